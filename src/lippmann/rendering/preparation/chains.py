@@ -6,8 +6,6 @@ clear glass or smooth gloss (docs/research/seen-light.md).
 
 from __future__ import annotations
 
-import numpy as np
-
 from lippmann.device.types import MitsubaScene
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.choices import REUSING
@@ -22,16 +20,3 @@ def count_chains(scene: MitsubaScene, request: RenderRequest) -> int:
     """
     is_denoised = request.denoise != "none" and request.box_filter and request.method not in REUSING
     return TUNING.chains if is_denoised and has_sharp_surfaces(scene) else 0
-
-
-def expected_samples(request: RenderRequest) -> int:
-    """Samples of a pixel that the picture will take, about.
-
-    The worst micro-image is that of a rare highlight, as a rule: where it is to be good, no few samples are counted on.
-    """
-    if not request.is_open_ended:
-        return request.samples
-    if request.quality is None or request.quality_worst is not None:
-        return TUNING.open_ended_samples
-    rest = TUNING.rest_variance if request.denoise == "none" else TUNING.clean_rest_variance
-    return int(np.clip(rest * 10 ** (request.quality / 10), TUNING.fewest_open_ended, TUNING.open_ended_samples))

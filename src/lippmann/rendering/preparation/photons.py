@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.rendering.film.memory_model import PHOTON, too_small
-from lippmann.rendering.preparation.chains import expected_samples
 from lippmann.rendering.preparation.exposure import gain_of
 from lippmann.rendering.preparation.photon_worth import are_worth_photons, shown_light
 from lippmann.rendering.preparation.seen_region import region_about, seen_points
+from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import find_casters, hides_caustics
 from lippmann.rendering.transport.caustic_photons import (
@@ -82,9 +82,10 @@ def shoot_photons(integrator: PathIntegrator, request: RenderRequest, source: Ra
         return Caustics(None)
     pixels = source.width * source.height * source.channels
     schedule = _schedule(pixels, request.is_open_ended)
-    passes = 1 if request.is_open_ended else -(-request.samples // schedule.most)
-    # Where the samples are known, a single pass is for no more than these.
-    most = schedule.most if request.is_open_ended else min(schedule.most, request.samples)
+    samples = TUNING.open_ended_samples if request.is_open_ended else request.samples
+    passes = 1 if request.is_open_ended else -(-samples // schedule.most)
+    # A single pass is for no more samples than there are.
+    most = min(schedule.most, samples)
     # No fewer where memory is short: it does not change a picture.
     required = 2 * emissions(pixels * most) * PHOTON
     if required > memory:
@@ -99,7 +100,7 @@ def shoot_photons(integrator: PathIntegrator, request: RenderRequest, source: Ra
         if request.caustics != "auto":
             return True
         light = shown_light(integrator, source, pilot, request.seed)
-        found = Caustics("photons", light=light, radiance=radiance, share=share, samples=expected_samples(request))
+        found = Caustics("photons", light=light, radiance=radiance, share=share, samples=samples)
         # Where there is no exposure yet, no light is known to be bright.
         return request.exposure == "auto" or found.are_worth_photons(gain_of(request.exposure))
 

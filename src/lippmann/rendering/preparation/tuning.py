@@ -15,10 +15,8 @@ class PreparationTuning:
         Chains of seen light with each path of a denoised picture. With 2, pictures of one sample lose 0.4 dB in the
         mean of ten scenes and clear coat 2.6 dB; with 8 they gain 0.3 dB and tracing takes a quarter longer
         (docs/research/seen-light.md).
-    open_ended_samples, fewest_open_ended:
-        Samples per pixel that a picture is taken to need at most, and at least, where something else says when to stop.
-    rest_variance, clean_rest_variance:
-        Mean squared error of one sample, in codes, of usual scenes; and what a denoiser leaves of it.
+    open_ended_samples:
+        Samples per pixel that a picture is taken to need where something else says when to stop.
     pilot_paths, pilot_paths_of_emitter:
         Paths by which emitters are weighed, in all, and of each emitter at least.
     pilot_surfaces:
@@ -56,9 +54,6 @@ class PreparationTuning:
 
     chains: int = 4
     open_ended_samples: int = 128
-    fewest_open_ended: int = 8
-    rest_variance: float = 0.01
-    clean_rest_variance: float = 0.001
     pilot_paths: int = 1 << 14
     pilot_paths_of_emitter: int = 1 << 8
     pilot_surfaces: int = 3
