@@ -31,12 +31,12 @@ PLAIN = HELP | {
     "pydantic_core",
 }
 PLAIN |= {"drjit", "imagecodecs", "mitsuba", "typing_extensions", "typing_inspection"}
-RENDER = PLAIN | {"cffi", "llvmlite", "pycparser", "pyoidn", "yaml"}
+RENDER = PLAIN | {"cffi", "llvmlite", "pycparser", "pyoidn"}
 BUDGETS = {
     "--help": (HELP, 25),
-    "preview teapot": (PLAIN, 285),
-    "render teapot": (RENDER, 355),
-    "render model.glb": (RENDER, 370),
+    "preview teapot": (PLAIN, 290),
+    "render teapot": (RENDER, 365),
+    "render model.glb": (RENDER, 380),
 }
 
 

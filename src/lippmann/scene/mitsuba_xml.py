@@ -16,7 +16,6 @@ from itertools import islice, zip_longest
 from os.path import relpath
 from pathlib import Path
 from xml.parsers import expat
-from xml.sax.saxutils import quoteattr
 
 from lippmann.errors import SceneError
 from lippmann.scene.mitsuba_plugins import check_material, check_plugin
@@ -32,6 +31,10 @@ MOST_ELEMENTS = 1_000_000
 MOST_LEVELS = 100
 
 _ESCAPED_DOLLAR = "\\$"
+#: What stands in an attribute's quotes for other characters; xml.sax.saxutils loads all of urllib.
+_ENTITIES = str.maketrans(
+    {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
+)
 _PARAMETER = re.compile(r"(?<!\\)\$(\w*)", re.ASCII)
 #: Elements without a type that Mitsuba copies from an included scene, beside its objects: other names for them.
 _NAMES = ("alias", "ref")
@@ -91,7 +94,8 @@ class MitsubaXml:
             words = [element.tag]
             for name, value in element.attributes:
                 text = places.get(value, value) if name == element.file else value
-                words.append(f"{name}={quoteattr(text.replace('$', _ESCAPED_DOLLAR))}")
+                quoted = text.replace("$", _ESCAPED_DOLLAR).translate(_ENTITIES)
+                words.append(f'{name}="{quoted}"')
             yield f"<{' '.join(words)}>", element._origin
             stack += [element.tag, *reversed(element.children)]
 
