@@ -6,7 +6,8 @@ python benchmarks/defaults.py OTHER [--today CHECKOUT] [--scenes NAME...] [--dis
 picture is a whole command in a process of its own, whose kernels are compiled; the two take turns. Measured are
 processor time and the clock's of the whole tree of processes, the largest one's peak memory, and in a further run the
 modules and the program's files that it loads. The PSNR is that of pixels all over the panel against a long plain
-rendering of these, which is made twice, so that its own error is known. Scenes and references are kept in ``--cache``.
+rendering of these by the same checkout, which is made twice, so that its own error is known. Scenes and references are
+kept in ``--cache``.
 Writes ``benchmarks/results/defaults.json``, where rows of other scenes and displays stay.
 """
 
@@ -19,7 +20,6 @@ import statistics
 import subprocess
 import sys
 import tempfile
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import defaults_scenes
-from harness import kept, median_ratio, save, saved
+from harness import median_ratio, save, saved
 
 HERE = Path(__file__).resolve().parent.parent
 BUNDLED = ("teapot", "room", "small-balls", "primitives", "tree", "gears")
@@ -71,16 +71,29 @@ class Checkout:
 
     def run(self, program: str, words: list[str]) -> dict[str, float]:
         """Run one command; seconds of the clock, of the processors, and the peak of its memory in bytes."""
-        own = self.folder / ".venv" / "bin" / "python"
-        python = str(own) if own.exists() else sys.executable
-        environment = {**os.environ, "PYTHONPATH": str(self.folder / "src")}
-        environment.pop("PYTHONDONTWRITEBYTECODE", None)  # Python keeps compiled modules, as for a user
-        command = [sys.executable, "-S", "-c", _TIMING, python, "-c", program, *words]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        command = [sys.executable, "-S", "-c", _TIMING, self._python(), "-c", program, *words]
+        done = subprocess.run(command, env=self._environment(), capture_output=True, text=True, check=True)
         figures: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
         if figures.pop("code"):
             raise RuntimeError(f"{' '.join(words)}: {done.stderr.strip()}")
         return figures
+
+    def trace_reference(self, scene: str, display: str, file: Path) -> None:
+        """Write the long rendering that this checkout's pictures are judged by."""
+        unfinished = file.with_suffix(".part.npz")
+        script = Path(__file__).parent / "defaults_reference.py"
+        words = [str(script), scene, display, str(JUDGED), str(REFERENCE_SAMPLES), str(unfinished)]
+        subprocess.run([self._python(), *words], env=self._environment(), check=True)
+        unfinished.replace(file)
+
+    def _python(self) -> str:
+        own = self.folder / ".venv" / "bin" / "python"
+        return str(own) if own.exists() else sys.executable
+
+    def _environment(self) -> dict[str, str]:
+        environment = {**os.environ, "PYTHONPATH": str(self.folder.resolve() / "src")}
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)  # Python keeps compiled modules, as for a user
+        return environment
 
     def commit(self) -> str:
         found = subprocess.run(
@@ -116,38 +129,13 @@ def measure(checkouts: dict[str, Checkout], words: list[str], out: Path, runs: i
 
 
 class Reference:
-    """Long renderings of pixels of one scene on one display, at an exposure of 0."""
+    """Long renderings of pixels of one scene on one display by one checkout, at an exposure of 0."""
 
-    def __init__(self, scene: str, display: str, file: Path) -> None:
-        values = kept(file, lambda: self._trace(scene, display))
-        self.columns, self.rows, self.halves = values["columns"], values["rows"], values["halves"]
-        self.seconds = float(values["seconds"])
-
-    @staticmethod
-    def _trace(scene: str, display: str) -> dict[str, Any]:
-        import lippmann
-        from lippmann.rendering.request.plan import resolve
-        from lippmann.rendering.request.render_request import RenderRequest
-        from lippmann.rendering.session import open_session
-
-        shown, panel = lippmann.load_scene(scene), lippmann.load_display(display)
-        request = RenderRequest(method="full", spp=REFERENCE_SAMPLES, exposure=0.0, caustics="paths")
-        request = resolve(request, shown, panel)
-        session = open_session(shown, request)
-        from lippmann.rendering.transport.ray_source import DisplayRays
-        from reference_pixels import trace_pixels
-
-        placement = session.place(panel)
-        source = DisplayRays(panel, placement.world_from_display, bool(request.subpixels))
-        integrator = session.integrator(source, placement.display_from_world)
-        random = np.random.default_rng(5)
-        columns, rows = random.integers(0, panel.panel.width, JUDGED), random.integers(0, panel.panel.height, JUDGED)
-        started = time.process_time()
-        halves = [
-            trace_pixels(session, source, integrator, columns, rows, REFERENCE_SAMPLES, seed) for seed in (991, 992)
-        ]
-        seconds = time.process_time() - started
-        return {"columns": columns, "rows": rows, "halves": np.stack(halves), "seconds": seconds}
+    def __init__(self, checkout: Checkout, scene: str, display: str, file: Path) -> None:
+        if not file.exists():
+            checkout.trace_reference(scene, display, file)
+        with np.load(file) as values:
+            self.columns, self.rows, self.halves = values["columns"], values["rows"], values["halves"]
 
     def judge(self, file: Path) -> dict[str, Any]:
         """PSNR of a picture in dB, what it states of itself, and the reference's own PSNR as the picture shows it."""
@@ -215,10 +203,9 @@ def main() -> None:
                     continue
                 words = ["render", named[name], "-d", display, "-q", "-o", "{out}"]
                 row = measure(checkouts, words, out, options.runs)
-                reference = Reference(
-                    named[name], display, options.cache / f"{name.replace(' ', '_')}_{display}_{REFERENCE_SAMPLES}.npz"
-                )
-                for side in checkouts:
+                for side, checkout in checkouts.items():
+                    kept = f"{name.replace(' ', '_')}_{display}_{REFERENCE_SAMPLES}_{commits[side]}.npz"
+                    reference = Reference(checkout, named[name], display, options.cache / kept)
                     row[side] |= reference.judge(out.with_stem(f"{side}_{out.stem}"))
                 add({"scene": name, "display": display, "seen": name in BUNDLED, **row})
 

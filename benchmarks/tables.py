@@ -12,6 +12,7 @@ from typing import Any
 
 import caustics_tables
 import conformance_tables
+import defaults_tables
 import drafts_tables
 import equal_error_tables
 import equal_time_tables
@@ -397,6 +398,7 @@ medians of {result["runs"]} runs.
 SECTIONS = {
     "methods": _methods,
     "first_picture": first_picture_tables.describe,
+    "defaults": defaults_tables.describe,
     "caustics": caustics_tables.describe,
     "photon_share": photon_share_tables.describe,
     "light_vertices": light_vertices_tables.describe,

@@ -22,8 +22,6 @@ main()
 HELP = {"annotated_doc", "lippmann", "shellingham", "typer"}
 PLAIN = HELP | {
     "annotated_types",
-    "charset_normalizer",
-    "colorama",
     "cython_runtime",
     "numpy",
     "psutil",
