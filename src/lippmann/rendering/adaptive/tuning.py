@@ -40,6 +40,8 @@ class AdaptiveTuning:
         Estimated PSNR in dB from which on a default picture gets no more samples, and that for which they are reckoned.
         The estimate is of light before tone mapping, which brings out the noise of highlights by up to 1.5 dB
         (``equal_time.py``).
+    clean_worst:
+        Estimated PSNR in dB from which on the worst micro-image needs no more samples, and for which they are reckoned.
     chosen_samples:
         Samples of a noisy pixel for one of all in the second half of a picture's samples (``equal_time.py``).
     noise_radius:
@@ -66,6 +68,7 @@ class AdaptiveTuning:
     modest_quality: float = 34.0
     clean: float = 35.5
     aim: float = 35.0
+    clean_worst: float = 25.0
     chosen_samples: int = 4
     noise_radius: int = 1
     least_noise: float = 0.75
