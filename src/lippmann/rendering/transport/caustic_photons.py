@@ -32,7 +32,7 @@ _FEWEST_OF_PAIR = 64
 _UNIFORM_SHARE = 0.1
 #: Emissions of each half: one for so many samples of the picture, within limits. An emission takes as long as one and a
 #: half paths (`benchmarks/photon_share.py`): with twice as many, caustics have 1 to 2 dB less noise.
-SAMPLES_OF_EMISSION, FEWEST, MOST = 8, 1 << 15, 1 << 21
+SAMPLES_OF_EMISSION, FEWEST, MOST = 8, 1 << 16, 1 << 21
 #: Photons within the radius of a look-up, as a rule, where there are so many emissions.
 NEIGHBOURS, EMISSIONS_OF_NEIGHBOURS = 50, 1 << 18
 #: Photons within the radius of a look-up in those of the pilot.
