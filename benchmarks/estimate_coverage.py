@@ -172,13 +172,13 @@ def stated(case: Case, way: str) -> Iterator[dict[str, Any]]:
 
 def promised(case: Case, way: str, qualities: tuple[int, ...]) -> Iterator[dict[str, Any]]:
     """What comes of asking for a quality."""
-    from lippmann.rendering.adaptive.stopping import TOLERANCE
+    from lippmann.rendering.adaptive.tuning import TUNING
 
     for quality in qualities:
         for seed in SEEDS:
             found = case.beside_the_truth(case.trace(way, 100 + seed, quality_worst=quality, spp=MOST))
             end = "samples" if found["samples"] >= MOST else "quality"
-            kept = end == "quality" and found["worst"] >= quality - TOLERANCE
+            kept = end == "quality" and found["worst"] >= quality - TUNING.tolerance
             yield {"quality": quality, "seed": seed, "end": end} | found | {"kept": kept}
 
 

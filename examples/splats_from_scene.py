@@ -19,8 +19,8 @@ from scipy.spatial.transform import Rotation
 
 import lippmann
 from lippmann.color.transfer import encode_srgb
+from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.request.resolve import resolve
 from lippmann.rendering.session import open_session
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import Splats, real_harmonics
