@@ -50,7 +50,7 @@ def remark_objects(depsgraph: Any, remark: Any) -> None:
 def remark_scene(scene: Any, view_layer: Any, remark: Any) -> None:
     """Name what the scene does to its pictures and displays do not show."""
     if scene.render.film_transparent and scene.world is not None:
-        remark("its pictures are transparent where the world is shown here: --background 0,0,0 hides it")
+        remark("its pictures are transparent where the world is shown here (background=0,0,0 hides it)")
     space = bpy.data.colorspace.working_space if hasattr(bpy.data, "colorspace") else _REC709  # from Blender 5 on
     if space != _REC709:
         remark(f"its colours are converted from {space}; light is multiplied in Rec. 709")
