@@ -20,6 +20,8 @@ from lippmann.errors import LippmannError
 REFUSED = {
     ("layout-lftoolbox", "seed-5"): "has no display in it",
     ("layout-lftoolbox", "seed-5-packed"): "has no display in it",
+    # Their pixels are read first.
+    **{("photograph", seed): "needs a depth map" for seed in named_seeds("photograph") if seed.endswith(".tif")},
 }
 
 

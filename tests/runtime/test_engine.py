@@ -314,7 +314,7 @@ def test_diagnosis_tells_a_wrong_picture(monkeypatch, tmp_path):
         "class detail:\n"
         "    llvm_version = staticmethod(lambda: (19, 1, 0))\n"
         "has_backend = lambda which: True\n"
-        "JitBackend = LogLevel = set_log_level = set_thread_count = Anything()\n"
+        "JitBackend = LogLevel = set_log_level = set_thread_count = syntax = Anything()\n"
         "thread_count = lambda: 1\n"
     )
     if not GOOD:

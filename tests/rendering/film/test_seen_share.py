@@ -37,6 +37,7 @@ def test_glowing_surfaces_before_black_are_something(engine):
     from lippmann import api
 
     glow = {"type": "rectangle", "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 3.0}}}
-    preview = api.preview(api.load_scene({"type": "scene", "glow": glow}, environment="none"), (32, 32), spp=1)
+    scene = api.load_scene({"type": "scene", "glow": glow}, environment="none")
+    preview = api.preview(scene, (32, 32), spp=1, tone_map="none")
     assert preview.pixels.max() > 1
     assert not any("empty" in note for note in preview.provenance.notes)

@@ -189,7 +189,7 @@ def test_defaults_follow_the_scene(tmp_path):
     own = resolve(RenderRequest(), scene, form="preview")
     assert (own.spp, own.pixel_filter) == (4, "box")
     path = resolve(RenderRequest(integrator="path"), scene)
-    assert (path.integrator, path.depth, path.spp, path.pixel_filter) == ("path", None, 16, "box")
+    assert (path.integrator, path.depth, path.spp, path.pixel_filter) == ("path", 8, 16, "box")
     assert resolve(RenderRequest(), load_scene("teapot")).integrator == "path"
     assert resolve(RenderRequest(integrator="classic"), load_scene("teapot")).depth == 2
     assert resolve(RenderRequest(), load_scene("tree")).integrator == "classic"
