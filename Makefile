@@ -9,7 +9,7 @@ ROUNDS ?= 20
 OPEN := $(if $(filter Darwin,$(shell uname -s)),open,xdg-open)
 
 .DEFAULT_GOAL := help
-.PHONY: addon audit check docs help setup setup-dev demo test test-long test-oldest measure-tests search lint clean
+.PHONY: addon audit check docs help setup setup-dev demo test test-long test-oldest search lint clean
 
 help:
 	@echo 'make demo    set up and render a teapot for a lenticular display into $(PICTURE)'
@@ -57,16 +57,11 @@ lint: setup-dev
 test: lint
 	.venv/bin/python -m pytest -n $(JOBS) --dist worksteal -m 'not long' $(PYTEST)
 
-# The tests of tests/long.txt, and those that bear the marker.
 test-long: setup-dev
 	.venv/bin/python -m pytest -n $(JOBS) --dist worksteal -m long $(PYTEST)
 
-# The tests that are not in tests/slow.txt.
 check: lint
-	.venv/bin/python -m pytest -n $(JOBS) --quick $(PYTEST)
-
-measure-tests: setup-dev
-	.venv/bin/python scripts/measure_tests.py -q
+	.venv/bin/python -m pytest -n $(JOBS) -m 'not slow and not long' $(PYTEST)
 
 search: setup-dev
 	.venv/bin/python -m pytest -n auto -m hypothesis --hypothesis-profile search --rounds $(ROUNDS) $(PYTEST)

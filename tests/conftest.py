@@ -39,37 +39,21 @@ OF_PYTEST = re.compile(r"site-packages.(pluggy|_pytest|xdist|execnet)\b")
 def pytest_addoption(parser):
     # Tests state how many examples they take; a search takes more of them by further rounds.
     parser.addoption("--rounds", type=int, default=1, help="run each property test so many times")
-    parser.addoption("--quick", action="store_true", help="leave out the tests of tests/slow.txt and the long ones")
 
 
-def slow_tests() -> dict[str, float]:
-    """Tests that `make check` leaves out, and their processor seconds."""
-    return _listed("slow.txt")
-
-
-def long_tests() -> dict[str, float]:
-    """Tests, or cases of them in brackets, that `make test` leaves out, and their seconds."""
-    return _listed("long.txt")
-
-
-def _listed(name: str) -> dict[str, float]:
-    lines = (ROOT / "tests" / name).read_text(encoding="utf-8").splitlines()
-    pairs = (line.split(" ", 1) for line in lines if line and not line.startswith("#"))
-    return {name: float(seconds) for seconds, name in pairs}
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(config, items):
-    long = long_tests()
-    for item in items:
-        if item.nodeid in long or item.nodeid.partition("[")[0] in long:
-            item.add_marker("long")
-    if not config.getoption("--quick"):
-        return
-    slow = slow_tests()
-    is_out = [item.nodeid.partition("[")[0] in slow or "long" in item.keywords for item in items]
-    config.hook.pytest_deselected(items=[item for item, out in zip(items, is_out, strict=True) if out])
-    items[:] = [item for item, out in zip(items, is_out, strict=True) if not out]
+@pytest.hookimpl(wrapper=True)
+def pytest_pycollect_makeitem():
+    """``long_cases("a", "b")`` makes these cases of a test ``long``; ``long_cases(but=["a"])`` all the others."""
+    items = yield
+    for item in items if isinstance(items, list) else []:
+        for mark in item.iter_markers("long_cases"):
+            named = mark.args or mark.kwargs["but"]
+            absent = set(named) - {one.callspec.id for one in items}
+            if absent:
+                raise pytest.Collector.CollectError(f"{item.originalname} has no case {sorted(absent)}")
+            if (item.callspec.id in named) == bool(mark.args):
+                item.add_marker("long")
+    return items
 
 
 def pytest_generate_tests(metafunc):

@@ -22,6 +22,7 @@ def small():
     return load_display("seed-lenticular").resized(64, 32)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "former",
     [

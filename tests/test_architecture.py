@@ -254,6 +254,7 @@ def test_every_part_has_its_place_in_the_order():
     assert {part(module) for module in modules()} <= set(ORDER)
 
 
+@pytest.mark.long
 def test_parts_import_only_from_parts_before_them():
     assert places([found for found in imports() if breaks_order(found)]) == []
 
@@ -278,6 +279,7 @@ def test_the_order_is_read_rightly(module, source, broken):
     assert any(breaks_order(found) for found in imports_of(module, source)) == broken
 
 
+@pytest.mark.slow
 def test_modules_of_a_package_do_not_import_each_other_in_a_circle():
     assert cycles(imports_inside_packages()) == []
 

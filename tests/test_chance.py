@@ -59,6 +59,7 @@ def test_chance_is_seen(code, found):
     assert found in "".join(seen)
 
 
+@pytest.mark.slow
 def test_no_test_depends_on_chance():
     conftest = TESTS / "conftest.py"
     seen = {path: list(faults(path.read_text(encoding="utf-8"))) for path in FILES if path != conftest}

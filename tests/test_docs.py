@@ -141,6 +141,21 @@ def serve_once(content, what, console, *, host, port, browser, folder="", starte
     console.result({"address": server.address}, server.address)
 
 
+@pytest.mark.long_cases(
+    but=[
+        "README.md",
+        "docs/how-to/calibrate.md",
+        "docs/how-to/caustics.md",
+        "docs/how-to/install.md",
+        "docs/how-to/reach-the-panel.md",
+        "docs/how-to/volumes.md",
+        "docs/reference/layers.md",
+        "docs/reference/looking-glass.md",
+        "docs/reference/monitor-display.md",
+        "docs/tutorials/print-maker.md",
+    ]
+)
+@pytest.mark.slow
 @pytest.mark.parametrize("page", [p for p in PAGES if commands(p)], ids=name)
 def test_commands_and_python_run_in_the_order_of_the_page(page, workplace, engine, capfd, monkeypatch):
     from lippmann.cli import run
@@ -154,6 +169,7 @@ def test_commands_and_python_run_in_the_order_of_the_page(page, workplace, engin
     run_python(page)
 
 
+@pytest.mark.long_cases("docs/tutorials/python.md")
 @pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "python") and not commands(p)], ids=name)
 def test_python_examples_run(page, workplace, engine):
     run_python(page)
@@ -192,6 +208,7 @@ def site(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_the_site_tells_of_every_option_and_function(site):
     render = (site / "reference" / "commands" / "render.html").read_text(encoding="utf-8")
     assert "--quality" in render
@@ -209,6 +226,7 @@ def test_the_site_shows_the_tables_of_properties(site):
         assert name.replace("&", "&amp;") in page, table.stem
 
 
+@pytest.mark.slow
 def test_pages_of_the_site_load_nothing_from_other_hosts(site):
     pages = list(site.rglob("*.html"))
     assert len(pages) > 50

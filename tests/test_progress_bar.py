@@ -30,6 +30,7 @@ def test_stages_that_come_back_do_not_turn_it_back():
     assert 0 < found[0] < found[-1] <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [

@@ -120,6 +120,12 @@ def test_the_workflow_covers_three_systems_and_the_oldest_python():
     assert {"make test", "docker build --target check ."} <= set(run_lines())
 
 
+def test_all_tests_are_run_each_week():
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "all-tests.yml").read_text(encoding="utf-8"))
+    assert workflow[True]["schedule"]  # YAML 1.1 reads the key ``on`` as true
+    assert {"make test", "make test-long"} <= {step.get("run") for step in workflow["jobs"]["all-tests"]["steps"]}
+
+
 def test_the_container_copies_what_is_there_and_runs_the_check():
     stages = re.findall(r"^FROM \S+ AS (\w+)$", DOCKERFILE, re.M)
     assert stages == ["system", "check", "lippmann"]

@@ -47,6 +47,7 @@ def loaded(words, folder):
     return json.loads(file.read_text())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", BUDGETS)
 def test_a_command_loads_no_more_than_it_may(command, tmp_path, request):
     packages, most = BUDGETS[command]

@@ -43,6 +43,7 @@ def test_lines_of_progress(addon, line, told):
     assert addon("job").parse_progress(line) == told
 
 
+@pytest.mark.slow
 @given(st.text(max_size=40))
 def test_any_line(addon, line):
     told = addon("job").parse_progress(line)

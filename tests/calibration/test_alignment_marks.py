@@ -133,6 +133,7 @@ def test_cutting_lines_begin_where_the_picture_ends():
     assert not ink[M : height - M, M : width - M].any()
 
 
+@pytest.mark.slow
 @given(window=st.builds(PixelWindow, st.integers(0, 700), st.integers(0, 500), st.integers(1, 90), st.integers(1, 80)))
 @settings(deadline=None, max_examples=40)
 def test_windows_are_cut_from_the_whole(window):

@@ -41,6 +41,7 @@ def opened(image, tmp_path, monkeypatch):
     return both
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bits", [8, 16, 32])
 def test_piece_by_piece_gives_the_same(opened, tmp_path, bits):
     whole, large = opened(bits)

@@ -71,6 +71,7 @@ def test_what_could_not_be_read_is_left_out():
     assert (painted(PixelWindow(0, 0, 20, 20), None) == 0.5).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pitch", "slope", "center"])
 def test_every_field_has_its_label_and_keeps_most_of_its_pattern(name):
     pattern = Pattern(name, fields=5)

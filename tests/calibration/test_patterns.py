@@ -129,6 +129,7 @@ def test_stripes_stand_on_the_panel_and_wander_at_wrong_values(display):
         assert abs(abs(best) / (480 if display == "pitch" else 264) - 1 / 3) < 0.06
 
 
+@pytest.mark.slow
 def test_a_wrong_centre_shifts_all_at_once():
     pixels = draw(Pattern("stripes", views=3), replace(MONITOR, center=MONITOR.center + 1 / 3))
     # A larger centre: a smaller place under the lens, the view further right.

@@ -43,6 +43,7 @@ def options_of(command):
     return [each.opts for each in of_values if not NAMES & set(each.opts)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command", [pytest.param(name, marks=() if name == "replay" else pytest.mark.long) for name in NEEDED]
 )

@@ -35,6 +35,7 @@ def kept(tmp_path):
     assert {entry.name for entry in tmp_path.iterdir() if "part" in entry.name} == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "content"),
     [
@@ -107,6 +108,7 @@ def test_an_unknown_display_suggests_a_known_one(lippmann, kept):
     refuse(lippmann("render", "teapot", "--display", "seed-lenticluar", *FAST, "-o", kept), "seed-lenticular")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "named"),
     [
@@ -150,6 +152,7 @@ def test_an_output_folder_that_cannot_be_written(lippmann, tmp_path):
     refuse(lippmann("render", "teapot", *FAST, "-o", folder / "out.png"), "out.png")
 
 
+@pytest.mark.long
 def test_a_full_disk(lippmann, picture, tmp_path):
     if not Path("/dev/full").exists():
         pytest.skip("there is no /dev/full on this system")
@@ -175,7 +178,8 @@ def test_a_full_disk(lippmann, picture, tmp_path):
     assert [entry.name for entry in tmp_path.iterdir()] == ["out.png"]
 
 
-@pytest.mark.parametrize("delay", [2.0, 4.0])
+@pytest.mark.slow
+@pytest.mark.parametrize("delay", [2.0, pytest.param(4.0, marks=pytest.mark.long)])
 def test_ctrl_c_in_the_middle(tmp_path, delay):
     out = tmp_path / "out.png"
     out.write_bytes(b"older")
@@ -207,6 +211,7 @@ def test_pictures_that_will_not_do(lippmann, tmp_path, kept):
     refuse(lippmann("compose", tmp_path, "-o", kept), str(tmp_path))
 
 
+@pytest.mark.slow
 def test_a_fault_of_the_program_is_one_line_and_exit_code_1(lippmann, picture, monkeypatch):
     import lippmann.image
 

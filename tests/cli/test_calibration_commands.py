@@ -100,6 +100,7 @@ def test_what_an_eye_sees_of_the_pattern(lippmann, monitor_file, tmp_path):
     assert colors == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "said"),
     [

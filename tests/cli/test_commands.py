@@ -16,6 +16,7 @@ def picture_size(path):
         return picture.size
 
 
+@pytest.mark.slow
 def test_render_says_what_it_did(lippmann, tmp_path, engine):
     out = tmp_path / "a.png"
     done = lippmann("render", "teapot", "--method", "full", "--spp", 2, "--depth", 2, "--seed", 7, "--json", "-o", out)
@@ -31,6 +32,7 @@ def test_render_says_what_it_did(lippmann, tmp_path, engine):
     assert read_picture(out).provenance.depth == 2
 
 
+@pytest.mark.slow
 def test_render_prints_the_depth_range_beside_what_the_display_resolves(lippmann, tmp_path, engine):
     done = lippmann("render", "teapot", "--spp", 1, "--integrator", "direct", "-o", tmp_path / "a.png")
     assert done.code == 0
@@ -38,6 +40,7 @@ def test_render_prints_the_depth_range_beside_what_the_display_resolves(lippmann
     assert "display resolves" in done.err
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_bytes_of_pixels(lippmann, tmp_path, engine):
     for name in ("a", "b"):
         assert lippmann("render", "teapot", "--spp", 2, "-q", "-o", tmp_path / f"{name}.exr").code == 0
@@ -45,6 +48,7 @@ def test_the_same_seed_gives_the_same_bytes_of_pixels(lippmann, tmp_path, engine
     assert np.array_equal(a, b)
 
 
+@pytest.mark.long
 def test_memory_does_not_change_the_picture(lippmann, tmp_path, engine):
     for name, memory in (("a", "4G"), ("b", "32M")):
         words = ("render", "teapot", "--spp", 2, "-q", "--memory", memory, "-o", tmp_path / f"{name}.exr")
@@ -53,6 +57,7 @@ def test_memory_does_not_change_the_picture(lippmann, tmp_path, engine):
     assert np.array_equal(a, b)
 
 
+@pytest.mark.long
 def test_single_scattering_darkens_rough_metal_and_is_told(lippmann, tmp_path, engine):
     ball = trimesh.creation.icosphere(3)
     rough = trimesh.visual.material.PBRMaterial(metallicFactor=1.0, roughnessFactor=1.0, baseColorFactor=[255] * 4)
@@ -68,6 +73,7 @@ def test_single_scattering_darkens_rough_metal_and_is_told(lippmann, tmp_path, e
     assert means[1] < 0.95 * means[0]
 
 
+@pytest.mark.long
 def test_an_empty_picture_is_told(lippmann, tmp_path, engine):
     words = ("render", "teapot", "--spp", 1, "--place", "fit", "-o", tmp_path / "a.png")
     done = lippmann(*words, "--shift", "500,0,0")
@@ -92,6 +98,7 @@ def test_info_tells_where_a_picture_came_from(lippmann, picture):
     assert values["display"]["gap"] == 6.8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["views", "micro-images"])
 def test_taking_apart_and_composing_gives_the_same_pixels(lippmann, picture, tmp_path, command):
     folder, out = tmp_path / "parts", tmp_path / "again.png"
@@ -125,6 +132,7 @@ def test_a_sweep_is_an_animation(lippmann, picture, tmp_path, ending):
         assert out.read_bytes()[4:8] == b"ftyp"
 
 
+@pytest.mark.slow
 def test_preview_renders_the_plain_picture(lippmann, tmp_path, engine):
     done = lippmann("preview", "teapot", "--plain", "--spp", 1, "--pixels", "40x30", "-o", tmp_path / "p.png", "--json")
     assert done.json["rays"]["primary"] == 1200
@@ -144,6 +152,7 @@ def test_displays_lists_pixels_lenses_field_and_depth(lippmann):
     assert re.search("^seed-lenticular +512x512 +64 +8 ", text, re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_doctor_says_whether_a_render_would_run(lippmann):
     done = lippmann("doctor", "--json")
     assert done.code == 0
@@ -154,6 +163,7 @@ def test_doctor_says_whether_a_render_would_run(lippmann):
         assert f"extra {extra}" in said
 
 
+@pytest.mark.slow
 def test_version_and_help(lippmann):
     import lippmann as package
 

@@ -7,6 +7,7 @@ import pytest
 from lippmann.image import read_picture
 
 
+@pytest.mark.slow
 def test_the_command_writes_shades_and_a_legend_but_floats_as_they_are(lippmann, engine, tmp_path):
     done = lippmann("render", "teapot", "--integrator", "depth", "-o", tmp_path / "d.png")
     assert "see d-legend.png; .exr keeps millimetres" in done.err

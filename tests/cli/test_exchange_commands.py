@@ -11,6 +11,7 @@ from lippmann.image import read_picture
 PATHS = {"hci": "out", "lftoolbox": "out.mat", "eslf": "out.png", "zarr": "out.lf", "views": "out"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", list(PATHS))
 def test_there_and_back(lippmann, picture, tmp_path, layout):
     path = tmp_path / PATHS[layout]
@@ -62,6 +63,7 @@ def test_another_program_s_views_on_a_display_that_is_asked_for(lippmann, tmp_pa
     assert codes[0, 0].tolist() == [224, 0, 9]
 
 
+@pytest.mark.slow
 def test_bad_input_is_one_line_and_code_2(lippmann, picture, tmp_path):
     out, there = tmp_path / "out", tmp_path / "there"
     there.mkdir()

@@ -8,6 +8,7 @@ import pytest
 from lippmann.image import read_picture
 
 
+@pytest.mark.long
 def test_layers_go_into_the_file_with_the_picture(lippmann, engine, tmp_path):
     plain, layered = tmp_path / "plain.exr", tmp_path / "layered.exr"
     words = ("render", "teapot", "--integrator", "direct", "--spp", 1, "-q")
@@ -31,6 +32,7 @@ def test_layers_need_a_file_that_holds_them(lippmann, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_denoising_brings_a_picture_nearer_to_a_long_one(lippmann, engine, tmp_path):
     for name, words in {"noisy": ("--denoise", "none"), "denoised": ("--denoise", "oidn")}.items():
         done = lippmann("render", "teapot", "--spp", 2, *words, "--json", "-o", tmp_path / f"{name}.exr")

@@ -39,6 +39,7 @@ json.dump(said, sys.stdout)
 """
 
 
+@pytest.mark.slow
 def test_every_writer_says_it_in_one_line_and_leaves_nothing(picture, tmp_path):
     words = {name: [str(picture) if word == "PICTURE" else word for word in each] for name, each in WRITERS.items()}
     child = subprocess.run(

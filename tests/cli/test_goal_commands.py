@@ -19,6 +19,7 @@ def small(cut_display):
     return cut_display(128, 48)
 
 
+@pytest.mark.slow
 def test_a_quality_is_worked_for_and_stated(lippmann, engine, tmp_path, small):
     out = tmp_path / "a.png"
     done = lippmann("render", "teapot", "--display", small, "--quality-worst", 30, "--json", "-o", out)
@@ -35,6 +36,8 @@ def test_a_quality_is_worked_for_and_stated(lippmann, engine, tmp_path, small):
     assert more.json["estimate"]["psnr"] >= 36
 
 
+@pytest.mark.long_cases(but=["--quality-worst-primitives", "--quality-worst-teapot"])
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["gears", "primitives", "room", "small-balls", "teapot", "tree"])
 @pytest.mark.parametrize(
     "goal", [("--quality-worst", 20), ("--quality", 20), ("--max-time", 1)], ids=lambda goal: goal[0]
@@ -50,6 +53,7 @@ def test_every_bundled_scene_has_a_goal_with_the_light_it_was_made_for(lippmann,
     assert goal[0] == "--max-time" or done.json["estimate"]["psnr"] > 19
 
 
+@pytest.mark.slow
 def test_samples_alone_are_judged_too_and_the_error_is_a_layer(lippmann, engine, tmp_path, small):
     out = tmp_path / "a.exr"
     done = lippmann("render", "teapot", "--display", small, "--spp", 4, "--maps", tmp_path / "maps", "-o", out)
@@ -61,6 +65,7 @@ def test_samples_alone_are_judged_too_and_the_error_is_a_layer(lippmann, engine,
     assert set(np.unique(image.maps["samples"])) == {4}
 
 
+@pytest.mark.long
 def test_time_ends_it_and_the_quality_reached_is_said(lippmann, engine, tmp_path, small):
     words = ("--quality-worst", 60, "--max-time", 4, "--denoise", "none")
     started = time.process_time()
@@ -79,12 +84,14 @@ def test_samples_bound_a_quality(lippmann, engine, tmp_path, small):
     assert "the samples are spent" in done.err
 
 
+@pytest.mark.slow
 def test_one_sample_says_why_it_says_nothing(lippmann, engine, tmp_path, small):
     done = lippmann("render", "teapot", "--display", small, "--spp", 1, "--json", "-o", tmp_path / "a.png")
     assert done.json["estimate"] is None
     assert "one sample per pixel does not tell" in done.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
@@ -107,6 +114,7 @@ def test_goals_that_cannot_be_are_refused(lippmann, engine, tmp_path, words, com
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_pixels_that_were_carried_over_have_had_no_samples(lippmann, engine, tmp_path, small):
     out = tmp_path / "a.exr"
     words = ("--method", "lens-view", "--spp", 2, "--maps", tmp_path / "maps")
@@ -120,6 +128,7 @@ def test_pixels_that_were_carried_over_have_had_no_samples(lippmann, engine, tmp
 # ---- auto -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_auto_is_the_default_and_says_what_it_took(lippmann, engine, tmp_path, small):
     out = tmp_path / "a.png"
     done = lippmann("render", "teapot", "--display", small, "--spp", 2, "--json", "-o", out)
@@ -134,6 +143,7 @@ def test_auto_is_the_default_and_says_what_it_took(lippmann, engine, tmp_path, s
     assert np.array_equal(read_picture(out).pixels, read_picture(plain).pixels)
 
 
+@pytest.mark.long
 def test_a_quality_is_reached_by_the_denoised_picture(lippmann, engine, tmp_path, small):
     words = ("render", "teapot", "--display", small, "--quality", 38, "--json", "-o")
     done = lippmann(*words, tmp_path / "a.png")
@@ -159,6 +169,7 @@ def test_a_time_too_short_for_two_samples_gives_one_and_says_so(lippmann, engine
     assert "there was time for one sample per pixel only" in done.err
 
 
+@pytest.mark.slow
 def test_a_draft_and_a_modest_quality_take_no_more_samples_than_nothing_asked(lippmann, engine, tmp_path, cut_display):
     """What a picture has anyway is assessed after the fewest samples, however cheap more of them are."""
     small, out = cut_display(512, 160), tmp_path / "a.png"
@@ -177,6 +188,7 @@ def test_a_draft_and_a_modest_quality_take_no_more_samples_than_nothing_asked(li
     assert 30 <= modest["estimate"]["psnr"] < usual["estimate"]["psnr"]
 
 
+@pytest.mark.slow
 def test_a_final_picture_says_that_it_is_good(lippmann, engine, tmp_path, small):
     done = lippmann("render", "teapot", "--display", small, "--effort", "final", "--json", "-o", tmp_path / "a.png")
     assert done.code == 0, done.err

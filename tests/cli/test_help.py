@@ -25,6 +25,7 @@ def commands(command=None, words=()):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", commands())
 def test_each_command_has_two_examples_that_parse(name):
     assert len(EXAMPLES[name]) == 2
@@ -53,6 +54,7 @@ def test_every_command_has_a_group():
     assert {name for names in COMMAND_GROUPS.values() for name in names} >= set(top.commands)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [(), ("--help",), ("render", "--help"), ("quilt", "--help"), ("plan", "--help")])
 def test_help_is_well_formed(lippmann, words):
     done = lippmann(*words)
@@ -87,6 +89,7 @@ def test_names_are_completed(monkeypatch, tmp_path):
 
 
 class TestOutputsThatNobodyNamed:
+    @pytest.mark.slow
     def test_they_are_named_after_the_scene(self, lippmann, engine, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         words = ("render", "teapot", "--spp", 1, "--integrator", "albedo")

@@ -55,6 +55,7 @@ COMMANDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_pipe_that_nobody_writes_into_is_not_waited_for(name, tmp_path, monkeypatch):
     from lippmann.cli import run
@@ -70,6 +71,7 @@ def test_a_pipe_that_nobody_writes_into_is_not_waited_for(name, tmp_path, monkey
     assert "is a pipe, no file" in said.getvalue().splitlines()[-1]
 
 
+@pytest.mark.slow
 def test_a_device_that_never_ends_is_refused():
     refused("info", "/dev/zero", says="/dev/zero: is a device, no file")
 
@@ -90,6 +92,7 @@ def exr(width, height, tile):
     return head + attribute(b"tiles", b"tiledesc", struct.pack("<IIB", *tile, 0)) + b"\0" + bytes(4096)
 
 
+@pytest.mark.long
 def test_tiles_larger_than_their_picture_get_no_memory(tmp_path):
     (tmp_path / "t.exr").write_bytes(exr(64, 32, (30000, 30000)))
     refused(
@@ -97,6 +100,7 @@ def test_tiles_larger_than_their_picture_get_no_memory(tmp_path):
     )
 
 
+@pytest.mark.long
 def test_textures_count_against_the_memory_that_was_given(tmp_path):
     """Ten files of 190 kB are 2.7 GB of pixels."""
     packed = zlib.compress(bytes(8192 * 8192 * 3 + 8192), 9)
@@ -132,6 +136,7 @@ def test_textures_count_against_the_memory_that_was_given(tmp_path):
     refused("preview", tmp_path / "s.gltf", "--memory", "1G", "-o", tmp_path / "x.png", says="allow more with --memory")
 
 
+@pytest.mark.slow
 def test_a_light_field_of_one_packed_byte_is_refused(tmp_path):
     """A variable of 8 GB, packed, in the head of a file of 300 bytes."""
     body = struct.pack("<II2I", 6, 8, 9, 0) + struct.pack("<II5i4x", 5, 20, 8, 8, 5000, 8000, 3)
@@ -158,6 +163,7 @@ def test_a_photograph_larger_than_memory_is_refused_before_it_is_decoded(tmp_pat
     assert "6000 x 6000 pixels takes 275 MiB of memory; 100 MiB are left" in said.getvalue().splitlines()[-1]
 
 
+@pytest.mark.long
 def test_a_full_disk_ends_a_light_field_in_one_line(lippmann, tmp_path, engine):
     """HDF5's library ended the process where it could write no more."""
     picture, written = tmp_path / "p.png", tmp_path / "p.mat"

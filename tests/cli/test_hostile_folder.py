@@ -35,12 +35,16 @@ def lippmann(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [
         ("doctor",),
-        ("preview", "teapot", "--pixels", "16x16", "--spp", "1", "-o", "x.png"),
-        ("preview", "scene.xml", "--plain", "--pixels", "16x16", "--spp", "1", "-o", "x.png"),
+        pytest.param(("preview", "teapot", "--pixels", "16x16", "--spp", "1", "-o", "x.png"), marks=pytest.mark.long),
+        pytest.param(
+            ("preview", "scene.xml", "--plain", "--pixels", "16x16", "--spp", "1", "-o", "x.png"),
+            marks=pytest.mark.long,
+        ),
     ],
     ids=("doctor", "bundled scene", "scene file"),
 )
@@ -60,6 +64,7 @@ def test_a_library_is_asked_for_its_version_elsewhere(folder, monkeypatch):
     assert not (folder / "marker").exists()
 
 
+@pytest.mark.slow
 def test_settings_of_the_compiler_are_not_taken_from_the_folder(folder):
     (folder / ".numba_config.yaml").write_text("cache_dir: kernels\n")
     run = lippmann(

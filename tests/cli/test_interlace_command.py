@@ -51,6 +51,8 @@ def interlace(lippmann, frames, path, *options):
         return np.asarray(picture)
 
 
+@pytest.mark.long_cases("options0-print.tif")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["print.tif", "print.png"])
 @pytest.mark.parametrize("options", [(), ("--reverse",)])
 def test_each_eye_sees_its_photograph_behind_every_lens(lippmann, frames, tmp_path, name, options):
@@ -60,6 +62,7 @@ def test_each_eye_sees_its_photograph_behind_every_lens(lippmann, frames, tmp_pa
         assert (seen(codes, (number + 0.5) / COUNT) == level).all()
 
 
+@pytest.mark.slow
 def test_lenses_across_show_the_first_photograph_from_above(lippmann, frames, tmp_path):
     codes = interlace(lippmann, frames, tmp_path / "flip.tif", "--size", "20x30mm", "--lenses", "across")
     assert codes.shape == (472, 315, 3)
@@ -162,6 +165,7 @@ def test_profile_is_embedded_and_the_display_is_in_the_file(lippmann, frames, tm
         assert not file.is_bigtiff
 
 
+@pytest.mark.slow
 def test_a_folder_a_display_and_what_is_said(lippmann, frames, tmp_path):
     result = lippmann("interlace", frames[0].parent, "-d", "lkg-portrait", "-o", tmp_path / "lkg.png", "--json")
     assert result.json["size"] == [1536, 2048]

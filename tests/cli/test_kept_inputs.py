@@ -16,6 +16,7 @@ def picture(lippmann, tmp_path, engine):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [
@@ -37,6 +38,7 @@ def test_a_picture_is_kept(lippmann, picture, words):
     assert picture.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_links_are_the_same_file(lippmann, picture, tmp_path):
     os.link(picture, tmp_path / "hard.png")
     (tmp_path / "soft.png").symlink_to(picture)

@@ -27,6 +27,7 @@ def content(path):
     return {file.relative_to(path).as_posix(): file.read_bytes() for file in files if file.is_file()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [
@@ -49,6 +50,7 @@ def test_the_outcome_is_the_same(lippmann, pair, tmp_path, monkeypatch, words):
     assert content(tmp_path / f"pieces{ending}") == content(tmp_path / f"whole{ending}")
 
 
+@pytest.mark.slow
 def test_figures_are_the_same(lippmann, pair, tmp_path, monkeypatch):
     found = []
     for limit in (0, 1 << 25):

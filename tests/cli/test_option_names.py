@@ -42,6 +42,7 @@ def library():
             yield name, ast.parse(path.read_text(encoding="utf-8"))
 
 
+@pytest.mark.long
 def test_every_parameter_that_an_error_names_is_an_option():
     named = {
         keyword.value.value: name
@@ -56,6 +57,7 @@ def test_every_parameter_that_an_error_names_is_an_option():
     assert {parameter for parameter in unknown if parameter not in OF_THE_LIBRARY} == set(), unknown
 
 
+@pytest.mark.long
 def test_the_library_says_no_flag():
     said = [
         (name, node.value)

@@ -143,6 +143,7 @@ def test_the_woven_picture_is_replayed(lippmann, views, calibration, tmp_path):
     assert levels[2] > 200
 
 
+@pytest.mark.slow
 def test_bad_input_is_one_line_and_code_2(lippmann, views, calibration, tmp_path):
     def refused(*words):
         outcome = lippmann(*words)

@@ -28,6 +28,7 @@ def psnr(lippmann, reference, picture):
     return lippmann("compare", reference, picture, "--json").json["psnr"]
 
 
+@pytest.mark.long
 def test_it_denoises_shares_and_knows_its_error(lippmann, long_picture, tmp_path):
     oidn = ("--denoise", "oidn-fast")
     done = rendered(lippmann, tmp_path / "pooled.exr", *POOLED, *oidn, "--spp", 2)
@@ -41,18 +42,21 @@ def test_it_denoises_shares_and_knows_its_error(lippmann, long_picture, tmp_path
     assert (tmp_path / "pooled" / "error.png").exists()
 
 
+@pytest.mark.long
 def test_a_denoiser_is_its_default(lippmann, engine, tmp_path):
     done = rendered(lippmann, tmp_path / "a.exr", *POOLED, "--spp", 1)
     assert done.json["options"]["denoise"] == "oidn"
     assert "one sample per pixel" in done.err
 
 
+@pytest.mark.long
 def test_it_can_be_asked_for_a_quality(lippmann, engine, tmp_path):
     done = rendered(lippmann, tmp_path / "a.exr", *POOLED, "--quality", 33)
     assert done.json["estimate"]["psnr"] >= 33
     assert done.json["spp"] < 64
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [

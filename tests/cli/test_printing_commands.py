@@ -26,6 +26,7 @@ def dpi(path):
         return tags["XResolution"].value, tags["YResolution"].value
 
 
+@pytest.mark.slow
 def test_a_print_is_rendered_at_its_true_size(lippmann, engine, tmp_path):
     path = tmp_path / "print.tif"
     assert lippmann("render", "teapot", "--display", "print", *SHEET, *QUICK, "-o", path).code == 0
@@ -39,6 +40,7 @@ def test_a_print_is_rendered_at_its_true_size(lippmann, engine, tmp_path):
         assert picture.mode == "RGB"
 
 
+@pytest.mark.slow
 def test_marks_are_added_by_render_and_afterwards_alike(lippmann, engine, tmp_path):
     plain, marked, later = (tmp_path / f"{name}.tif" for name in ("plain", "marked", "later"))
     assert lippmann("render", "teapot", "--display", SHORT, *QUICK, "-o", plain).code == 0
@@ -81,6 +83,7 @@ def test_the_pitch_that_was_found_is_rendered(lippmann, engine, tmp_path):
     assert display.gap == pytest.approx(2 / 1.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -108,6 +111,7 @@ def test_bad_prints_are_one_line_and_code_2(lippmann, tmp_path, words, said):
         assert not path.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -173,6 +177,7 @@ def test_a_bleed_goes_on_beyond_the_same_picture(lippmann, engine, tmp_path):
     np.testing.assert_allclose(np.clip(image.pixels, 0, 1), second.pixels, atol=0.01)  # of 8 bits
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["a.tif", "a.png"])
 def test_a_print_in_tiles_is_finished_as_one_in_memory(lippmann, engine, tmp_path, name):
     profile = tmp_path / "own.icc"
@@ -191,6 +196,7 @@ def test_a_print_in_tiles_is_finished_as_one_in_memory(lippmann, engine, tmp_pat
     assert np.abs(first - second).max() <= 1  # tiles are rounded to codes once more
 
 
+@pytest.mark.slow
 def test_zarr_may_be_mirrored(lippmann, engine, tmp_path):
     for name, more in (("plain.zarr", ()), ("mirrored.zarr", ("--mirror",))):
         assert lippmann("render", "teapot", "-d", SHORT, *POINT, *more, "-o", tmp_path / name).code == 0

@@ -95,6 +95,7 @@ def begun(lippmann, engine, cut_display, tmp_path, stopping):
     return begin
 
 
+@pytest.mark.long
 def test_a_picture_begun_with_another_llvm_is_refused(lippmann, engine, begun, other_llvm):
     words, output = begun()
     other_llvm()
@@ -104,6 +105,7 @@ def test_a_picture_begun_with_another_llvm_is_refused(lippmann, engine, begun, o
     assert not output.exists()
 
 
+@pytest.mark.long
 def test_a_picture_begun_with_another_denoiser_is_refused(lippmann, begun, monkeypatch):
     words, output = begun("--denoise", "oidn-fast")
     monkeypatch.setattr("lippmann.rendering.denoise.oidn.denoiser_version", lambda: "99.0.0 (pyoidn 99.0.0)")
@@ -114,6 +116,7 @@ def test_a_picture_begun_with_another_denoiser_is_refused(lippmann, begun, monke
     assert not output.exists()
 
 
+@pytest.mark.long
 def test_a_picture_without_a_denoiser_is_gone_on_with_by_another_one(lippmann, begun, monkeypatch):
     words, output = begun("--denoise", "none")
     monkeypatch.setattr("lippmann.rendering.denoise.oidn.denoiser_version", lambda: "99.0.0 (pyoidn 99.0.0)")
@@ -121,6 +124,7 @@ def test_a_picture_without_a_denoiser_is_gone_on_with_by_another_one(lippmann, b
     assert output.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changed", ["LLVM", "Open Image Denoise"])
 def test_a_sequence_begun_with_other_programs_is_refused(
     engine, moving_ball, make_display, tmp_path, other_llvm, monkeypatch, changed

@@ -25,6 +25,7 @@ def calibration(tmp_path):
     return path
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("engine")
 def test_a_quilt_gets_its_name_from_scene_and_device(lippmann, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -40,6 +41,7 @@ def test_a_quilt_gets_its_name_from_scene_and_device(lippmann, tmp_path, monkeyp
     assert quilt.pixels.max() > 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_views_share_their_light_where_that_is_asked_for(lippmann, tmp_path):
     words = ("quilt", "render", "teapot", *SMALL, "--method", "pooled", "--json", "-o", tmp_path / f"x{ENDING}")
@@ -49,6 +51,7 @@ def test_views_share_their_light_where_that_is_asked_for(lippmann, tmp_path):
     assert outcome.json["estimate"]["worst"] > 5
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("engine")
 def test_a_calibration_names_its_quilt_and_takes_it_back(lippmann, calibration, tmp_path):
     quilt, native = tmp_path / f"x{ENDING}", tmp_path / "native.png"
@@ -60,6 +63,7 @@ def test_a_calibration_names_its_quilt_and_takes_it_back(lippmann, calibration, 
     assert read_picture(native).pixels.shape == (200, 150, 3)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_plan_says_what_to_expect(lippmann, calibration, monkeypatch):
     monkeypatch.setattr(forecast, "PROBE_SECONDS", 0.1)
@@ -109,6 +113,7 @@ def test_plan_foresees_a_turn(lippmann, monkeypatch):
     assert (refused.code, refused.err.count("\n")) == (2, 1)
 
 
+@pytest.mark.slow
 def test_bad_input_is_one_line_and_code_2(lippmann, tmp_path):
     def refused(*words):
         outcome = lippmann(*words)

@@ -26,6 +26,7 @@ def quilt(request, tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_a_renamed_quilt_knows_what_it_is(lippmann, quilt):
     lost = quilt.rename(quilt.with_stem("lost"))
     found = read_quilt(lost)
@@ -45,6 +46,7 @@ def test_a_renamed_quilt_knows_what_it_is(lippmann, quilt):
         assert picture.size == (30, 40)
 
 
+@pytest.mark.long
 def test_a_lost_layout_is_given_back(lippmann, tmp_path):
     path = tmp_path / "quilt.jpg"
     Image.new("RGB", (384, 384), (90, 90, 90)).save(path)

@@ -118,6 +118,7 @@ def harness(display, unbroken, tmp_path):
     return Harness(display, tmp_path / unbroken.name, content(unbroken), random.Random(unbroken.name))
 
 
+@pytest.mark.long
 def test_killed_runs_are_resumed_to_the_same_file(harness):
     for _ in range(2):
         harness.run_and_kill()
@@ -148,6 +149,7 @@ def test_tiles_that_overlap_are_resumed_to_the_same_file(display, tmp_path):
     assert one.read_bytes() == two.read_bytes()
 
 
+@pytest.mark.long
 def test_an_interrupted_run_says_what_is_kept(display, tmp_path):
     output = tmp_path / "a.tif"
     words = [word for word in command(display, output, "--integrator", "path", "--spp", "64") if word != "--quiet"]
@@ -165,6 +167,7 @@ def test_an_interrupted_run_says_what_is_kept(display, tmp_path):
 # ---- In this process ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_the_command_says_how_much_was_found(lippmann, engine, tmp_path):
     words = ("render", "small-balls", "--integrator", "direct", "--method", "full", "--spp", 1, "--resume", "--json")
     done = lippmann(*words, "-o", tmp_path / "a.png")
@@ -174,6 +177,7 @@ def test_the_command_says_how_much_was_found(lippmann, engine, tmp_path):
     assert read_picture(tmp_path / "a.png").provenance.spp == 1
 
 
+@pytest.mark.slow
 def test_pictures_beyond_the_memory_go_to_tiles(lippmann, engine, display, tmp_path):
     words = ("render", "small-balls", "-d", display, "--integrator", "normal", "--spp", 1, "--memory", "16M", "-o")
     done = lippmann(*words, tmp_path / "a.tif", "--json")
@@ -258,6 +262,7 @@ def begun(lippmann, engine, small, tmp_path, monkeypatch):
     return output
 
 
+@pytest.mark.long
 def test_a_tile_is_not_written_through_a_link(lippmann, begun, small, tmp_path):
     (tmp_path / "precious.txt").write_text("mine")
     (journal_of(begun) / "r0000_c0001.tile").symlink_to(tmp_path / "precious.txt")
@@ -268,6 +273,7 @@ def test_a_tile_is_not_written_through_a_link(lippmann, begun, small, tmp_path):
     assert os.listdir(begun.parent) == ["a.png"]
 
 
+@pytest.mark.slow
 def test_a_journal_that_is_a_link_is_refused_in_one_line(lippmann, begun, small):
     journal_of(begun).rename(begun.parent / "elsewhere")
     journal_of(begun).symlink_to(begun.parent / "elsewhere")
@@ -291,6 +297,7 @@ def test_a_folder_of_the_users_is_refused_before_anything_is_rendered(lippmann, 
     assert not (tmp_path / "a.png").exists()
 
 
+@pytest.mark.slow
 def test_what_the_user_puts_into_a_journal_stays(lippmann, begun, small):
     (journal_of(begun) / "notes.txt").write_text("mine")
     done = lippmann(*small, begun)

@@ -9,6 +9,7 @@ from PIL import Image
 from lippmann.image import read_picture
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["lens-view", "interpolated"])
 @pytest.mark.parametrize("way", [(), ("--no-respect-gloss",), ("--order", "paper")], ids=["gloss", "plain", "paper"])
 def test_it_says_how_the_pixels_came_about(lippmann, engine, tmp_path, method, way):
@@ -55,6 +56,7 @@ def test_maps_show_parts_of_the_frame(lippmann, engine, tmp_path):
     assert light.mean() == pytest.approx((shown[0] | shown[2]).mean(), abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
@@ -85,6 +87,7 @@ def test_a_folder_of_other_things_is_not_replaced_by_maps(lippmann, engine, tmp_
     assert not (tmp_path / "a.png").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("display", ["mla-square", "mla-hexagonal"])
 def test_every_layout_can_reuse_points(lippmann, engine, tmp_path, display):
     out = tmp_path / "a.png"

@@ -23,6 +23,7 @@ def frames_of(path):
         return rate, [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
+@pytest.mark.long
 def test_frames_into_a_folder_with_a_film(engine, lippmann, moving_ball, tmp_path):
     film = tmp_path / "film.mp4"
     call = (moving_ball, "--frames", "0:24:12", "--fps", "24", "-o", tmp_path / "out", "--video", film, "--json")
@@ -44,6 +45,7 @@ def test_frames_into_a_folder_with_a_film(engine, lippmann, moving_ball, tmp_pat
     assert read_picture(tmp_path / "out" / names[1]).provenance.options["frame"] == 12
 
 
+@pytest.mark.long
 def test_frames_by_a_pattern_and_a_film_of_quilts(engine, lippmann, moving_ball, tmp_path):
     film = tmp_path / "film_qs3x1a1.mp4"
     output = tmp_path / "out_%03d.exr"
@@ -57,6 +59,7 @@ def test_frames_by_a_pattern_and_a_film_of_quilts(engine, lippmann, moving_ball,
         assert metadata_of_text(video.metadata["comment"], "film").layout == (3, 1, 1.0)
 
 
+@pytest.mark.slow
 def test_a_flight(engine, lippmann, tmp_path):
     body = "CAMERA ZOOM 1 ASPECTRATIO 1 ANTIALIASING 0 RAYDEPTH 2 CENTER 0 0 -5 VIEWDIR 0 0 1 UPDIR 0 1 0 END_CAMERA"
     ball = "SPHERE CENTER 0 0 0 RAD 1 TEXTURE AMBIENT 0.2 DIFFUSE 0.8 SPECULAR 0 OPACITY 1 COLOR 1 1 1 TEXFUNC 0"
@@ -70,6 +73,7 @@ def test_a_flight(engine, lippmann, tmp_path):
     assert not np.array_equal(first.pixels, second.pixels)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -104,6 +108,7 @@ def test_what_cannot_be_is_said_in_one_line(lippmann, moving_ball, tmp_path, mon
     assert not (tmp_path / "out.png").exists()
 
 
+@pytest.mark.slow
 def test_a_single_frame_may_have_a_plain_name(engine, lippmann, moving_ball, tmp_path):
     done = lippmann("render", moving_ball, "--frames", "7", "-o", tmp_path / "seven.png", *QUICK)
     assert done.code == 0, done.err
@@ -138,6 +143,7 @@ def test_frames_on_a_cluster_are_the_same(engine, lippmann, moving_ball, tmp_pat
 SMALL_QUILT = ("--views", "3x2", "--size", "384x288", *QUICK)
 
 
+@pytest.mark.long
 def test_a_turntable_with_a_film(engine, lippmann, moving_ball, tmp_path):
     film = tmp_path / "turn.mp4"
     call = (moving_ball, "--turntable", "5", "-o", tmp_path / "out", "--video", film, "--fps", "10", "--json")
@@ -148,6 +154,7 @@ def test_a_turntable_with_a_film(engine, lippmann, moving_ball, tmp_path):
     assert (rate, len(shown)) == (10, 5)
 
 
+@pytest.mark.slow
 def test_a_part_of_a_swing(engine, lippmann, tmp_path):
     call = ("--turntable", "8", "--swing", "40", "--frames", "2:4", "-o", tmp_path / "out_%d.png")
     done = lippmann("render", "teapot", *call, *QUICK)
@@ -155,8 +162,13 @@ def test_a_part_of_a_swing(engine, lippmann, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out_2.png", "out_3.png"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("film", "eye", "shape"), [("seen.mp4", ("--eye", "sweep"), (144, 108)), ("all_qs3x2a0.75.png", (), None)]
+    ("film", "eye", "shape"),
+    [
+        pytest.param("seen.mp4", ("--eye", "sweep"), (144, 108), marks=pytest.mark.long),
+        ("all_qs3x2a0.75.png", (), None),
+    ],
 )
 def test_quilts_of_a_turn_and_their_film(engine, lippmann, tmp_path, film, eye, shape):
     from lippmann.color.transfer import quantize
@@ -181,6 +193,7 @@ def test_quilts_of_a_turn_and_their_film(engine, lippmann, tmp_path, film, eye, 
     assert shape is None or shown[0].shape[:2] == shape
 
 
+@pytest.mark.long
 def test_a_film_of_quilts_beside_integral_images_is_rendered_by_their_cameras(engine, lippmann, tmp_path):
     from lippmann.color.transfer import quantize
 
@@ -219,6 +232,7 @@ def test_quilts_with_a_number_get_the_ending_of_their_kind(engine, lippmann, tmp
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"q_{number}_qs3x2a0.75.png" for number in (0, 1)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -35,6 +35,7 @@ def halves(path):
     return pixels[: len(pixels) // 2].mean(axis=(0, 1)), pixels[len(pixels) // 2 :].mean(axis=(0, 1))
 
 
+@pytest.mark.long
 def test_the_shortest_command_fills_the_display(lippmann, engine, scan, tmp_path):
     out = tmp_path / "a.png"
     done = lippmann("render", scan, "--display", "seed-lenticular", "-o", out, "--json")
@@ -50,6 +51,7 @@ def test_the_shortest_command_fills_the_display(lippmann, engine, scan, tmp_path
     assert np.ptp(rows) > 0.8 * 512
 
 
+@pytest.mark.long
 def test_options_choose_splats(lippmann, engine, scan, tmp_path):
     out = tmp_path / "a.png"
     done = lippmann("preview", scan, "--display", "seed-lenticular", "--up", "y", "-o", out)
@@ -65,6 +67,7 @@ def test_options_choose_splats(lippmann, engine, scan, tmp_path):
     assert picture.pixels[..., 0].sum() > 20 * picture.pixels[..., 1].sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -92,6 +95,7 @@ def test_options_of_splats_are_refused_for_other_scenes(lippmann, tmp_path):
     assert "--min-opacity: 'teapot' holds no Gaussian splats" in done.err
 
 
+@pytest.mark.long
 def test_forecasts_quilts_and_turntables_show_splats(lippmann, engine, scan, tmp_path):
     done = lippmann("plan", scan, "--json")
     assert done.code == 0, done.err

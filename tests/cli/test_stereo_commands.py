@@ -66,6 +66,7 @@ def test_a_sweep_in_another_codec(lippmann, picture, tmp_path, codec, name):
         assert video.streams.video[0].codec_context.codec.canonical_name == name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "said"),
     [

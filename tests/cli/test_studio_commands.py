@@ -62,6 +62,7 @@ def until(socket, holds, seconds=120.0):
             return read
 
 
+@pytest.mark.slow
 def test_studio_shows_and_renders_until_ctrl_c(tmp_path):
     """The real renderer, once: a live frame, a full render of the same state into another folder, and the end."""
     (tmp_path / "own.toml").write_text(OWN_DISPLAY)
@@ -94,7 +95,8 @@ def test_studio_shows_and_renders_until_ctrl_c(tmp_path):
     assert (code, err.strip()) == (130, "Ctrl-C ends it")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGHUP])
 def test_show_serves_the_picture_until_it_is_ended(tmp_path, number):
     pixels = np.random.default_rng(1).random((24, 32, 3), dtype=np.float32)
     IntegralImage(pixels, DISPLAY).save(tmp_path / "shot.png")
@@ -106,6 +108,7 @@ def test_show_serves_the_picture_until_it_is_ended(tmp_path, number):
     assert (code, err.strip()) == (130, "Ctrl-C ends it")
 
 
+@pytest.mark.slow
 def test_mistakes_are_said_before_a_page_opens(lippmann, tmp_path):
     (tmp_path / "bad.toml").write_text("scale = 'large'\n")
     tried = {

@@ -42,6 +42,7 @@ def scene(tmp_path):
     return path
 
 
+@pytest.mark.long
 def test_a_hostile_file_says_nothing_to_the_terminal(lippmann, scene, tmp_path, engine):
     picture = tmp_path / "p\x1b[31m.png"
     quick = ("--integrator", "depth", "--spp", "1")

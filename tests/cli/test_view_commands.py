@@ -60,6 +60,7 @@ def interrupted(process):
     return process.returncode, err
 
 
+@pytest.mark.slow
 def test_view_serves_the_picture_until_ctrl_c(shot):
     with serving("view", shot) as (process, address):
         assert address.startswith("http://127.0.0.1:")
@@ -72,6 +73,7 @@ def test_view_serves_the_picture_until_ctrl_c(shot):
         fetch(address)
 
 
+@pytest.mark.slow
 def test_view_says_the_way_through_a_tunnel(shot):
     with serving("view", shot, "--json", SSH_CONNECTION="192.0.2.1 1 192.0.2.2 22") as (process, address):
         port = address.rstrip("/").rpartition(":")[2]
@@ -81,11 +83,13 @@ def test_view_says_the_way_through_a_tunnel(shot):
     assert f"ssh -L {port}:127.0.0.1:{port} " in err
 
 
+@pytest.mark.slow
 def test_view_warns_of_others(shot):
     with serving("view", shot, "--host", "0.0.0.0") as (process, _):
         assert "everyone who can reach this machine" in interrupted(process)[1]
 
 
+@pytest.mark.slow
 def test_view_says_what_is_wrong_with_pixels_here_and_on_the_page(shot):
     content = bytearray(shot.read_bytes())
     content[-40] ^= 0xFF
@@ -100,6 +104,7 @@ def test_view_says_what_is_wrong_with_pixels_here_and_on_the_page(shot):
     assert f"lippmann: {line}" in err
 
 
+@pytest.mark.slow
 def test_view_opens_the_browser_where_there_is_a_screen(shot, tmp_path):
     opened = tmp_path / "opened.txt"
     browser = f"{sys.executable} -c \"open(r'{opened}', 'w').write(__import__('sys').argv[1])\" %s"
@@ -141,6 +146,7 @@ def refuse(outcome, *words):
         assert word in lines[0], outcome.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [(), ("--export", "page.html")])
 def test_pictures_that_will_not_do(lippmann, shot, tmp_path, monkeypatch, way):
     monkeypatch.chdir(tmp_path)
@@ -169,6 +175,7 @@ def test_a_port_in_use_is_said(lippmann, shot):
     refuse(lippmann("view", shot, "--host", "192.0.2.1"), "--host", "192.0.2.1")
 
 
+@pytest.mark.slow
 def test_calibrate_page_saves_the_display_file(tmp_path):
     mine = tmp_path / "mine.toml"
     with serving("calibrate", "page", "panel-4k", "-o", mine) as (process, address):

@@ -22,6 +22,7 @@ def pixels(path):
     return np.asarray(Image.open(path).convert("RGB"), float)
 
 
+@pytest.mark.slow
 def test_the_shortest_command_shows_the_bone(lippmann, engine, scan, tmp_path):
     out = tmp_path / "a.png"
     done = lippmann("render", scan, "-o", out, "--json")
@@ -45,6 +46,7 @@ def test_options_change_what_is_seen(lippmann, engine, scan, tmp_path):
     assert done.code == 0, done.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "said"),
     [

@@ -74,6 +74,7 @@ def test_without_certificates_dasks_own_configuration_counts(tmp_path):
     assert not TlsFiles().security().require_encryption
 
 
+@pytest.mark.long
 def test_no_scheduler(monkeypatch):
     from lippmann.cluster import connect, connection
 
@@ -96,6 +97,7 @@ def test_without_dask_it_is_said_how_to_get_it(monkeypatch):
         address.import_distributed()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -21,6 +21,7 @@ TILES = 16
 OPTIONS = {"integrator": "direct", "method": "full", "spp": 2, "device": "cpu"}
 
 
+@pytest.mark.long
 def test_a_killed_worker_and_a_poisoned_tile(lab, render, here, until):
     """A worker dies in mid-tile and is replaced; a tile that cannot be rendered is named, the rest goes on."""
     lab.start()
@@ -39,6 +40,7 @@ def test_a_killed_worker_and_a_poisoned_tile(lab, render, here, until):
     assert second.output.read_bytes() == here
 
 
+@pytest.mark.long
 def test_the_dashboard_shows_tiles_by_name(lab, render, until):
     """The page of a worker, as people and programs get it, lists the tile that it holds: row 1, column 2."""
     pytest.importorskip("bokeh")
@@ -255,6 +257,7 @@ def test_encrypted_connections(lab, here, tmp_path, until):
         pass
 
 
+@pytest.mark.slow
 def test_nothing_listens_beyond_loopback(lab, until):
     lab.start()
     until(lambda: "Registered to" in lab.log())
@@ -321,6 +324,7 @@ def test_a_scene_goes_to_each_worker_once(lab, tmp_path):
         assert len(parts) == len(set(parts)) <= len(names)
 
 
+@pytest.mark.long
 def test_workers_that_end_while_they_start_are_one_line(tmp_path):
     """As the kernel does when memory is short: the process is gone before it has said anything."""
     preload = tmp_path / "ends.py"

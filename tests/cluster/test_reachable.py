@@ -93,6 +93,7 @@ def test_a_scheduler_that_is_about_to_start_is_waited_for():
     started[0].close()
 
 
+@pytest.mark.slow
 def test_certificates_that_agree(listener, tmp_path):
     certificate, key = made(tmp_path, "ours")
     check_reachable(listener(certificate, key, certificate), certificate, certificate, key)

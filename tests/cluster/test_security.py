@@ -75,6 +75,7 @@ asyncio.run(main())
 PAGES = ("status", "info/main/workers.html", "json/identity.json", "metrics", "health", "individual-task-stream")
 
 
+@pytest.mark.slow
 def test_nobody_else_runs_code_in_a_cluster_of_this_machine(tmp_path):
     """Scheduler, worker and nanny refuse all who have not the cluster's certificate; the cluster itself works."""
     from distributed.comm.addressing import unparse_address
@@ -100,6 +101,7 @@ def test_nobody_else_runs_code_in_a_cluster_of_this_machine(tmp_path):
         assert cluster.client.submit(unparse_address, "tls", "served").result(timeout=30) == "tls://served"
 
 
+@pytest.mark.slow
 def test_a_cluster_of_this_machine_shows_its_pages_to_nobody(until):
     """A worker that takes the place of one that died is no different."""
     remarks: list[str] = []
@@ -193,6 +195,7 @@ def test_where_dask_refuses_open_connections_no_warning_is_needed():
     assert said == []
 
 
+@pytest.mark.long
 def test_the_warning_comes_before_the_connection(monkeypatch):
     """Whoever listens there instead of the scheduler can already send code when the connection stands."""
     from lippmann.cluster import connection
@@ -301,6 +304,7 @@ def program(tmp_path) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_a_render_imports_nothing_that_lies_about(places, program):
     """Neither beside the scene nor in the folder that Dask would share with all accounts of the machine."""
     options = ("primitives", "--integrator", "direct", "--spp", "2", "--device", "cpu", "--cluster", "local:1")
@@ -320,6 +324,7 @@ def test_a_render_imports_nothing_that_lies_about(places, program):
     assert places.left() == set()
 
 
+@pytest.mark.long
 def test_a_worker_imports_nothing_that_lies_about(lab, places, program, until):
     from distributed import Client
 

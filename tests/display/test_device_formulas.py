@@ -51,11 +51,13 @@ def assert_same_on_device(display, device, seed):
     np.testing.assert_allclose(there[2:], here[2:], rtol=1e-12, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_presets_on_the_device(device):
     for display in list_displays():
         assert_same_on_device(display, device, seed=1)
 
 
+@pytest.mark.slow
 @given(data=st.data(), seed=st.integers(0, 1000))
 @settings(deadline=None, max_examples=15)
 def test_random_displays_on_the_device(displays, device, data, seed):

@@ -394,6 +394,7 @@ def test_an_eye_on_a_ray_sees_its_panel_point(displays, data):
 # ---- Values ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @given(data=st.data())
 @many
 def test_plain_values_round_trip_exactly(displays, data):

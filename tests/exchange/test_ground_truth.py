@@ -87,6 +87,7 @@ def views_of(folder):
     return views, disparities
 
 
+@pytest.mark.long
 def test_disparity_moves_every_view_onto_the_middle_one(folder):
     views, _ = views_of(folder)
     middle = VIEWS // 2
@@ -111,6 +112,8 @@ def test_disparity_moves_every_view_onto_the_middle_one(folder):
         assert psnr(*wrong) < found - 3, wrong
 
 
+@pytest.mark.long_cases("parallel")
+@pytest.mark.slow
 def test_the_same_point_has_the_same_disparity_in_every_view(folder):
     _, disparities = views_of(folder)
     middle = VIEWS // 2
@@ -122,6 +125,7 @@ def test_the_same_point_has_the_same_disparity_in_every_view(folder):
         np.testing.assert_allclose(seen[inside], disparity[inside], atol=2e-3)
 
 
+@pytest.mark.slow
 def test_depth_is_related_to_disparity_as_published(folder):
     values = configparser.ConfigParser()
     values.read(folder / "parameters.cfg")

@@ -25,6 +25,7 @@ def there_and_back(image, folder, stored):
     return read_zarr(folder)
 
 
+@pytest.mark.slow
 @settings(max_examples=8, suppress_health_check=[HealthCheck.too_slow], deadline=None)
 @given(st.data(), TYPES)
 def test_everything_comes_back_bit_by_bit(random_displays, picture, same, tmp_path_factory, data, stored):

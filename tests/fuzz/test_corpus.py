@@ -52,6 +52,8 @@ def test_the_corpus_is_that_of_the_targets():
     assert size < 500_000
 
 
+@pytest.mark.long_cases("rendered-obj", "rendered-mitsuba-xml")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TARGETS)
 def test_sound_inputs_are_read(name, tmp_path):
     sound = named_seeds(name)
@@ -64,6 +66,7 @@ def test_sound_inputs_are_read(name, tmp_path):
                 raise
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TARGETS)
 def test_what_broke_a_reader_once_does_so_no_more(name, looked_at):
     assert {path.name: broken for path in found(name) if (broken := looked_at(name, path.read_bytes()))} == {}
@@ -85,6 +88,8 @@ def test_long_inputs_end_in_time(name, data, looked_at):
     assert looked_at(name, data) == ""
 
 
+@pytest.mark.long_cases("rendered-obj")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TARGETS)
 def test_damaged_inputs_end_in_a_result_or_an_error(name, looked_at):
     target = TARGETS[name]
@@ -94,6 +99,7 @@ def test_damaged_inputs_end_in_a_result_or_an_error(name, looked_at):
         assert looked_at(name, data) == "", data
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TARGETS)
 @settings(
     deadline=None, max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]

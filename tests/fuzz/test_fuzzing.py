@@ -84,6 +84,7 @@ for mebibytes in (20, 400):
 """
 
 
+@pytest.mark.slow
 def test_memory_is_held_against_a_planted_fault():
     # In a process of its own: not every system lets go of what the tests before this one took.
     done = subprocess.run([sys.executable, "-c", HOG], cwd=Path(__file__).parent, capture_output=True, text=True)
@@ -105,6 +106,7 @@ def test_what_is_printed_is_seen(tmp_path):
         assert said() == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TARGETS)
 def test_inputs_follow_from_the_seed(name):
     target = TARGETS[name]
@@ -174,14 +176,19 @@ print(found["inputs"], found["finds"], saved, *found["kinds"])
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the long run reads Linux's /proc")
 @pytest.mark.parametrize(
     ("fault", "kind"),
     [
         ("os.abort()", "ends the process with status 6"),
-        ("signal.signal(signal.SIGPROF, signal.SIG_IGN)\n        while True: pass", "hangs outside Python"),
+        pytest.param(
+            "signal.signal(signal.SIGPROF, signal.SIG_IGN)\n        while True: pass",
+            "hangs outside Python",
+            marks=pytest.mark.long,
+        ),
         ("raise KeyError('x')", "KeyError"),
-        ("print('noise', file=sys.stderr)", "prints 'noise"),
+        pytest.param("print('noise', file=sys.stderr)", "prints 'noise", marks=pytest.mark.long),
     ],
 )
 def test_the_long_run_survives_and_tells_what_a_reader_does(fault, kind):

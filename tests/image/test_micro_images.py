@@ -52,6 +52,7 @@ def test_a_micro_image_holds_the_pixels_of_its_lens_in_their_order(data, random_
             np.testing.assert_array_equal((after - before)[both], 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("excess", [0.0, 1e-9, 3e-9, 1e-8, 1e-7, 9e-7, -1e-8, -9e-7])
 @pytest.mark.parametrize("layout", ["lenticular", "square", "hexagonal"])
 @pytest.mark.parametrize("offset", [None, (0.0, 0.0), (0.875, 0.875)])

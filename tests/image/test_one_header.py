@@ -54,6 +54,7 @@ def opens(hook):
     return count
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("use", USES)
 @pytest.mark.parametrize("in_pieces", [False, True])

@@ -24,6 +24,7 @@ def assert_same(back, image):
     assert (back.display, back.provenance, back.stored) == (image.display, image.provenance, image.stored)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("write", WRITERS)
 @pytest.mark.parametrize("layout", ["lenticular", "square", "hexagonal"])
 @pytest.mark.parametrize(("name", "bits"), [("a.png", 8), ("a.png", 16), ("a.exr", 32), ("a.exr", 16), ("a.tif", 16)])
@@ -58,6 +59,7 @@ def test_maps_travel_along(tmp_path, display, picture, write):
     np.testing.assert_array_equal(back.maps["id"], maps["id"])
 
 
+@pytest.mark.slow
 @settings(
     deadline=None, max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 )
@@ -76,6 +78,7 @@ def test_any_display_there_and_back(tmp_path, random_displays, picture, data):
             compose(parts)
 
 
+@pytest.mark.long
 @settings(
     deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 )

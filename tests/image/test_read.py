@@ -62,6 +62,7 @@ def test_a_missing_empty_or_foreign_file(tmp_path):
         read_picture(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "bits"), KINDS)
 def test_a_file_cut_anywhere_is_one_line_of_error(tmp_path, display, picture, capfd, name, bits):
     write_picture(picture(display("lenticular", lenses=(16, 11))), tmp_path / name, bits=bits)
@@ -76,6 +77,7 @@ def test_a_file_cut_anywhere_is_one_line_of_error(tmp_path, display, picture, ca
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 @settings(
     deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 )

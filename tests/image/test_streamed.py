@@ -140,6 +140,7 @@ def test_rows_from_the_top_down_decode_each_piece_once(counted):
     assert len(loads) == len(set(loads)) == 10 * 8
 
 
+@pytest.mark.long
 @given(data=st.data())
 @settings(max_examples=150, deadline=None)
 def test_every_view_shows_the_same_pixels_without_a_table(random_displays, data):
@@ -164,6 +165,8 @@ def test_every_view_shows_the_same_pixels_without_a_table(random_displays, data)
         assert ((some[1] >= top) & (some[1] < bottom))[some[0]].all()
 
 
+@pytest.mark.long_cases("tiled.tif-3", "tiled.tif-4", "tiled.tif-5", "strips.tif-3", "strips.tif-5")
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS, ids=range(len(LAYOUTS)))
 def test_replay_and_refocus_see_the_same(saved, display, layout):
     opened, whole = saved(display(**layout))
@@ -174,6 +177,7 @@ def test_replay_and_refocus_see_the_same(saved, display, layout):
         np.testing.assert_allclose(refocus(opened, plane), refocus(whole, plane), atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS, ids=range(len(LAYOUTS)))
 @pytest.mark.parametrize("write", [write_views, write_micro_images])
 def test_folders_are_the_same(saved, display, layout, write, tmp_path, monkeypatch):

@@ -62,6 +62,7 @@ def test_a_view_holds_the_pixels_at_its_place_behind_every_lens(data, random_dis
             assert np.abs(beside_v).max(initial=0) <= limit
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(data=st.data())
 def test_resampled_views_take_own_pixels_only(data, random_displays):

@@ -165,6 +165,7 @@ except OutputError as error:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="the system has no limit on the size of files")
 @pytest.mark.parametrize("name", ["a.png", "a.exr", "a.tif"])
 def test_a_disk_that_takes_no_more_leaves_the_old_file(tmp_path, name):

@@ -82,6 +82,7 @@ def test_scenes_have_sums(name):
     assert content_hash(scene) != content_hash(replace(scene, name="another"))
 
 
+@pytest.mark.slow
 def test_sums_are_the_same_in_another_process():
     code = "from lippmann.scene.readers.load import load_scene; from lippmann.journal import content_hash; "
     code += "print(content_hash(load_scene('teapot')), content_hash({'a', 'b', 'c'}))"

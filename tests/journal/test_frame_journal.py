@@ -156,6 +156,7 @@ def _hold(path, found):
         found.put(str(error))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no such locks there")
 def test_only_one_process_at_a_time(begun):
     context = multiprocessing.get_context("spawn")

@@ -84,6 +84,7 @@ def test_no_pixel_off_silhouettes(display, picture):
     assert found.to_dict()["psnr_off_silhouettes"] is None
 
 
+@pytest.mark.long
 @settings(deadline=None, max_examples=30)
 @given(seed=st.integers(0, 2**31), kind=st.sampled_from(["lenticular", "slanted", "square", "hexagonal"]))
 def test_what_always_holds(display, picture, seed, kind):

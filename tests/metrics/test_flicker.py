@@ -65,6 +65,7 @@ def test_what_the_reference_itself_changes_by_is_no_flicker(display, picture):
     assert found.error == pytest.approx(0.01, rel=1e-4)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=20)
 @given(seed=st.integers(0, 2**31), kind=st.sampled_from(["lenticular", "slanted", "square", "hexagonal"]))
 def test_the_share_lies_between_none_and_two(display, picture, seed, kind):

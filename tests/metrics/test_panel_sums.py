@@ -75,6 +75,7 @@ def close(a, b):
         assert a == b
 
 
+@pytest.mark.slow
 def test_the_figures_are_the_same(pair, monkeypatch):
     whole, opened = pair
     found = compare(*opened)

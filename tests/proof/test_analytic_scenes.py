@@ -58,6 +58,7 @@ def furnace(ball):
     return {"sky": {"type": "constant", "radiance": 1.0}, "ball": ball}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHEETS)
 def test_glow_of_one_before_a_sky_of_one_is_one_exactly(name):
     from lippmann.api import load_scene, render
@@ -74,6 +75,7 @@ def test_glow_of_one_before_a_sky_of_one_is_one_exactly(name):
     assert np.abs(picture.pixels - 1).max() <= 2e-7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHEETS)
 def test_white_furnace_is_one_in_every_pixel(name):
     from lippmann.api import load_scene, render
@@ -129,6 +131,7 @@ def ball_seen(sheet, center, radius, offset=(0.0, 0.0)):
     return np.where(clear & (np.abs(distance - radius) > 1e-3), distance < radius, np.nan)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("height", [22.0, -31.0])
 @pytest.mark.parametrize("distance", DISTANCES)
 @pytest.mark.parametrize("name", SHEETS)
@@ -145,6 +148,7 @@ def test_a_small_ball_lights_the_pixels_worked_out_by_hand(name, distance, heigh
         assert np.array_equal(pixels[..., channel].reshape(-1)[sure], wanted[sure])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("height", [22.0, -31.0])
 @pytest.mark.parametrize("distance", DISTANCES)
 @pytest.mark.parametrize("name", ["square", "hexagonal"])
@@ -185,6 +189,7 @@ def test_rays_begin_at_the_aperture(name):
 # ---- A picture in the lens plane -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", DISTANCES)
 @pytest.mark.parametrize("name", SHEETS)
 def test_a_picture_in_the_lens_plane_looks_the_same_from_everywhere(name, distance):
@@ -236,6 +241,7 @@ def clear_pixels(sheet, subpixels=False):
     return chosen.reshape(sheet.height, sheet.width)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("distance", DISTANCES)
 @pytest.mark.parametrize("name", SHEETS)
@@ -258,6 +264,7 @@ def test_mirroring_the_scene_mirrors_the_picture(name, distance, axis):
     assert not np.array_equal(other, one)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "columns", "rows"),
     [
@@ -290,6 +297,7 @@ DENSE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", DISTANCES)
 @pytest.mark.parametrize("name", DENSE)
 def test_the_replayed_scene_is_orthoscopic(name, distance):
@@ -327,6 +335,7 @@ def test_the_replayed_scene_is_orthoscopic(name, distance):
 # ---- Surfaces without holes ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_no_ray_slips_through_between_triangles():
     """The rays of a straight sheet are level; here each row of them runs along the edges of a mesh."""
     from lippmann.api import load_scene, render

@@ -74,6 +74,7 @@ def micro_images_by_particles(scene, seed):
     return means
 
 
+@pytest.mark.long
 def test_micro_images_have_the_light_of_particles():
     import mitsuba as mi
 

@@ -71,6 +71,7 @@ def agreement(made, built, eye, points):
     return float((near & alike)[usable].mean())
 
 
+@pytest.mark.long
 def test_every_eye_at_the_viewing_distance_sees_its_own_perspective(made, glowing, build_once):
     built = build_once(glowing("teapot"))
     shares = [agreement(made, built, eye, lens_points()) for eye in EYES]
@@ -79,6 +80,7 @@ def test_every_eye_at_the_viewing_distance_sees_its_own_perspective(made, glowin
     assert min(shares) > 0.93
 
 
+@pytest.mark.slow
 def test_without_regard_to_the_distance_it_would_not(glowing, build_once):
     """With micro-images as wide as the lenses the far side of the print flips before the eye leaves the field."""
     from lippmann.api import render
@@ -93,6 +95,7 @@ def test_without_regard_to_the_distance_it_would_not(glowing, build_once):
     assert agreement(wrong, build_once(scene), EYES[2], near) > 0.93
 
 
+@pytest.mark.slow
 def test_the_marked_sheet_shows_the_same(made, glowing, build_once):
     built = build_once(glowing("teapot"))
     marked = {name: Finish(margin=5.0).image(image) for name, image in made.items()}

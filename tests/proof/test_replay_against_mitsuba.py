@@ -137,6 +137,8 @@ def pictures(glowing, build_once):
     return make
 
 
+@pytest.mark.long_cases(but=["teapot-straight-inf", "teapot-square-400.0"])
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", DISTANCES)
 @pytest.mark.parametrize("name", SHEETS)
 @pytest.mark.parametrize("scene", SCENES)
@@ -171,6 +173,7 @@ def check_eye_where_views_meet(made, built):
     assert np.abs(samples.viewpoints[samples.clear] - there).max() < 1e-9
 
 
+@pytest.mark.long
 def test_pixels_per_lens_need_not_be_whole(pictures):
     """A corner of a 4K panel's worth: every pixel stands at a place of its own behind its lens."""
     sheet = Sheet("lenticular", 6.2867, 320, 180, distance=600.0, tangent=-0.1666, pixel=0.0899, gap=0.886)
@@ -187,6 +190,7 @@ FINE = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("layout", FINE)
 @pytest.mark.parametrize("scene", SCENES[:2])
 def test_fine_pixels_show_what_a_camera_at_the_very_eye_sees(scene, layout, pictures):
@@ -231,6 +235,7 @@ def seen_from(made, built, eye, points):
     return {"hit": hit, "position": position, "normal": normal, "emission": emission}
 
 
+@pytest.mark.long
 def test_the_scenes_own_camera_is_the_eye_at_the_viewing_point(pictures, glowing):
     """Placed by the teapot's camera, the display shows an eye at (0, 0, D) what Mitsuba's camera there sees."""
     import mitsuba as mi

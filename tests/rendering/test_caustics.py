@@ -54,6 +54,7 @@ def rendered(scene, layout="lenticular", **options):
     return lippmann.render(scene, DISPLAYS[layout], **({"exposure": 0, "tone_map": "none"} | chosen | options))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("layout", ["lenticular", "hexagonal", pytest.param("square", marks=pytest.mark.long)])
 def test_photons_bring_what_paths_do_not_find(layout):
     """Every lens that sees the focus sees it by photons alone; nothing else differs."""
@@ -75,6 +76,7 @@ def test_photons_bring_what_paths_do_not_find(layout):
     assert not any("photons bring it" in note for note in pictures["photons"].provenance.notes)
 
 
+@pytest.mark.slow
 def test_photons_are_the_default_where_there_are_caustics():
     scene = emitter_over_glass()
     chosen, photons = rendered(scene), rendered(scene, caustics="photons")
@@ -115,6 +117,7 @@ def test_photons_go_by_the_exposure_whoever_chooses_it(made, way):
         assert rendered(scene, caustics="photons", spp=1).provenance.options["caustics"] == "photons"
 
 
+@pytest.mark.slow
 def test_halves_have_photons_of_their_own():
     """The photons' noise is in the estimate: pictures of other seeds differ by what it says."""
     scene = emitter_over_glass()
@@ -127,12 +130,14 @@ def test_halves_have_photons_of_their_own():
     assert told == pytest.approx(scatter, abs=1.5)
 
 
+@pytest.mark.slow
 def test_pooled_light_has_them_too():
     scene = emitter_over_glass()
     plain, pooled = (rendered(scene, caustics="photons", method=method, spp=8).pixels for method in ("full", "pooled"))
     assert pooled.mean() == pytest.approx(plain.mean(), rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_scene_without_emitters_is_the_same_with_photons():
     shape = trimesh.creation.icosphere(3, 20)
     mesh = Mesh("", shape.vertices.astype(np.float32), shape.faces.astype(np.uint32), 0)
@@ -151,6 +156,7 @@ def test_other_light_has_no_caustics(integrator):
         rendered(scene, integrator=integrator, caustics="photons")
 
 
+@pytest.mark.slow
 def test_too_little_memory_is_refused():
     with pytest.raises(MemoryLimitError, match="photons of caustics"):
         rendered(emitter_over_glass(), caustics="photons", memory=SMALL)
@@ -205,6 +211,7 @@ def glass_under_a_wide_emitter():
     )
 
 
+@pytest.mark.long
 def test_every_receiver_has_the_light_of_paths():
     """Blocks of pixels, by the scatter of independent pictures."""
     scene = glass_under_a_wide_emitter()
@@ -225,6 +232,7 @@ def test_every_receiver_has_the_light_of_paths():
         assert mean["photons"][own].mean() > without[own].mean() * 1.01, name  # and there are some
 
 
+@pytest.mark.long
 def test_what_a_frosted_sheet_lets_through_is_left_to_paths():
     """Photons are gathered on the side that is seen: a caustic on the other side of a sheet is not theirs."""
     corners = [(-80, -60, 0), (80, -60, 0), (80, 60, 0), (-80, 60, 0)]

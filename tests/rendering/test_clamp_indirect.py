@@ -19,6 +19,7 @@ def rendered(**options):
     return lippmann.render("room", DISPLAY, **(chosen | options))
 
 
+@pytest.mark.long
 def test_bright_hits_go_and_nothing_gets_brighter():
     plain, clamped = rendered(), rendered(clamp_indirect=0.5)
     assert (clamped.pixels <= plain.pixels + 1e-5).all()
@@ -31,15 +32,18 @@ def test_bright_hits_go_and_nothing_gets_brighter():
     assert (clamped.pixels - direct.pixels).max() < plain.pixels.max()
 
 
+@pytest.mark.long
 def test_a_limit_that_nothing_reaches_changes_nothing():
     np.testing.assert_array_equal(rendered(clamp_indirect=1e9).pixels, rendered().pixels)
 
 
+@pytest.mark.long
 def test_direct_light_is_never_clamped():
     plain, clamped = (rendered(depth=1, clamp_indirect=limit) for limit in (None, 1e-3))
     np.testing.assert_array_equal(plain.pixels, clamped.pixels)
 
 
+@pytest.mark.slow
 def test_the_limit_is_that_of_what_is_shown():
     """With an exposure of one stop light is twice as bright, and so is what is cut off."""
     plain = rendered(clamp_indirect=0.5, exposure=0, tone_map="none")

@@ -67,6 +67,7 @@ def scenes(engine):
 
 
 class TestCompressedDepth:
+    @pytest.mark.slow
     @pytest.mark.parametrize("surface", ["depth", "position", "normal", "albedo"])
     def test_surfaces(self, scenes, surface):
         compressed, flat = scenes
@@ -77,6 +78,7 @@ class TestCompressedDepth:
         assert np.abs(second).max() > 0.4
         assert (apart > 2e-3 * max(np.abs(second).max(), 1.0)).mean() < 2e-3  # rays that graze an edge
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("method", ["lens-view", "interpolated", "pooled"])
     def test_methods_that_share_points_show_what_full_rendering_shows(self, scenes, method):
         compressed, _ = scenes
@@ -99,6 +101,7 @@ class TestCompressedDepth:
 
 
 class TestStudio:
+    @pytest.mark.slow
     def test_turning_the_model_leaves_the_light_in_its_place(self):
         upright = letter_f()
         plain = brightness(mesh_scene(upright))
@@ -108,17 +111,20 @@ class TestStudio:
             beside = brightness(mesh_scene(turned(upright, -yaw, (0, 1, 0))), turn=(yaw, 0.0, 0.0))
             assert beside.mean() == pytest.approx(plain.mean(), abs=0.003)
 
+    @pytest.mark.slow
     def test_the_viewer_sees_the_lit_side_whichever_it_is(self):
         ball = trimesh.creation.icosphere(4, 1.0)
         means = [brightness(mesh_scene(ball), turn=turn).mean() for turn in ((0, 0, 0), (180, 0, 0), (70, 40, 120))]
         assert np.ptp(means) < 0.004
 
+    @pytest.mark.slow
     def test_a_grey_model_is_neither_dark_nor_clipped(self):
         seen = brightness(mesh_scene(trimesh.creation.icosphere(4, 1.0), turned(letter_f(), 30, (0, 1, 0))))
         assert 0.25 < seen.mean() < 0.75
         assert (seen > 254.5 / 255).mean() <= 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", [600.0, 150.0])
 def test_the_model_fills_the_panel(distance):
     scene = mesh_scene(turned(trimesh.creation.icosphere(4, 1.0), 45, (1, 1, 0)))
@@ -130,6 +136,7 @@ def test_the_model_fills_the_panel(distance):
     assert (rows[-1] - rows[0] + 1) / len(seen) == pytest.approx(0.95, abs=0.03)
 
 
+@pytest.mark.slow
 def test_default_light_is_pooled_and_a_slanted_sheet_gets_sub_pixels():
     scene = mesh_scene(trimesh.creation.icosphere(2, 1.0))
     upright = lippmann.render(scene, lenticular()).provenance

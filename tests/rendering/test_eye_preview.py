@@ -27,6 +27,8 @@ def teapot():
     return lippmann.load_scene("teapot")
 
 
+@pytest.mark.long_cases(but=["hexagonal-eye0"])
+@pytest.mark.slow
 @pytest.mark.parametrize("eye", EYES)
 @pytest.mark.parametrize("name", DISPLAYS)
 def test_it_is_the_replay_of_the_whole_picture(teapot, name, eye):
@@ -51,6 +53,7 @@ def test_it_is_the_replay_of_the_whole_picture(teapot, name, eye):
     assert found.pixels.mean() == pytest.approx(replayed.mean(), rel=0.02)
 
 
+@pytest.mark.long
 def test_few_samples_are_denoised_and_near_many(teapot):
     display = Display("fine", Panel(360, 240, 0.125), LensArray("lenticular", 0.6, 12.0), 0.8, "", 400.0, 20.0)
 

@@ -25,6 +25,7 @@ def short_probe(monkeypatch):
     monkeypatch.setattr(forecast, "PROBE_SECONDS", 0.2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seconds", [0.0, 0.5])
 def test_rays_are_those_of_the_rendering(monkeypatch, seconds):
     # However long the probe lasts: later samples take fewer shadow rays than the first.
@@ -37,6 +38,7 @@ def test_rays_are_those_of_the_rendering(monkeypatch, seconds):
         assert foreseen.rays[kind] == pytest.approx(rays[kind], rel=0.1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("spp", [2, 64])
 def test_later_samples_take_fewer_shadow_rays(monkeypatch, spp):
     monkeypatch.setattr(forecast, "PROBE_SECONDS", 0.0)
@@ -45,6 +47,7 @@ def test_later_samples_take_fewer_shadow_rays(monkeypatch, spp):
     assert foreseen.rays["shadow"] == pytest.approx(rays["shadow"], rel=0.1)
 
 
+@pytest.mark.long
 def test_depth_is_that_of_the_picture():
     foreseen = lippmann.plan("teapot", SHEET, spp=1)
     image = lippmann.render("teapot", SHEET, spp=1, layers=True)
@@ -67,11 +70,13 @@ def test_a_notebook_shows_a_table():
         assert f">{html.escape(text)}</td>" in page
 
 
+@pytest.mark.long
 def test_nothing_beyond_what_is_resolved_is_blurred():
     deep = replace(SHEET, gap=300.0, viewing_distance=math.inf)
     assert lippmann.plan("teapot", deep, spp=1).blurred_share == 0.0
 
 
+@pytest.mark.long
 def test_work_grows_with_samples_and_pixels(monkeypatch):
     measured, trace = [], forecast._Probe.trace
     monkeypatch.setattr(forecast._Probe, "trace", lambda *given: measured.append(trace(*given)) or measured[-1])
@@ -88,12 +93,14 @@ def test_work_grows_with_samples_and_pixels(monkeypatch):
     assert one.seconds["total"] == pytest.approx(sum(v for k, v in one.seconds.items() if k != "total"))
 
 
+@pytest.mark.long
 def test_denoising_counts():
     found = lippmann.plan("teapot", SHEET, spp=2, denoise="oidn-fast")
     assert found.seconds["denoise"] > 0
     assert found.memory["expected"] > lippmann.plan("teapot", SHEET, spp=2, method="full").memory["expected"]
 
 
+@pytest.mark.long
 def test_small_and_classic_pictures():
     tiny = SHEET.resized(8, 3)
     found = lippmann.plan("teapot", tiny, spp=1)

@@ -62,6 +62,8 @@ def case(request, judged_scene):
     return judged_scene(request.param, lippmann.load_scene(hard_scenes()[request.param]()), display, REFERENCE)
 
 
+@pytest.mark.long_cases("mirrors", "stripes", "water")
+@pytest.mark.slow
 def test_the_error_falls_with_samples_and_the_mean_is_right(case):
     errors = [case.errors(case.picture(samples))[0] for samples in SAMPLES]
     # Plain noise falls to a sixteenth; light that few paths find and that codes clip, more slowly.
@@ -73,6 +75,8 @@ def test_the_error_falls_with_samples_and_the_mean_is_right(case):
     assert abs(float(found.mean() - case.mean.mean())) < allowed
 
 
+@pytest.mark.long_cases("mirrors-32", "mirrors-128", "stripes-32", "water-32", "water-128")
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", SAMPLES[1:])
 def test_what_a_picture_says_of_itself_holds(case, samples):
     image = case.picture(samples)
@@ -84,6 +88,8 @@ def test_what_a_picture_says_of_itself_holds(case, samples):
     assert stated["worst_low"] - 0.5 <= worst <= stated["worst_high"] + better
 
 
+@pytest.mark.long_cases("water")
+@pytest.mark.slow
 def test_a_promised_quality_is_kept(case):
     quality = CASES[case.name][1]
     image = case.render(quality_worst=quality, denoise="none")
@@ -91,6 +97,7 @@ def test_a_promised_quality_is_kept(case):
     assert case.psnr(image)[1] >= quality - 1
 
 
+@pytest.mark.long_cases("mirrors", "stripes", "water")
 def test_denoised_pictures_get_better_and_do_not_flatter_themselves(case):
     found = [case.picture(samples, denoise="oidn") for samples in SAMPLES]
     errors = [case.errors(image)[0] for image in found]
@@ -102,6 +109,8 @@ def test_denoised_pictures_get_better_and_do_not_flatter_themselves(case):
         assert worst >= stated["worst_low"] - 0.5
 
 
+@pytest.mark.long_cases("water")
+@pytest.mark.slow
 def test_a_quality_that_auto_goes_for_is_kept(case):
     """Whichever of the two pictures it takes, its own word for it is true."""
     quality = CASES[case.name][1]
@@ -110,6 +119,8 @@ def test_a_quality_that_auto_goes_for_is_kept(case):
     assert case.psnr(image)[1] >= quality - 1
 
 
+@pytest.mark.long_cases("water")
+@pytest.mark.slow
 def test_errors_flicker_no_more_than_noise_does(case):
     """Noise of neighbouring views is their own; whatever is done to a picture must not set them against each other."""
     noisy, clean = (

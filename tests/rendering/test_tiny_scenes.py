@@ -114,6 +114,7 @@ def render(scene, panel="2 lenses", **options):
     return lippmann.render(scene, display, placement=placement, threads=1, **options)
 
 
+@pytest.mark.long_cases("one glass triangle, two emitters, one dark", "two splats", "one voxel")
 @pytest.mark.parametrize("name", named(SCENES, QUICK))
 def test_each_tiny_scene_is_rendered_by_every_integrator_and_method(name, tmp_path):
     """By each integrator with the method that it takes by default, and by each method with the integrator."""
@@ -131,6 +132,7 @@ def test_each_tiny_scene_is_rendered_by_every_integrator_and_method(name, tmp_pa
     assert {("auto", "auto"), ("auto", "full")} <= set(made)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("panel", named(PANELS, ["1 pixel"]))
 @pytest.mark.parametrize(
     "options", [{"spp": 1, "method": "full", "caustics": "photons"}, {"spp": 2}, {"quality": 20.0}]

@@ -38,6 +38,8 @@ def chart():
     return charts.scatter([Mark(1, 2, "square", "a", "m")], Axis([0, 5], "x"), Axis([0, 5], "y"), title="t")
 
 
+@pytest.mark.long_cases("no text")
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", sorted(HOSTILE))
 def test_settings_of_the_working_folder_are_not_read(tmp_path, settings):
     (tmp_path / "matplotlibrc").write_bytes(HOSTILE[settings])

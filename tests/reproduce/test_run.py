@@ -44,6 +44,7 @@ def test_quick_is_a_part_of_the_whole():
     assert quick.runs < whole.runs
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_page_and_its_figures(lippmann, without_engine, tmp_path):
     out = tmp_path / "report"
     code, said, _ = lippmann("reproduce", "-o", out, "--quick", "--json")
@@ -59,6 +60,7 @@ def test_the_command_writes_the_page_and_its_figures(lippmann, without_engine, t
     assert set(figures["physical"]) == {"teapot"}
 
 
+@pytest.mark.slow
 def test_tables_for_other_programs(lippmann, without_engine, tmp_path):
     assert lippmann("reproduce", "-o", tmp_path / "report", "--quick")[0] == 0
     with (tmp_path / "report" / "results.csv").open(newline="") as file:
@@ -88,6 +90,7 @@ def test_lost_time_is_never_a_negative_saving(lippmann, without_engine, tmp_path
         assert not re.search(r"-\d+(\.\d+)? ?\\?%", text), name
 
 
+@pytest.mark.long
 def test_it_says_what_was_saved(lippmann, without_engine, tmp_path):
     code, said, _ = lippmann("reproduce", "-o", tmp_path / "report", "--quick")
     assert code == 0
@@ -114,6 +117,7 @@ def test_nothing_is_rendered_for_a_place_that_cannot_be_written(monkeypatch, tmp
         reproduce(tmp_path / "no" / "such", quick=True)
 
 
+@pytest.mark.slow
 def test_nothing_is_left_of_a_run_that_fails(monkeypatch, fake_renderer, tmp_path):
     def interrupt(results):
         raise KeyboardInterrupt
@@ -125,6 +129,7 @@ def test_nothing_is_left_of_a_run_that_fails(monkeypatch, fake_renderer, tmp_pat
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_small_real_run(engine, small_display):
     results = run_experiment(
         Experiment(("small-balls",), small_display, runs=1, warm_up=0), engine_renderer(small_display)

@@ -88,6 +88,7 @@ def test_where_python_does_not_know_the_variable_the_code_removes_the_entry(host
     assert marks(hostile) == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flags", [[], ["-E"]], ids=["by the variable", "by the code"])
 @pytest.mark.parametrize("how", ["safely", "plainly"])
 def test_spawned_processes(hostile, tmp_path, flags, how):

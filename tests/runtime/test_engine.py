@@ -72,12 +72,14 @@ def test_arguments_out_of_range(arguments, problem):
         engine.start(**arguments)
 
 
+@pytest.mark.slow
 def test_no_library_found():
     message = start_fails(NOTHING_FOUND)
     assert "no usable LLVM library is installed" in message
     assert llvm.install_command() in message
 
 
+@pytest.mark.slow
 @needs_cpu_only
 def test_no_library_found_on_the_device_of_choice():
     assert "no usable LLVM library is installed" in start_fails(NOTHING_FOUND, device="auto")
@@ -93,6 +95,7 @@ def old_libraries(folder: Path) -> list[tuple[int, Path, str]]:
     return found
 
 
+@pytest.mark.long
 def test_only_an_old_library_found(tmp_path):
     for version, path, look in old_libraries(tmp_path):
         before = NOTHING_FOUND + look + f"llvm.files_in = lambda folders: iter([Path({str(path)!r})])\n"
@@ -101,30 +104,35 @@ def test_only_an_old_library_found(tmp_path):
         assert llvm.install_command() in message
 
 
-@pytest.mark.parametrize("device", ["cpu", "auto"])
+@pytest.mark.slow
+@pytest.mark.parametrize("device", [pytest.param("cpu", marks=pytest.mark.long), "auto"])
 def test_named_library_is_an_old_one(tmp_path, device):
     for version, path, look in old_libraries(tmp_path):
         message = start_fails(NOTHING_FOUND + look, device=device, **{llvm.PATH_VARIABLE: str(path)})
         assert message.startswith(f"{llvm.PATH_VARIABLE}: '{path}' is LLVM {version}")
 
 
+@pytest.mark.slow
 def test_named_library_is_missing(tmp_path):
     path = str(tmp_path / "libLLVM.so.19.1")
     assert f"'{path}' not found" in start_fails(device="auto", **{llvm.PATH_VARIABLE: path})
 
 
+@pytest.mark.slow
 def test_named_library_is_missing_and_a_gpu_does_not_excuse_it(tmp_path):
     before = "from lippmann.runtime import gpu; gpu.find = lambda: 'Test GPU'\n"
     path = str(tmp_path / "libLLVM.so.19.1")
     assert f"'{path}' not found" in start_fails(before, device="auto", **{llvm.PATH_VARIABLE: path})
 
 
+@pytest.mark.slow
 def test_named_library_is_a_text_file(tmp_path):
     path = tmp_path / "libLLVM.so.19.1"
     path.write_text("no library")
     assert f"'{path}' is not a shared library" in start_fails(**{llvm.PATH_VARIABLE: str(path)})
 
 
+@pytest.mark.slow
 def test_library_states_a_good_version_and_cannot_be_loaded(tmp_path):
     path = tmp_path / "libLLVM.so.19.1"
     path.write_text("no library" * 100)
@@ -262,6 +270,7 @@ def test_extras_are_installed_or_say_how(monkeypatch):
     assert usd.fix == "pip install 'lippmann[usd]'"
 
 
+@pytest.mark.long
 def test_diagnosis_of_a_machine_that_cannot(monkeypatch, tmp_path):
     monkeypatch.setenv(llvm.PATH_VARIABLE, str(tmp_path / "none.so"))
     diagnosis = engine.diagnose("cpu")
@@ -288,6 +297,7 @@ def test_diagnosis_survives_an_engine_that_ends_its_process(monkeypatch, tmp_pat
     assert "Cannot select" in render.value
 
 
+@pytest.mark.slow
 def test_diagnosis_survives_an_engine_that_never_ends(monkeypatch, tmp_path):
     (tmp_path / "mitsuba.py").write_text("import time; time.sleep(60)")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))

@@ -97,6 +97,7 @@ def run(code: str, timeout: float = 240) -> list[str]:
     return done.stdout.splitlines()
 
 
+@pytest.mark.long
 def test_calls_of_eight_threads_give_the_bytes_of_single_ones(tmp_path):
     code = f"""
     import random, tempfile
@@ -158,6 +159,7 @@ def test_calls_of_eight_threads_give_the_bytes_of_single_ones(tmp_path):
     assert run(code) == ["123 []"]
 
 
+@pytest.mark.long
 def test_scenes_may_be_freed_while_another_thread_renders():
     code = """
     from lippmann.device.pbr import build
@@ -184,6 +186,7 @@ def test_scenes_may_be_freed_while_another_thread_renders():
     assert run(code) == ["True []"]
 
 
+@pytest.mark.long
 def test_the_tiles_of_a_file_may_be_traced_by_another_thread():
     # A lock held while the runner works would never be free for it.
     code = """
@@ -206,6 +209,7 @@ def test_the_tiles_of_a_file_may_be_traced_by_another_thread():
     assert run(code) == ["True"]
 
 
+@pytest.mark.long
 def test_asking_a_scene_while_another_thread_renders():
     # Before Python 3.12, functools.cached_property has one lock for the same property of all objects: a thread that
     # holds it and waits for the engine stops the one that has the engine.
@@ -223,6 +227,7 @@ def test_asking_a_scene_while_another_thread_renders():
     assert run(code, 100) == ["(2, 3)", "False"]
 
 
+@pytest.mark.long
 def test_the_engine_stays_with_the_thread_that_renders():
     code = """
     began, may_go, order = threading.Event(), threading.Event(), []
@@ -247,6 +252,7 @@ def test_the_engine_stays_with_the_thread_that_renders():
     assert run(code) == ["[] [True, True, True]", "first 4"]
 
 
+@pytest.mark.long
 def test_a_wait_ends_by_ctrl_c(tmp_path):
     sign = tmp_path / "waiting"
     code = f"""
@@ -284,6 +290,7 @@ def test_a_wait_ends_by_ctrl_c(tmp_path):
     assert (said, errors, process.returncode) == ("stopped\n1296\n", "", 0)
 
 
+@pytest.mark.long
 @needs_fork
 def test_a_child_of_a_fork_before_the_first_render_renders():
     code = """
@@ -293,6 +300,7 @@ def test_a_child_of_a_fork_before_the_first_render_renders():
     assert run(code) == ["True"]
 
 
+@pytest.mark.long
 @needs_fork
 @pytest.mark.parametrize("end", ["os._exit", "sys.exit"])
 def test_a_child_of_a_fork_after_a_render_is_refused(end):
@@ -318,6 +326,7 @@ def test_a_child_of_a_fork_after_a_render_is_refused(end):
     assert run(code) == [REFUSAL, REFUSAL, "1296"]
 
 
+@pytest.mark.long
 @needs_fork
 def test_an_uncaught_refusal_ends_the_child():
     code = """
@@ -338,8 +347,16 @@ def test_an_uncaught_refusal_ends_the_child():
     assert run(code) == ["1"]
 
 
+@pytest.mark.slow
 @needs_fork
-@pytest.mark.parametrize(("end", "code_of_child"), [("os._exit", 3), ("leave", 3), ("fail", 1)])
+@pytest.mark.parametrize(
+    ("end", "code_of_child"),
+    [
+        pytest.param("os._exit", 3, marks=pytest.mark.long),
+        ("leave", 3),
+        pytest.param("fail", 1, marks=pytest.mark.long),
+    ],
+)
 def test_a_child_of_a_fork_during_a_render_is_refused(end, code_of_child):
     # It ends with its own exit code, where Dr.Jit's clean-up would wait for the kernel that ran during the fork.
     code = f"""
@@ -370,6 +387,7 @@ def test_a_child_of_a_fork_during_a_render_is_refused(end, code_of_child):
     assert run(code) == [str((REFUSAL, code_of_child)), "True"]
 
 
+@pytest.mark.long
 @needs_fork
 def test_a_fork_beside_a_thread_that_waits_leaves_no_lock_behind():
     # Nothing is loaded yet, so that the child may render: it waits for no thread of its parent.
@@ -390,6 +408,7 @@ def test_a_fork_beside_a_thread_that_waits_leaves_no_lock_behind():
     assert run(code) == ["('1296', 3)"]
 
 
+@pytest.mark.slow
 @needs_fork
 def test_the_denoiser_is_refused_in_a_child():
     code = """
@@ -401,6 +420,7 @@ def test_the_denoiser_is_refused_in_a_child():
     assert run(code) == [REFUSAL]
 
 
+@pytest.mark.long
 @needs_fork
 def test_workers_that_are_forked_are_refused_and_those_that_are_spawned_render(tmp_path):
     (tmp_path / "work.py").write_text(

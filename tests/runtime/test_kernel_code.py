@@ -58,6 +58,7 @@ def loads_numba(tmp_path):
     return program
 
 
+@pytest.mark.slow
 @needs_linux
 def test_a_second_process_runs_what_the_first_has_compiled(loads_numba, tmp_path):
     assert loads_numba()

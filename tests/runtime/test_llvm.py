@@ -140,12 +140,14 @@ def test_component_libraries_are_not_taken(folder):
     assert list(llvm.files_in([folder])) == []
 
 
+@pytest.mark.slow
 def test_none_found(folder):
     with pytest.raises(EngineError, match="no usable LLVM library is installed") as raised:
         llvm.choose()
     assert raised.value.fix.endswith(llvm.install_command())
 
 
+@pytest.mark.slow
 def test_only_old_ones_found_are_named(folder):
     put(folder, "libLLVM-15.so.1")
     put(folder, "libLLVM-14.so.1")
@@ -180,12 +182,13 @@ def test_named_library_is_the_only_one_considered(folder, tmp_path_factory, monk
     assert llvm.choose().version == (19, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "problem"),
     [
-        (None, "not found"),
-        (b"just text", "is not a shared library"),
-        (library_bytes("libLLVM-14.so.1"), "is LLVM 14, which is too old"),
+        pytest.param(None, "not found", marks=pytest.mark.long),
+        pytest.param(b"just text", "is not a shared library", marks=pytest.mark.long),
+        pytest.param(library_bytes("libLLVM-14.so.1"), "is LLVM 14, which is too old", marks=pytest.mark.long),
         (library_bytes("libLLVM-15.so.1"), "is LLVM 15, which is too old"),
     ],
     ids=["missing", "text", "14", "15"],
@@ -205,6 +208,7 @@ def test_wrong_named_library_is_an_error_even_beside_a_good_one(
     assert llvm.install_command() in raised.value.fix
 
 
+@pytest.mark.slow
 def test_bare_name_is_looked_up_where_the_loader_looks(folder, monkeypatch, tmp_path_factory):
     put(folder, "libLLVM.so.19.1")
     monkeypatch.chdir(tmp_path_factory.mktemp("current"))

@@ -33,6 +33,7 @@ def run(tmp_path, stamp, cache):
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
 
 
+@pytest.mark.slow
 def test_a_second_process_does_not_compile_and_a_changed_package_does(tmp_path):
     cache = tmp_path / "cache"
     assert run(tmp_path, "a", cache) == ["0", "1"]
@@ -125,6 +126,7 @@ print(ready(2.5), ready._cache._cache_file._data_name(1))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 def test_a_child_forked_while_a_kernel_is_compiled_compiles_and_keeps_kernels_under_its_own_name(tmp_path):
     path = tmp_path / "kernels.py"

@@ -122,6 +122,7 @@ def steps_scene():
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pop_out", [0.2, 0.5, 0.8])
 def test_a_picture_shows_the_share_before_the_lens_plane_that_was_asked_for(engine, pop_out):
     """Measured on what the display shows; the box around the scene is a hundred times as deep."""

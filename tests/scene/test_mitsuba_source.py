@@ -184,6 +184,7 @@ def test_outside_files_need_leave(save, tmp_path):
     load_scene(path, allow_outside=True)
 
 
+@pytest.mark.long
 def test_whoever_asks_for_cameras_starts_the_engine(save):
     code = (
         "from lippmann.scene.readers.load import load_scene\n"
@@ -208,6 +209,7 @@ def test_a_scene_that_brings_a_sensor_is_placed_by_it(save, engine):
     assert load_scene(save(EMITTER + '<sensor type="irradiancemeter"/>', "meter.xml")).display_camera is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [(3.0, 3.0), (2.0, 1.0)])
 def test_an_orthographic_sensor_with_a_scale_sees_what_mitsuba_sees(save, engine, scale):
     from lippmann import api

@@ -62,6 +62,7 @@ def test_a_triangle_beyond_the_vertices_is_refused(scene, body):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "data"),
     [("ply", triangle(900_000_000)), ("serialized", serialized(900_000_000))],

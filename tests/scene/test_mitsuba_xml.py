@@ -159,6 +159,7 @@ class TestIncludes:
         top.unlink()
         assert dict(read_mitsuba_xml(scene).files) == {"sub/a.ply": both, "sub/b.ply": beside}
 
+    @pytest.mark.slow
     def test_circles_and_crowds_end(self, save):
         save('<include filename="room.xml"/>', "b.xml")
         with pytest.raises(SceneError, match=rf"includes too many files; at most {MOST_INCLUDE_LEVELS} files inside"):

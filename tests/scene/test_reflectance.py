@@ -44,6 +44,7 @@ def test_no_surface_is_no_reflectance():
     assert mean_reflectance(SceneDescription("none")) is None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("value", "strength"), [(0.9, 1.0), (0.25, 1.0), (0.125, 2.0), (0.0, BRIGHTEST)])
 def test_dark_models_get_more_light(value, strength):
     scene = Scene("s", squares((grey(value), 1, None)))

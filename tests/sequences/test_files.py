@@ -63,11 +63,13 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
 
 
+@pytest.mark.long
 def test_a_whole_run_leaves_its_frames_alone(unbroken):
     assert list(unbroken) == [f"f_{number:02}.png" for number in FRAMES]
     assert len(set(unbroken.values())) == 4
 
 
+@pytest.mark.long
 def test_finished_frames_are_kept_and_the_rest_is_the_same(unbroken, moving_ball, display, tmp_path):
     run(moving_ball, display, tmp_path, most=2)
     assert (tmp_path / "f_%02d.png.journal").exists()
@@ -79,6 +81,7 @@ def test_finished_frames_are_kept_and_the_rest_is_the_same(unbroken, moving_ball
     assert {name: (tmp_path / name).stat().st_mtime_ns for name in written} == written
 
 
+@pytest.mark.long
 def test_damaged_and_absent_frames_are_rendered_again(unbroken, moving_ball, display, tmp_path):
     run(moving_ball, display, tmp_path, most=3)
     (tmp_path / "f_00.png").unlink()
@@ -88,6 +91,7 @@ def test_damaged_and_absent_frames_are_rendered_again(unbroken, moving_ball, dis
     assert contents(tmp_path) == unbroken
 
 
+@pytest.mark.long
 def test_what_was_half_written_is_swept(unbroken, moving_ball, display, tmp_path):
     run(moving_ball, display, tmp_path, most=1)
     (tmp_path / ".f_03-0123abcd.part.png").write_bytes(b"half")
@@ -95,6 +99,7 @@ def test_what_was_half_written_is_swept(unbroken, moving_ball, display, tmp_path
     assert contents(tmp_path) == unbroken
 
 
+@pytest.mark.slow
 def test_what_was_chosen_for_the_first_frame_holds(unbroken, moving_ball, display, tmp_path):
     run(moving_ball, display, tmp_path, most=1)
     journal = tmp_path / "f_%02d.png.journal"
@@ -105,6 +110,7 @@ def test_what_was_chosen_for_the_first_frame_holds(unbroken, moving_ball, displa
         run(moving_ball, display, tmp_path, resume=True)
 
 
+@pytest.mark.long
 def test_a_journal_chooses_no_other_options(unbroken, moving_ball, display, tmp_path):
     run(moving_ball, display, tmp_path, most=1)
     journal = tmp_path / "f_%02d.png.journal"
@@ -115,6 +121,7 @@ def test_a_journal_chooses_no_other_options(unbroken, moving_ball, display, tmp_
     assert contents(tmp_path) == unbroken
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -136,6 +143,7 @@ def test_other_options_are_refused(engine, moving_ball, display, tmp_path, optio
     assert contents(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_other_scenes_and_displays_are_refused(engine, moving_ball, display, tmp_path):
     out = tmp_path / "out"
     out.mkdir()
@@ -154,6 +162,7 @@ def test_other_scenes_and_displays_are_refused(engine, moving_ball, display, tmp
         run(moving_ball, load_display("panel-4k"), out, resume=True)
 
 
+@pytest.mark.long
 def test_more_or_fewer_frames_may_be_asked_for(unbroken, moving_ball, display, tmp_path):
     run(moving_ball, display, tmp_path, most=2)
     frames = run(moving_ball, display, tmp_path, frames=range(7), most=5, resume=True)
@@ -161,6 +170,7 @@ def test_more_or_fewer_frames_may_be_asked_for(unbroken, moving_ball, display, t
     assert all(contents(tmp_path)[name] == unbroken[name] for name in ("f_00.png", "f_03.png"))
 
 
+@pytest.mark.long
 def test_frames_that_are_rendered_in_tiles_are_kept_too(engine, moving_ball, display, tmp_path):
     from lippmann.tiles.tiled_render import render_here
 
@@ -182,6 +192,7 @@ def command(scene, folder, *more):
     return [sys.executable, "-c", start, *map(str, (*words, "--device", "cpu", *more))]
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no such signal there")
 @pytest.mark.parametrize("film", [pytest.param("film.png", marks=pytest.mark.long), "film.mp4"])
 def test_killed_in_mid_sequence_and_gone_on_with(unbroken, moving_ball, tmp_path, film):

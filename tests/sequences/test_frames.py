@@ -78,6 +78,7 @@ def test_a_camera_of_the_file_is_followed(moving_ball, display):
     assert moved == pytest.approx([1, 0, 0], abs=1e-6)
 
 
+@pytest.mark.long
 def test_a_frame_alone_is_the_same_as_among_others(engine, moving_ball):
     motion = open_motion(moving_ball)
     options = {"integrator": "direct", "spp": 1, "device": "cpu"}
@@ -88,6 +89,7 @@ def test_a_frame_alone_is_the_same_as_among_others(engine, moving_ball):
     assert among[2].provenance.options["frame"] == 2
 
 
+@pytest.mark.slow
 def test_frames_are_rendered_in_tiles_too(engine, moving_ball, tmp_path):
     motion = open_motion(moving_ball)
     options = {"integrator": "direct", "method": "full", "spp": 1, "device": "cpu", "tone_map": "none"}
@@ -101,6 +103,7 @@ def test_frames_are_rendered_in_tiles_too(engine, moving_ball, tmp_path):
     assert np.array_equal(read.world_from_display, whole.world_from_display)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["animation", "flight"])
 def test_nothing_is_compiled_for_later_frames(engine, moving_ball, room, kind, monkeypatch):
     import drjit as dr
@@ -124,6 +127,7 @@ def test_nothing_is_compiled_for_later_frames(engine, moving_ball, room, kind, m
     assert kernels[2] <= kernels[0] | kernels[1]
 
 
+@pytest.mark.slow
 def test_what_was_chosen_for_the_first_frame_holds(engine, moving_ball):
     images = render_sequence(open_motion(moving_ball), frames=[0, 1], integrator="direct", spp=1, device="cpu")
     assert [image.provenance.method for _, image in images] == ["pooled", "pooled"]

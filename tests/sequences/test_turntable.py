@@ -66,6 +66,7 @@ def corners_before(motion, where, frame):
     return motion.scene(frame).bounds_in(where(frame).display_from_world)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (33.0, 0.0, 0.0), (0.0, -90.0, 0.0), (20.0, 25.0, 0.0)])
 @pytest.mark.parametrize("swing", [None, 70.0])
 def test_one_placement_holds_the_scene_at_all_angles(display, turn, swing):
@@ -83,6 +84,7 @@ def test_one_placement_holds_the_scene_at_all_angles(display, turn, swing):
     assert swing is not None or scales[0] == pytest.approx(scales[1], rel=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", [0, 1, 3])
 def test_a_frame_is_the_scene_turned(engine, display, frame):
     """Frame k of N, as a picture of a scene whose vertices were turned by hand."""
@@ -102,6 +104,7 @@ def test_a_frame_is_the_scene_turned(engine, display, frame):
     assert border.max() == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lit", ["light", "studio"])
 def test_light_stands_still(engine, display, lit):
     """A matte ball looks the same at all angles, and is lit from one side."""
@@ -147,6 +150,7 @@ def test_a_swing_is_smooth_and_closed():
     assert (min(angles), angles[8]) == pytest.approx((-20.0, 0.0))
 
 
+@pytest.mark.slow
 def test_exposure_is_held(engine, display):
     """Whatever frame is rendered first."""
     from lippmann.rendering import picture
@@ -163,6 +167,7 @@ def test_exposure_is_held(engine, display):
     assert all(np.array_equal(images[frame].pixels, fixed[frame].pixels) for frame in (1, 2))
 
 
+@pytest.mark.long
 def test_quilts_of_a_turn(engine, display):
     motion = open_turntable(scene_of(block(), lights=[SIDE_LIGHT]), 4)
     quilts = dict(render_quilt_sequence(motion, display, [0, 1], views=(3, 1), size=(300, 256), **QUICK))
@@ -172,6 +177,7 @@ def test_quilts_of_a_turn(engine, display):
     assert widths[1] / widths[0] == pytest.approx(0.5, abs=0.1)
 
 
+@pytest.mark.slow
 def test_unfinished_quilts_are_gone_on_with(engine, display, tmp_path):
     motion = open_turntable(scene_of(block(), lights=[SIDE_LIGHT]), 3)
 
@@ -211,6 +217,7 @@ def test_a_camera_that_places_the_display_cuts_nothing_off(display):
     assert "the lens plane moved" in where(0).warnings[0]
 
 
+@pytest.mark.slow
 def test_progress_never_runs_backwards(engine, display):
     reports = []
     motion = open_turntable(scene_of(block(), lights=[SIDE_LIGHT]), 3)
@@ -220,6 +227,7 @@ def test_progress_never_runs_backwards(engine, display):
     assert done[-1] == 3
 
 
+@pytest.mark.slow
 def test_the_call_renders_a_whole_turn(engine, display):
     images = list(lippmann.render_turntable(scene_of(block(), lights=[SIDE_LIGHT]), display, 3, spp=1, device="cpu"))
     assert len(images) == 3

@@ -51,6 +51,7 @@ def test_jupyter_gets_an_iframe(studio):
     assert studio.address in bundle["text/plain"]
 
 
+@pytest.mark.long
 def test_only_pages_of_this_machine_may_frame_it(studio):
     headers = headers_of(studio)
     assert "X-Frame-Options" not in headers
@@ -70,6 +71,7 @@ def test_the_state_follows_the_page(studio):
     assert studio.state == StudioState(display=TINY, scale=1.5)
 
 
+@pytest.mark.long
 def test_renders_take_turns_with_the_studio(studio):
     """A live picture gathers light all the while, and goes on afterwards."""
     state = values_of_state(StudioState(display=TINY))
@@ -92,6 +94,7 @@ def test_renders_take_turns_with_the_studio(studio):
             number = int.from_bytes(said(socket, "frame", 60)[8:12], "little")
 
 
+@pytest.mark.long
 def test_a_scene_without_a_file_is_shown_but_not_rendered_from_the_page(engine):
     scene = lippmann.load_scene("teapot", light=lippmann.LightOptions(turn=(20.0, 0.0)))
     with lippmann.studio(scene, TINY) as studio, page_of(studio) as socket:
@@ -107,6 +110,7 @@ def test_a_scene_without_a_file_is_shown_but_not_rendered_from_the_page(engine):
             assert "\n" not in line
 
 
+@pytest.mark.slow
 def test_a_closed_studio_is_gone(tmp_path, engine):
     studio = lippmann.studio("teapot", TINY, folder=tmp_path)
     address, thread = urlsplit(studio.address), studio._session.thread._thread
@@ -142,6 +146,7 @@ def test_what_will_not_do_is_one_line(arguments, words):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.long
 def test_the_interpreter_ends_with_an_open_studio():
     """Also in the middle of rendering, once the engine is loaded."""
     code = f"""
@@ -173,6 +178,7 @@ class _Notebook(http.server.BaseHTTPRequestHandler):
         pass
 
 
+@pytest.mark.long
 def test_a_cell_shows_live_frames(studio, open_tab):
     handler = type("Notebook", (_Notebook,), {"output": studio._repr_mimebundle_()["text/html"]})
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:

@@ -46,6 +46,7 @@ def opened(open_tab, address, **options):
     return tab
 
 
+@pytest.mark.slow
 def test_every_pixel_of_the_picture_is_a_pixel_of_the_screen(open_tab, address, picture, tmp_path):
     tab = opened(open_tab, address)
     tab.wait_for(f"{MAPPING} === 'exact'")
@@ -55,6 +56,7 @@ def test_every_pixel_of_the_picture_is_a_pixel_of_the_screen(open_tab, address, 
     tab.assert_clean()
 
 
+@pytest.mark.slow
 def test_pictures_through_a_wire_are_the_same(open_tab, picture, tmp_path):
     with WebServer(PanelSite(PictureFile(picture, tile_format="png"))) as server:
         tab = opened(open_tab, server.address)
@@ -73,6 +75,7 @@ def pattern():
     return found
 
 
+@pytest.mark.slow
 def test_the_pattern_reaches_the_screen_pixel_by_pixel(open_tab, address, tmp_path):
     tab = opened(open_tab, address)
     tab.page.keyboard.press("p")
@@ -84,7 +87,8 @@ def test_the_pattern_reaches_the_screen_pixel_by_pixel(open_tab, address, tmp_pa
     tab.assert_clean()
 
 
-@pytest.mark.parametrize("ratio", [2, 1.5])
+@pytest.mark.slow
+@pytest.mark.parametrize("ratio", [pytest.param(2, marks=pytest.mark.long), 1.5])
 def test_a_dense_screen_of_the_right_size_is_exact(open_tab, address, picture, tmp_path, ratio):
     """Where the system scales, the window divides by the ratio that the browser tells."""
     size = tuple(int(np.ceil(side / ratio)) for side in SIZE)
@@ -96,6 +100,7 @@ def test_a_dense_screen_of_the_right_size_is_exact(open_tab, address, picture, t
         np.testing.assert_array_equal(screen(tab, tmp_path)[:height, :width], np.asarray(file.convert("RGB")))
 
 
+@pytest.mark.slow
 def test_another_screen_is_complained_of(open_tab, address):
     tab = opened(open_tab, address, size=(1000, 600))
     assert "This screen has 1000 x 600 pixels, wall has 1338 x 642" in tab.wait_for(COMPLAINT)
@@ -125,6 +130,7 @@ CAUSES = [
 ]
 
 
+@pytest.mark.slow
 def test_each_complaint_has_its_cause(open_tab, address):
     tab = opened(open_tab, address)
     for changed, words in CAUSES:
@@ -142,6 +148,7 @@ def test_only_the_window_and_its_picture_are_served(picture):
         site.post(Request("/", {}), b"{}")
 
 
+@pytest.mark.slow
 def test_the_studio_is_shown_live_on_the_panel(studio, open_tab, tmp_path):
     panel = studio.session.display(studio.session.state).panel
     tab = open_tab(size=(max(panel.width, 300), max(panel.height, 300))).open(f"{studio.address}panel?live")

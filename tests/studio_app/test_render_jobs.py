@@ -156,6 +156,7 @@ def test_files_are_named_as_where_the_studio_was_started(runner, monkeypatch):
     assert until(lambda job: job.phase == "done").output.read_text() == str(started)
 
 
+@pytest.mark.slow
 def test_a_render_ends_with_a_studio_that_is_killed(tmp_path):
     """The real child process, whose work is a sleep that hears nothing."""
     render = (

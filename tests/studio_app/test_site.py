@@ -608,6 +608,7 @@ MESSAGES = st.sampled_from(["view", "shown", "pick", "render", "open", "resume",
 )
 
 
+@pytest.mark.slow
 @settings(
     max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture]
 )

@@ -59,6 +59,7 @@ def test_a_file_says_all_of_a_state(state):
     assert text.count("\n") <= len(dataclasses.fields(StudioState))
 
 
+@pytest.mark.long
 @settings(max_examples=30)
 @given(STATES)
 def test_the_command_line_says_all_but_the_eye(state):
@@ -94,6 +95,7 @@ def test_a_draft_is_kept_and_said():
     assert str(caught.value).startswith("state:2: spp: 4 beside a draft; a draft has one sample a pixel; leave it out")
 
 
+@pytest.mark.long
 def test_a_file_and_its_command_line_make_the_same_bytes(engine, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(
@@ -176,6 +178,7 @@ def test_what_is_no_text_is_no_state(tmp_path):
             read_state(tmp_path / name)
 
 
+@pytest.mark.long
 def test_a_state_loads_no_engine():
     code = (
         "import sys, lippmann.studio_app.state_toml, lippmann.studio_app.command_line; "

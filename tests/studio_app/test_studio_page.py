@@ -50,6 +50,7 @@ def state(tab):
     return tab.evaluate(f"{STUDIO}.store.state")
 
 
+@pytest.mark.slow
 def test_the_model_is_turned_by_hand_and_undone(page):
     tab = page()
     tab.page.keyboard.press("t")
@@ -72,6 +73,7 @@ def test_the_model_is_turned_by_hand_and_undone(page):
     tab.assert_clean()
 
 
+@pytest.mark.long
 def test_the_pointer_moves_the_eye(page):
     tab = page()
     box = tab.page.locator("canvas").first.bounding_box()
@@ -88,6 +90,7 @@ def test_the_pointer_moves_the_eye(page):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 def test_keys_work_on_a_fresh_page_and_after_a_click_on_a_tool(page):
     tab = page()
     press = tab.page.keyboard.press
@@ -121,6 +124,7 @@ def test_keys_work_on_a_fresh_page_and_after_a_click_on_a_tool(page):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 def test_the_bar_speaks_as_people_do_and_resume_is_for_these_settings(page):
     tab = page()
     command = tab.evaluate(COMMAND)
@@ -156,6 +160,7 @@ def test_the_bar_speaks_as_people_do_and_resume_is_for_these_settings(page):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 def test_values_are_typed_and_automatic_ones_are_given_back(page):
     tab = page()
     tab.page.get_by_role("spinbutton", name="Size", exact=True).fill("2.5")
@@ -186,6 +191,7 @@ def test_values_are_typed_and_automatic_ones_are_given_back(page):
     tab.assert_clean()
 
 
+@pytest.mark.long
 def test_a_print_and_a_monitor_are_given_another_size(page):
     tab = page(size=(1024, 768))
     width = tab.page.get_by_role("spinbutton", name="Size, width")
@@ -221,6 +227,7 @@ def test_a_print_and_a_monitor_are_given_another_size(page):
     tab.assert_clean()
 
 
+@pytest.mark.long
 def test_a_clicked_point_comes_into_the_lens_plane(page):
     tab = page()
     tab.page.keyboard.press("l")
@@ -232,6 +239,7 @@ def test_a_clicked_point_comes_into_the_lens_plane(page):
     tab.assert_clean()
 
 
+@pytest.mark.long
 def test_native_pixels_are_shown_one_by_one(page):
     tab = page()
     tab.page.keyboard.press("n")
@@ -254,6 +262,7 @@ DROP = """async (files) => {
 WEDGE = "v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n"
 
 
+@pytest.mark.slow
 def test_models_are_dropped_and_bad_ones_are_one_line(page):
     tab = page()
     tab.evaluate(f"{STUDIO}.store.set({{ turn: [30, 0, 0] }})")
@@ -274,6 +283,7 @@ def test_models_are_dropped_and_bad_ones_are_one_line(page):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 def test_a_model_that_cannot_be_opened_changes_nothing_here_nor_in_other_tabs(page, open_tab, studio):
     tab = page()
     before = state(tab)
@@ -288,6 +298,7 @@ def test_a_model_that_cannot_be_opened_changes_nothing_here_nor_in_other_tabs(pa
         assert max(each.evaluate(PIXEL, [3, 3])[1:3]) > 0
 
 
+@pytest.mark.long
 def test_everything_has_a_name_and_is_reached_by_keys(page):
     tab = page()
     nameless = tab.evaluate(
@@ -314,12 +325,15 @@ def test_everything_has_a_name_and_is_reached_by_keys(page):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "options"),
     [
         ((1440, 900), {}),
-        ((1024, 768), {}),
-        ((820, 1180), {"has_touch": True, "device_scale_factor": 2, "is_mobile": True}),
+        pytest.param((1024, 768), {}, marks=pytest.mark.long),
+        pytest.param(
+            (820, 1180), {"has_touch": True, "device_scale_factor": 2, "is_mobile": True}, marks=pytest.mark.long
+        ),
     ],
     ids=["desk", "small", "tablet"],
 )
@@ -338,6 +352,7 @@ def test_nothing_is_cut_off(page, size, options):
     tab.assert_clean()
 
 
+@pytest.mark.long
 def test_two_fingers_change_the_size(page):
     tab = page(size=(820, 1180), has_touch=True)
     before = state(tab)["scale"]
@@ -357,6 +372,7 @@ def test_two_fingers_change_the_size(page):
     tab.assert_clean()
 
 
+@pytest.mark.long
 def test_a_studio_that_died_is_said(tmp_path, open_tab):
     from stand_in import running
 
@@ -366,6 +382,7 @@ def test_a_studio_that_died_is_said(tmp_path, open_tab):
     assert "still running" in tab.wait_for(ALERT)
 
 
+@pytest.mark.slow
 def test_the_page_is_refused_without_its_token(studio, open_tab):
     tab = open_tab().open(studio.address.replace("secret", "guess"))
     assert json.loads(tab.page.inner_text("body")) == {"error": "there is nothing here"}
@@ -389,6 +406,7 @@ def test_a_result_of_any_name_is_found(page, studio):
     tab.assert_clean()
 
 
+@pytest.mark.long
 def test_a_print_is_rendered_and_seen_through_its_sheet(page, studio):
     """A whole render, by the command that the page shows."""
     tab = page()

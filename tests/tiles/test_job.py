@@ -35,13 +35,16 @@ def rendered(made, order=None):
     return {index: render_tile(prepared, index) for index in indices}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "side", "changes"),
     [
         # Tiles that are cut off at the edges; all others fit, to spare the compiler.
-        ("small-balls", 48, {}),
-        ("gears", 64, {"integrator": "path", "depth": 3, "spp": 3}),
-        ("small-balls", 64, {"integrator": "path", "depth": 4, "caustics": "photons"}),
+        pytest.param("small-balls", 48, {}, marks=pytest.mark.long),
+        pytest.param("gears", 64, {"integrator": "path", "depth": 3, "spp": 3}, marks=pytest.mark.long),
+        pytest.param(
+            "small-balls", 64, {"integrator": "path", "depth": 4, "caustics": "photons"}, marks=pytest.mark.long
+        ),
         ("teapot", 64, {"spp": 1, "subpixels": True}),
         ("tree", 64, {"integrator": "classic", "spp": 1, "pixel_filter": "point"}),
     ],
@@ -58,6 +61,7 @@ def test_tiles_make_the_picture_that_is_rendered_whole(engine, scene, side, chan
     assert np.array_equal(pixels, whole)
 
 
+@pytest.mark.slow
 def test_a_tile_is_the_same_in_any_order_and_after_pickling(engine):
     made = job(side=64)
     forwards = rendered(made)
@@ -65,6 +69,7 @@ def test_a_tile_is_the_same_in_any_order_and_after_pickling(engine):
     assert all(encode(forwards[index]) == encode(backwards[index]) for index in forwards)
 
 
+@pytest.mark.long
 def test_threads_do_not_matter(engine):
     code = """if True:
     import hashlib, sys

@@ -71,6 +71,7 @@ def steps(picture):
 # ---- Seams -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("engine")
 @pytest.mark.parametrize("settings", WAYS)
 def test_no_seam_is_measurable(settings, monkeypatch):
@@ -88,6 +89,7 @@ def test_no_seam_is_measurable(settings, monkeypatch):
     assert (steps(in_tiles(asked[0])) / whole[0] - 1)[:, 0].max() > 0.1
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("engine")
 @pytest.mark.parametrize("settings", WAYS)
 def test_tiles_have_the_samples_of_the_whole_picture(settings):
@@ -96,6 +98,7 @@ def test_tiles_have_the_samples_of_the_whole_picture(settings):
     assert np.square(tiled - one).mean() < 0.1 * np.square(other - one).mean()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_a_window_has_the_pixels_of_the_whole():
     from lippmann.display.pixel_window import PixelWindow
@@ -116,6 +119,7 @@ def test_a_window_has_the_pixels_of_the_whole():
 # ---- The same bytes ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_neither_threads_nor_order_matter(engine):
     code = """if True:
     import hashlib, sys
@@ -152,8 +156,11 @@ def stopping_after(count):
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
-@pytest.mark.parametrize(("settings", "ending"), [(DENOISED, "tif"), (SHARED, "zarr")])
+@pytest.mark.parametrize(
+    ("settings", "ending"), [(DENOISED, "tif"), pytest.param(SHARED, "zarr", marks=pytest.mark.long)]
+)
 def test_an_interrupted_run_gives_the_same_file(settings, ending, tmp_path, monkeypatch):
     for module in (tiles, tiled_render):
         monkeypatch.setattr(module, "SIDES", (SIDE, 32))
@@ -203,6 +210,7 @@ def test_the_sums_of_tiles_give_the_estimate_of_the_whole():
     assert estimate_denoised(sums[""], sums[OF_SAMPLES], (1, lenses.columns)).to_dict() == whole.to_dict()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_the_file_says_how_it_was_made(tmp_path):
     from lippmann.image import read_picture

@@ -86,6 +86,7 @@ def stopping_after(count: int):
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["a.png", "a.exr", "a.tif", "a.zarr"])
 def test_tiles_and_one_piece_give_the_same_file(render, scene, tmp_path, name):
     folders = tmp_path / "tiles", tmp_path / "whole"
@@ -115,7 +116,10 @@ def test_large_tiffs_are_tiled_and_the_same_too(render, scene, tmp_path, monkeyp
     assert np.abs(again.pixels - image.pixels.clip(0, 1)).max() < 0.01
 
 
-@pytest.mark.parametrize("stops", [(0,), (5, 4), (TILES,)])
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "stops", [pytest.param((0,), marks=pytest.mark.long), pytest.param((5, 4), marks=pytest.mark.long), (TILES,)]
+)
 def test_an_interrupted_run_gives_the_same_file(render, unbroken, tmp_path, stops):
     output = tmp_path / "a.tif"
     done = 0
@@ -152,6 +156,7 @@ def test_an_existing_picture_stays_until_the_new_one_is_whole(render, unbroken, 
     assert output.read_bytes() == unbroken
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", ["truncated", "flipped"])
 def test_a_damaged_tile_is_rendered_anew(render, unbroken, tmp_path, damage):
     output = tmp_path / "a.tif"
@@ -186,6 +191,7 @@ def test_a_runner_that_forgets_tiles_makes_no_file(render, tmp_path):
     assert not (tmp_path / "a.tif").exists()
 
 
+@pytest.mark.long
 def test_a_full_disk_ends_the_run_and_resuming_mends_it(render, unbroken, tmp_path, monkeypatch):
     output = tmp_path / "a.tif"
     write, written = Path.write_bytes, []
@@ -223,6 +229,7 @@ def test_a_disk_that_fills_while_the_file_is_written_harms_nothing(render, unbro
     assert output.read_bytes() == unbroken
 
 
+@pytest.mark.slow
 def test_a_copy_of_the_folder_taken_at_a_random_moment_can_be_finished(render, unbroken, tmp_path):
     output = tmp_path / "first" / "a.tif"
     output.parent.mkdir()
@@ -248,6 +255,7 @@ def test_a_copy_of_the_folder_taken_at_a_random_moment_can_be_finished(render, u
         assert (folder / "a.tif").read_bytes() == unbroken
 
 
+@pytest.mark.long
 def test_another_picture_is_refused_by_what_differs(render, tmp_path):
     output = tmp_path / "a.tif"
     with pytest.raises(StopError):

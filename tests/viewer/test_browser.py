@@ -23,6 +23,7 @@ def test_clean_page_is_clean(open_tab, page):
     assert tab.evaluate("async (x) => x + 1", 2) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fault", ["console.log('x')", "console.warn('x')", "throw new Error('x')", "fetch('missing.json').catch(() => 0)"]
 )

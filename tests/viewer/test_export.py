@@ -22,6 +22,7 @@ def data_of(page):
     return json.loads(found[1])
 
 
+@pytest.mark.slow
 def test_page_opens_from_disk_without_any_network(open_tab, tmp_path):
     image = noise(DISPLAYS["square"])
     page = page_of(tmp_path / "page.html", image)
@@ -33,6 +34,7 @@ def test_page_opens_from_disk_without_any_network(open_tab, tmp_path):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 def test_page_may_ask_nothing_of_any_network(open_tab, tmp_path):
     tab = opened(open_tab, page_of(tmp_path / "page.html", noise(DISPLAYS["square"])), offline=False)
     blocked = tab.evaluate("fetch('http://127.0.0.1:9/').then(() => 'went through', (error) => error.name)")
@@ -81,6 +83,7 @@ def test_place_that_cannot_be_written_is_named(tmp_path):
         export_page([("a", noise(DISPLAYS["square"]))], tmp_path / "nowhere" / "page.html")
 
 
+@pytest.mark.slow
 def test_hostile_name_is_shown_as_text(open_tab, tmp_path):
     name = "</script><img src=x onerror=console.log('ran')>.png"
     export_page([(name, noise(DISPLAYS["square"]))], tmp_path / "page.html")

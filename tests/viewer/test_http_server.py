@@ -284,6 +284,7 @@ def test_a_closed_server_answers_nobody_who_is_still_connected():
         ask_again()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "head",
     [b"GET / HTTP/1.1\r\n", b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 90\r\n\r\n"],

@@ -87,6 +87,7 @@ def alert(tab):
     return tab.page.inner_text("[role=alert]")
 
 
+@pytest.mark.long
 def test_page_of_the_installed_package_works(installed, shot, open_tab):
     with serving(installed, shot) as (process, address):
         tab = open_tab(size=(900, 700)).open(address)
@@ -100,6 +101,7 @@ def test_page_of_the_installed_package_works(installed, shot, open_tab):
         assert process.wait(20) == 130
 
 
+@pytest.mark.long
 def test_a_stopped_server_is_said_on_the_page(installed, shot, open_tab):
     with serving(installed, shot) as (process, address):
         tab = open_tab().open(address)
@@ -116,6 +118,7 @@ def test_a_stopped_server_is_said_on_the_page(installed, shot, open_tab):
         assert "does not answer" in alert(tab)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fate", ["damaged", "gone", "foreign"])
 def test_a_file_that_went_bad_is_said_on_the_page(installed, shot, open_tab, fate):
     with serving(installed, shot) as (_, address):

@@ -108,6 +108,7 @@ def host(widget, folder):
     return path
 
 
+@pytest.mark.slow
 def test_widget_draws_in_a_browser_without_any_kernel(widget, open_tab, tmp_path):
     tab = open_tab(size=(900, 700), offline=True).open(host(widget, tmp_path))
     tab.wait_for("document.querySelector('#cell canvas') !== null")

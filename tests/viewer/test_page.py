@@ -46,6 +46,7 @@ def test_modules_import_modules_of_the_page_only():
         assert set(imported) <= set(modules()), name
 
 
+@pytest.mark.long
 def test_modules_of_a_server_are_the_files_themselves(open_tab, served):
     tab = open_tab().open(served)
     tab.evaluate(f"{VIEWER}.ready")
@@ -59,6 +60,7 @@ def test_modules_of_a_server_are_the_files_themselves(open_tab, served):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 def test_modules_of_a_single_file_come_from_the_file(open_tab, tmp_path):
     page = page_of(tmp_path / "page.html", noise(DISPLAYS["square"]))
     tab = opened(open_tab, page)
@@ -72,6 +74,7 @@ def policy_of(page):
     return re.search(r'http-equiv="Content-Security-Policy" content="(.*?)"', page)[1]
 
 
+@pytest.mark.slow
 def test_single_file_allows_no_network_and_no_other_inline_script(open_tab, tmp_path):
     page = page_of(tmp_path / "page.html", noise(DISPLAYS["square"]))
     rules = dict(rule.split(" ", 1) for rule in policy_of(page.read_text(encoding="utf-8")).split("; "))
@@ -82,12 +85,13 @@ def test_single_file_allows_no_network_and_no_other_inline_script(open_tab, tmp_
     assert "Content Security Policy" in " ".join(tab.said)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "script",
     [
         {"textContent": "globalThis.hasRun = true"},
-        {"src": "data:text/javascript,globalThis.hasRun = true"},
-        {"type": "module", "textContent": "globalThis.hasRun = true"},
+        pytest.param({"src": "data:text/javascript,globalThis.hasRun = true"}, marks=pytest.mark.long),
+        pytest.param({"type": "module", "textContent": "globalThis.hasRun = true"}, marks=pytest.mark.long),
     ],
     ids=["inline", "data", "module"],
 )

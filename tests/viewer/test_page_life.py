@@ -48,6 +48,7 @@ def words(tab, selector):
 # ---- Pointer, touch, tilt, wheel -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_pointer_leads_the_eye(open_tab, page):
     tab = opened(open_tab, page)
     x, y, right, up = middle(tab)
@@ -60,6 +61,7 @@ def test_pointer_leads_the_eye(open_tab, page):
     tab.assert_clean()
 
 
+@pytest.mark.long
 def test_drag_moves_the_eye_from_where_it_is_and_wheel_moves_it_away(open_tab, page):
     tab = opened(open_tab, page)
     x, y, right, _ = middle(tab)
@@ -80,6 +82,7 @@ def test_drag_moves_the_eye_from_where_it_is_and_wheel_moves_it_away(open_tab, p
     assert state(tab, "eye")["z"] == pytest.approx(before["z"] * np.exp(0.48), rel=0.02)
 
 
+@pytest.mark.slow
 def test_touch_drags_the_eye_and_two_fingers_zoom(open_tab, page):
     tab = opened(open_tab, page, size=(390, 800), has_touch=True, is_mobile=True)
     x, y, right, _ = middle(tab)
@@ -103,6 +106,7 @@ def test_touch_drags_the_eye_and_two_fingers_zoom(open_tab, page):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 def test_tilt_moves_the_eye(open_tab, page):
     tab = opened(open_tab, page, size=(390, 800), has_touch=True, is_mobile=True)
     device = tab.page.context.new_cdp_session(tab.page)
@@ -125,6 +129,7 @@ def test_tilt_moves_the_eye(open_tab, page):
 # ---- Keys ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_everything_can_be_done_with_keys(open_tab, page):
     tab = opened(open_tab, page)
     tab.page.focus("canvas")
@@ -164,6 +169,7 @@ def test_everything_can_be_done_with_keys(open_tab, page):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 def test_tab_reaches_every_control(open_tab, page_of_two):
     tab = opened(open_tab, page_of_two, size=(1200, 1600))
     reached = set()
@@ -191,6 +197,7 @@ def test_tab_reaches_every_control(open_tab, page_of_two):
         assert name in text, name
 
 
+@pytest.mark.slow
 def test_divider_is_moved_by_pointer_and_keys(open_tab, page_of_two):
     tab = opened(open_tab, page_of_two)
     x, y, right, _ = middle(tab)
@@ -209,6 +216,7 @@ def test_divider_is_moved_by_pointer_and_keys(open_tab, page_of_two):
 # ---- Magnifier -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_magnifier_shows_raw_pixels_and_frames_the_one_seen(open_tab, page):
     tab = opened(open_tab, page, size=(900, 600))
     put_eye(tab, (3.0, 4.0, 120.0))
@@ -239,6 +247,7 @@ def test_magnifier_shows_raw_pixels_and_frames_the_one_seen(open_tab, page):
 # ---- Looks ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True])
 def test_page_follows_the_system_until_told_otherwise(open_tab, page, dark):
     tab = opened(open_tab, page, dark=dark)
@@ -255,6 +264,7 @@ def test_page_follows_the_system_until_told_otherwise(open_tab, page, dark):
     assert brightness() < 100
 
 
+@pytest.mark.slow
 def test_page_fits_a_phone(open_tab, page_of_two):
     tab = opened(open_tab, page_of_two, size=(360, 740), has_touch=True, is_mobile=True, device_scale_factor=3)
     assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
@@ -267,6 +277,7 @@ def test_page_fits_a_phone(open_tab, page_of_two):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 def test_nothing_moves_by_itself(open_tab, page):
     tab = opened(open_tab, page)
     before = state(tab, "eye")
@@ -278,6 +289,7 @@ def test_nothing_moves_by_itself(open_tab, page):
 # ---- What goes wrong -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_lost_context_recovers(open_tab, page):
     image = noise(DISPLAYS["square"])
     tab = opened(open_tab, page)
@@ -317,6 +329,7 @@ def grow_version(data):
     data["manifest"]["lippmann"] = 99
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said"), [(cut_tile, "damaged"), (lose_tile, "missing"), (grow_version, "another version")]
 )
@@ -327,6 +340,7 @@ def test_damage_is_said_on_the_page(open_tab, page, tmp_path, change, said):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 def test_browser_without_webgl_is_told(open_tab, page):
     tab = open_tab(offline=True)
     tab.page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
@@ -336,6 +350,7 @@ def test_browser_without_webgl_is_told(open_tab, page):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", ["gone", "cut"])
 def test_file_that_is_gone_or_cut_is_named_on_the_page(open_tab, tmp_path, damage):
     from lippmann.viewer.http_server import WebServer
@@ -357,6 +372,7 @@ def test_file_that_is_gone_or_cut_is_named_on_the_page(open_tab, tmp_path, damag
         server.close()
 
 
+@pytest.mark.long
 def test_served_page_shows_the_picture(open_tab, tmp_path):
     from lippmann.viewer.http_server import WebServer
     from lippmann.viewer.served_picture import PictureFile

@@ -64,6 +64,8 @@ def seen_part(image, eye, frame, shape):
     return np.round(255 * values) * inside[..., None]
 
 
+@pytest.mark.long_cases(but=["hexagonal"])
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DISPLAYS)
 def test_page_shows_what_replay_shows(open_tab, tmp_path, name):
     image = noise(DISPLAYS[name])
@@ -72,6 +74,8 @@ def test_page_shows_what_replay_shows(open_tab, tmp_path, name):
     tab.assert_clean()
 
 
+@pytest.mark.long_cases(but=["stripe, upright"])
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SUBPIXELS)
 def test_subpixels_are_seen_at_their_own_places(open_tab, tmp_path, name):
     image = noise(SUBPIXELS[name], subpixels=True)
@@ -84,6 +88,7 @@ def test_subpixels_matter():
     assert psnr(seen(plain, EYES[0], (300, 200)), seen(own, EYES[0], (300, 200))) < 15
 
 
+@pytest.mark.long
 def test_wide_panel_is_shown_as_exactly_as_a_small_one(open_tab, tmp_path):
     # Wider than a texture may be, so in tiles; with single precision alone one pixel in a thousand would be another.
     image = noise(lenticular(8200, 96, pixels=9.37, slant=7.0, distance=900.0))
@@ -96,6 +101,7 @@ def test_wide_panel_is_shown_as_exactly_as_a_small_one(open_tab, tmp_path):
         assert np.mean(np.any(shown(tab) != seen_part(image, eye, frame, shown(tab).shape), axis=2)) < 1e-4
 
 
+@pytest.mark.long
 def test_picture_beyond_the_memory_is_shown_in_parts(open_tab, tmp_path):
     display = lenticular(2100, 1100, pixels=10.0)
     image = noise(display)
@@ -114,6 +120,7 @@ def test_picture_beyond_the_memory_is_shown_in_parts(open_tab, tmp_path):
     tab.assert_clean()
 
 
+@pytest.mark.long
 def test_views_of_one_colour_each_are_shown_as_exactly_these(open_tab, tmp_path):
     display = DISPLAYS["lenticular"]
     colors = np.random.default_rng(3).integers(0, 256, (8, 3))
@@ -125,6 +132,7 @@ def test_views_of_one_colour_each_are_shown_as_exactly_these(open_tab, tmp_path)
         assert np.array_equal(np.unique(shown(tab).reshape(-1, 3), axis=0), color[None])
 
 
+@pytest.mark.slow
 def test_codes_of_light_follow_the_transfer(open_tab, tmp_path):
     values = np.random.default_rng(4).uniform(0, 1.2, (64, 96, 3)).astype(np.float32)
     image = IntegralImage(values, DISPLAYS["lenticular"])
@@ -132,6 +140,7 @@ def test_codes_of_light_follow_the_transfer(open_tab, tmp_path):
     assert_shows_replay(tab, image, EYES[:1])
 
 
+@pytest.mark.slow
 def test_the_window_shows_the_canvas(open_tab, tmp_path):
     tab = opened(open_tab, page_of(tmp_path / "page.html", noise(DISPLAYS["slanted"])))
     put_eye(tab, EYES[1])
@@ -150,6 +159,7 @@ def test_the_window_shows_the_canvas(open_tab, tmp_path):
     assert any(np.array_equal(part, codes[2:-2, 2:-2]) for part in parts)
 
 
+@pytest.mark.slow
 def test_zoom_shows_a_part_of_what_replay_shows(open_tab, tmp_path):
     image = noise(DISPLAYS["slanted"])
     tab = opened(open_tab, page_of(tmp_path / "page.html", image))
@@ -161,6 +171,7 @@ def test_zoom_shows_a_part_of_what_replay_shows(open_tab, tmp_path):
     assert np.mean(np.any(codes != expected, axis=2)) < 1e-4
 
 
+@pytest.mark.slow
 def test_side_by_side_shows_each_eye_its_own_picture(open_tab, tmp_path):
     image = noise(DISPLAYS["slanted"])
     tab = opened(open_tab, page_of(tmp_path / "page.html", image))
@@ -175,6 +186,7 @@ def test_side_by_side_shows_each_eye_its_own_picture(open_tab, tmp_path):
             assert np.mean(np.any(part != seen(image, (x + aside, y, z), (half, codes.shape[0])), axis=2)) < 1e-4
 
 
+@pytest.mark.slow
 def test_anaglyph_gives_red_to_the_left_eye(open_tab, tmp_path):
     image = noise(DISPLAYS["square"])
     tab = opened(open_tab, page_of(tmp_path / "page.html", image))
@@ -194,6 +206,8 @@ EXACT_VIEWS = {
 }
 
 
+@pytest.mark.long_cases(but=["lenticular"])
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXACT_VIEWS)
 def test_focus_on_a_plane_is_that_of_refocus(open_tab, tmp_path, name):
     display = EXACT_VIEWS[name]
@@ -208,6 +222,7 @@ def test_focus_on_a_plane_is_that_of_refocus(open_tab, tmp_path, name):
         assert psnr(codes, expected) >= 40, plane
 
 
+@pytest.mark.slow
 def test_divider_shows_the_second_picture_on_its_right(open_tab, tmp_path):
     first, second = noise(DISPLAYS["square"], seed=1), noise(DISPLAYS["hexagonal"], seed=2)
     tab = opened(open_tab, page_of(tmp_path / "page.html", first, second))
@@ -220,6 +235,7 @@ def test_divider_shows_the_second_picture_on_its_right(open_tab, tmp_path):
     assert np.mean(np.any(codes[:, seam:] != seen(second, EYES[1], size)[:, seam:], axis=2)) < 1e-4
 
 
+@pytest.mark.slow
 def test_layer_lies_over_the_picture_through_the_lenses(open_tab, tmp_path):
     display = DISPLAYS["slanted"]
     status = np.random.default_rng(5).integers(0, 3, (64, 96)).astype(np.float32)

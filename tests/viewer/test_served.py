@@ -40,6 +40,7 @@ def choose_layer(tab):
     tab.page.select_option("[aria-label=Layer]", "depth")
 
 
+@pytest.mark.slow
 def test_layers_come_when_they_are_asked_for(served):
     _, tab, _ = served
     before = drawn(tab)
@@ -50,6 +51,7 @@ def test_layers_come_when_they_are_asked_for(served):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 def test_a_file_written_anew_is_shown_after_a_reload(served):
     path, tab, server = served
     before = drawn(tab)
@@ -61,6 +63,7 @@ def test_a_file_written_anew_is_shown_after_a_reload(served):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 def test_an_old_page_does_not_mix_two_states_of_a_file(served, open_tab):
     path, tab, server = served
     write(path, 2)
@@ -71,6 +74,7 @@ def test_an_old_page_does_not_mix_two_states_of_a_file(served, open_tab):
     assert "reload" in tab.wait_for(ALERT)
 
 
+@pytest.mark.slow
 def test_a_server_that_died_is_said(served):
     _, tab, server = served
     server.close()

@@ -92,14 +92,15 @@ print(used("VmRSS") - before, used("VmHWM") - before)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="the system does not tell a process's memory")
 @pytest.mark.parametrize(
     ("name", "stored", "held", "read"),
     [
-        ("p.png", "uint8", 3, 6),
-        ("p.png", "uint16", 6, 12),
+        pytest.param("p.png", "uint8", 3, 6, marks=pytest.mark.long),
+        pytest.param("p.png", "uint16", 6, 12, marks=pytest.mark.long),
         ("p.exr", "float16", 12, 24),
-        ("p.exr", "float32", 12, 24),
+        pytest.param("p.exr", "float32", 12, 24, marks=pytest.mark.long),
     ],
 )
 def test_the_server_takes_the_memory_that_is_documented(tmp_path, name, stored, held, read):

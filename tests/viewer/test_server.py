@@ -225,6 +225,7 @@ WORDS = (
 PATHS = st.lists(st.sampled_from(WORDS) | st.text(max_size=4), max_size=8).map(lambda words: "/" + "/".join(words))
 
 
+@pytest.mark.slow
 @settings(
     max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 )

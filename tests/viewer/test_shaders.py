@@ -75,6 +75,7 @@ def run(open_tab, tmp_path):
     return go
 
 
+@pytest.mark.slow
 def test_codes_of_light_are_exactly_those_of_the_library(run):
     # Codes themselves, and values close to either side of the boundary between two.
     coded = (np.arange(256)[:, None] + np.array([-0.49, 0.0, 0.49])).ravel().clip(0, 255) / 255
@@ -82,6 +83,7 @@ def test_codes_of_light_are_exactly_those_of_the_library(run):
     np.testing.assert_array_equal(run("encode", light), quantize(light, 8, "srgb"))
 
 
+@pytest.mark.slow
 def test_light_of_codes_is_that_of_the_library(run):
     codes = np.arange(256, dtype=np.float32) / 255
     expected = linear_levels(np.dtype(np.uint8), "srgb")

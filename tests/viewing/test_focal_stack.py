@@ -67,6 +67,7 @@ def lippmann(capfd):
     return call
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["stack", "stack.tif", "stack.png", "stack.mp4"])
 def test_the_command_writes_folders_pages_and_animations(lippmann, image, picture, tmp_path, name):
     path = tmp_path / name
@@ -91,6 +92,7 @@ def test_the_command_writes_folders_pages_and_animations(lippmann, image, pictur
     assert np.abs(np.asarray(pages).astype(float) - coded(image)).max() <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [

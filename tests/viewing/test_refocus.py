@@ -97,6 +97,7 @@ def stripes(x):
     return (np.floor(x / 4) % 2).astype(np.float32)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("z", [-25.0, -8.0, 8.0, 25.0])
 @pytest.mark.parametrize(
     "display",
@@ -126,6 +127,7 @@ def test_a_drawn_plane_is_sharp_at_its_own_depth_only(display, z):
     assert errors[-z] > 2 * errors[z]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("plane", "size"), [(0.0, (9, 7)), (-8.0, (97, 61)), (5.0, (230, 90)), (11.0, (1, 1))])
 @pytest.mark.parametrize(
     "display",
@@ -146,6 +148,7 @@ def test_compiled_runs_are_the_look_ups_of_single_points(display, plane, size):
     np.testing.assert_array_equal(refocus(image, plane, size=size), refocus(single, plane, size=size))
 
 
+@pytest.mark.long
 def test_one_colour_stays_that_colour_where_anything_is_seen():
     for layout in ("square", "hexagonal", "lenticular"):
         display = square(8, 8, layout=layout)

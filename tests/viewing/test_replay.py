@@ -132,6 +132,7 @@ def test_at_the_viewing_distance_one_view_fills_the_picture(display):
     assert lit[picture.shape[0] // 2, 2:-2].all()
 
 
+@pytest.mark.long
 @settings(deadline=None, max_examples=60)
 @given(
     display=st.sampled_from(DISPLAYS + list_displays()[:2]),

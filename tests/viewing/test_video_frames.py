@@ -21,12 +21,14 @@ def image(engine, tmp_path_factory):
     return api.render("primitives", integrator="normal", spp=1, device="cpu")
 
 
+@pytest.mark.long
 def test_a_plain_name_shows_what_an_eye_sees(image):
     assert np.array_equal(projection_of(Path("film.mp4"))(image), replay(image))
     eye = (20.0, 0.0, 900.0)
     assert np.array_equal(projection_of(Path("film.png"), eye)(image), replay(image, eye))
 
 
+@pytest.mark.slow
 def test_a_quilts_name_shows_a_quilt(image):
     seen = projection_of(Path("film_qs4x2a1.mp4"))(image)
     assert seen.shape == (1024, 2048, 3)

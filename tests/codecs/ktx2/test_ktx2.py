@@ -26,6 +26,8 @@ def put(data, at, form, *values):
     return bytes(data)
 
 
+@pytest.mark.long_cases("uastc_rgb", "uastc_rgba")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_texels_are_those_of_the_reference_transcoder(name):
     expected = np.asarray(Image.open(DATA / f"{name}.png"))
@@ -97,6 +99,8 @@ def test_empty_codebooks_are_refused():
         Codebooks.read(0, 1, b"", b"", b"")
 
 
+@pytest.mark.long_cases("etc1s_rgba")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_damaged_files_end_in_a_line_or_a_picture(name):
     """Bytes changed at random, and ends cut off; kernels without bounds would die of an index too large."""

@@ -114,12 +114,14 @@ def toward(row, column, shape=(16, 32)):
     return np.array([-np.sin(theta) * np.sin(phi), np.cos(theta), np.sin(theta) * np.cos(phi)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("row", "column"), [(8, 16), (8, 24), (8, 8), (8, 0), (1, 20), (14, 3)])
 def test_environment_texels_lie_where_they_should(build, parts, row, column):
     seen = surroundings(build, parts, toward(row, column), one_texel(row, column))
     np.testing.assert_allclose(seen, (1, 2, 3), rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_environment_in_words(build, parts):
     """The four walls and the sky, spelled out."""
     for (row, column), direction in {
@@ -143,6 +145,7 @@ def test_environment_turns_with_its_frame(build, parts):
     np.testing.assert_allclose(seen, (1, 2, 3), rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_environment_lights_as_it_looks(build, look, parts):
     """Irradiance from a drawn environment equals its sum over the texels."""
     rng = np.random.default_rng(5)
@@ -201,6 +204,7 @@ def test_even_lamp(build, look, parts):
     np.testing.assert_allclose(seen, expected, rtol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("repeats", [1, 3])
 def test_textured_lamp(build, look, parts, repeats):
     """Also where its texture repeats, which Mitsuba's own area light cannot do."""
@@ -219,6 +223,7 @@ def test_textured_lamp(build, look, parts, repeats):
     np.testing.assert_allclose(seen, [each, each, 0], rtol=0.02, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("double_sided", "expected"), [(False, 0.0), (True, 1.0)])
 def test_back_of_a_lamp(build, look, parts, double_sided, expected):
     material = Material(base_color=(0, 0, 0), specular=0.0, emission=(2, 2, 2), double_sided=double_sided)
@@ -244,6 +249,7 @@ def test_holes_of_a_lamp_do_not_shine(build, look, parts):
     assert built.has_null
 
 
+@pytest.mark.slow
 def test_unlit_surface_shows_its_colour_from_both_sides(build, look, parts):
     colors = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], np.float32)
     built = build(parts.describe([parts.square(colors=colors)], [Material(base_color=(0.5, 0.5, 1.0), unlit=True)]))

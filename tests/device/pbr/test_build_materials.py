@@ -29,6 +29,7 @@ def flags(built):
 GLASS = Material(transmission=1.0, roughness=0.0, thickness=1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("material", "expected"),
     [
@@ -122,6 +123,7 @@ def seen_through(build, look, parts, material, mesh, *, samples=400):
     return look.picture(built, size=4, samples=samples, depth=40, half=0.01).mean((0, 1))
 
 
+@pytest.mark.slow
 def test_clear_ball_is_invisible_in_even_light(build, look, parts):
     seen = seen_through(build, look, parts, replace(GLASS, base_color=(1, 1, 1)), parts.ball())
     np.testing.assert_allclose(seen, 1, atol=0.01)
@@ -191,6 +193,7 @@ def test_black_attenuation_stays_finite(build, parts):
     assert green == 0
 
 
+@pytest.mark.slow
 def test_absorbing_bodies_are_not_instanced(build, parts):
     """Their shapes have to be found among the scene's."""
     wine = replace(GLASS, attenuation_color=(0.5, 0.25, 1.0), attenuation_distance=2.0)

@@ -29,6 +29,7 @@ def outward(built, look, x, y, **where):
     return np.array(si.n).T, np.array(si.sh_frame.n).T, np.array(si.p).T
 
 
+@pytest.mark.slow
 def test_a_mesh_whose_copies_would_fill_the_memory_is_kept_once(build, look, parts):
     mesh = parts.ball(steps=60)
     places = np.stack([moved(3.0 * number, 0, 0) for number in range(6)])
@@ -63,6 +64,7 @@ def test_copies_are_merged(build, look, parts, stacked):
     assert not look.hit(built, [1.5, 1195.5], [0, 0]).is_valid().numpy().any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("memory", [None, SCARCE])  # merged, and as instances
 @pytest.mark.parametrize("smooth", [True, False])
 def test_mirrored_placement_keeps_the_outside_out(build, look, parts, memory, smooth):
@@ -134,6 +136,7 @@ def test_family_in_a_repeated_object(build, look, parts):
     np.testing.assert_allclose(seen, [(1, 0, 0), (0, 1, 0)], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_copies_keep_colours_coordinates_and_normals(build, look, parts):
     """Merged copies, some of them mirrored, equal the same meshes one by one."""
     rng = np.random.default_rng(5)
@@ -153,6 +156,7 @@ def test_copies_keep_colours_coordinates_and_normals(build, look, parts):
             np.testing.assert_allclose(mine, its, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_copies_beyond_the_memory_are_refused(build, parts):
     places = np.tile(np.eye(4), (2_000_000, 1, 1))
     with pytest.raises(SceneError, match=r"2,000,000 placed meshes of 28,084,000,000 triangles need .* GiB.* 1 GiB"):

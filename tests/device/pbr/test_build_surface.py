@@ -134,6 +134,7 @@ def at(cosine):
 unit = st.floats(0, 1)
 
 
+@pytest.mark.slow
 @given(
     base=st.tuples(unit, unit, unit),
     metallic=unit,
@@ -183,6 +184,7 @@ def test_light_through_a_frosted_sheet(build, parts):
     np.testing.assert_allclose(value, through_sheet(material, wi, wo), rtol=2e-4, atol=2e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cosine", [0.9, 0.35, -0.8, -0.3])
 @pytest.mark.parametrize("ior", [1.5, 1.2])
 def test_frosted_glass_refracts_as_mitsubas_does(build, parts, cosine, ior):
@@ -260,7 +262,11 @@ def binned(vectors, values):
     return np.histogram2d(vectors[:, 2], np.arctan2(vectors[:, 1], vectors[:, 0]), edges, weights=values)[0]
 
 
-@pytest.mark.parametrize("cosine", [0.9, 0.3, -0.6])
+@pytest.mark.long_cases("oiled glass-0.3")
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "cosine", [pytest.param(0.9, marks=pytest.mark.long), 0.3, pytest.param(-0.6, marks=pytest.mark.long)]
+)
 @pytest.mark.parametrize("name", CASES)
 def test_draws_follow_their_density_and_weigh_right(build, parts, name, cosine):
     """Share of draws per bin of directions equals the integral of the density, and of light that of the value."""
@@ -306,6 +312,7 @@ NARROW = {
 }
 
 
+@pytest.mark.long_cases("cloudy glass-0.9")
 @pytest.mark.parametrize("cosine", [0.9, -0.6])
 @pytest.mark.parametrize("name", NARROW)
 def test_narrow_lobes_first_show_the_same_light(build, parts, name, cosine):
@@ -341,8 +348,9 @@ def test_wide_lobes_are_drawn_as_ever(build, parts):
             assert np.array_equal(plain, first)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CASES if "glass" not in name])
-@pytest.mark.parametrize("cosine", [1.0, 0.5])
+@pytest.mark.parametrize("cosine", [1.0, pytest.param(0.5, marks=pytest.mark.long)])
 def test_no_surface_makes_light(build, parts, name, cosine):
     """Glass is left out: radiance grows by the square of the refractive index on entering it."""
     _, factor, _, _ = draw(bsdf_of(build, parts, CASES[name]), at(cosine), 200_000)
@@ -356,6 +364,7 @@ def test_white_matte_surface_loses_nothing(build, parts):
         np.testing.assert_allclose(factor, 1, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roughness", [0.05, 0.2, 0.5, 1.0])
 @pytest.mark.parametrize("cosine", [1.0, 0.6, 0.2, 0.05])
 def test_white_plastic_neither_makes_nor_loses_light(build, parts, roughness, cosine):
@@ -403,6 +412,7 @@ def charlie(wi, wo, alpha):
     return density / ((1 + masking(wi[..., 2]) + masking(wo[..., 2])) * 4 * wi[..., 2])
 
 
+@pytest.mark.slow
 def test_sheen_formula(build, parts):
     """Cloth adds its lobe and dims what it covers by its own albedo, integrated here over the hemisphere."""
     tint = np.array([0.8, 0.6, 0.4])
@@ -421,6 +431,7 @@ def test_sheen_formula(build, parts):
     np.testing.assert_allclose(value, expected, rtol=0.02, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_albedo_table_matches_the_integral(engine):
     from lippmann.device.pbr.microfacet import sheen_albedo_table
 
@@ -476,6 +487,7 @@ def test_bump_seen_from_behind_is_a_dent(build, look, parts):
     np.testing.assert_allclose(seen, [-TILT], atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rotation", [0.0, 0.5, np.pi / 2])
 def test_brushed_metal_spreads_light_along_its_direction(build, look, parts, rotation):
     """Its direction is told by the texture coordinates, which all triangles of a mesh carry without any texture."""

@@ -59,6 +59,7 @@ def test_picture_stands_upright(build, look, parts, texels):
     np.testing.assert_allclose(seen, texels / 255, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("filtering", ["nearest", "linear"])
 @pytest.mark.parametrize("wrap_u", MODES)
 @pytest.mark.parametrize("wrap_v", MODES)
@@ -72,6 +73,7 @@ def test_wrap_modes_per_axis(build, look, parts, texels, wrap_u, wrap_v, filteri
     np.testing.assert_allclose(look.emitted(built, x, y), expected, atol=2e-5)
 
 
+@pytest.mark.long
 @given(
     scale=st.tuples(st.floats(0.3, 3), st.floats(0.3, 3)),
     angle=st.floats(-3, 3),
@@ -169,6 +171,7 @@ def test_picture_is_uploaded_once(engine, texels):
     assert store.bitmap_count == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("filtering", ["nearest", "linear"])
 @pytest.mark.parametrize(("wrap_u", "wrap_v"), [("repeat", "mirror"), ("clamp", "repeat"), ("mirror", "clamp")])
 @pytest.mark.parametrize("srgb", [False, True])
@@ -202,6 +205,7 @@ def test_pictures_of_many_materials(build, look, parts, wrap_u, wrap_v, filterin
         assert wrong.mean() < (0.01 if filtering == "nearest" else 1e-9)  # on borders of texels, rounding decides
 
 
+@pytest.mark.slow
 def test_channels_of_many_materials(build, look, parts):
     rng = np.random.default_rng(13)
     pictures = [rng.integers(0, 256, (3, 4, 4), dtype=np.uint8) for _ in range(9)]

@@ -44,6 +44,7 @@ def tilted(degrees):
     return Texture(Image("n", np.tile(texel, (2, 2, 1))), srgb=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roughness", [0.1, 0.5, 1.0])
 @pytest.mark.parametrize("cosine", [1.0, 0.5, 0.1, -0.7])
 @pytest.mark.parametrize("material", [METAL, SHEET, GLASS], ids=["metal", "sheet", "glass"])
@@ -52,6 +53,7 @@ def test_white_surfaces_keep_all_light(kept, material, roughness, cosine):
     np.testing.assert_allclose(kept(replace(material, roughness=roughness), cosine), 1, atol=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ior", [1.0, 1.1, 1.33, 1.8, 2.4])
 @pytest.mark.parametrize("cosine", [0.9, 0.4, -0.9, -0.4])
 def test_glass_of_any_index_keeps_all_light(kept, ior, cosine):
@@ -69,6 +71,7 @@ def test_rough_clear_coat_keeps_all_light(kept, coated):
     np.testing.assert_allclose(kept(replace(coated, clearcoat=1.0, clearcoat_roughness=1.0), 0.5), 1, atol=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roughness", [0.2, 0.5, 1.0])
 def test_white_cloth_keeps_all_light(kept, roughness):
     cloth = replace(WHITE, sheen_color=(1.0, 1.0, 1.0), sheen_roughness=roughness)
@@ -85,6 +88,7 @@ def test_coloured_rough_metal_gets_deeper_not_darker(kept):
     assert bright[2] / bright[0] < single[2] / single[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [30, 50, 60, 80])
 @pytest.mark.parametrize("cosine", [1.0, 0.5, -0.8])
 @pytest.mark.parametrize("roughness", [0.05, 0.5])
@@ -105,6 +109,7 @@ def test_brushed_metal_keeps_nearly_all_light(kept, strength):
         np.testing.assert_allclose(light, 1, atol=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("base", [METAL, Material(base_color=(0.0, 0.0, 0.0), metallic=1.0), WHITE, SHEET])
 @pytest.mark.parametrize("thickness", [0.0, 250.0, 550.0])
 def test_thin_films_make_no_light(kept, base, thickness):
@@ -113,6 +118,7 @@ def test_thin_films_make_no_light(kept, base, thickness):
         assert (kept(material, cosine) < 1.03).all()
 
 
+@pytest.mark.slow
 def test_solid_glass_in_even_light_cannot_be_seen(build, look, parts):
     """The furnace of a whole body: paths cross several interfaces (single scattering keeps a third at roughness 1)."""
     even = Environment(np.ones((2, 4, 3), np.float32))
@@ -123,6 +129,7 @@ def test_solid_glass_in_even_light_cannot_be_seen(build, look, parts):
         assert picture.mean() == pytest.approx(1, abs=0.05)
 
 
+@pytest.mark.slow
 def test_glass_of_index_one_is_a_tinted_nothing(build, look, parts):
     """Rays pass straight through: whatever lies behind is seen, in the glass's colour twice."""
     pane = replace(GLASS, ior=1.0, roughness=0.4, base_color=(0.9, 0.5, 0.3))

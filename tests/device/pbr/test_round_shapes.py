@@ -77,6 +77,7 @@ def rays(count, aim, spread, seed):
     return origin, direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 
+@pytest.mark.slow
 @settings(max_examples=30)
 @given(st.integers(0, 1000))
 def test_a_ball_is_the_ellipsoid_of_its_placement(seed):
@@ -145,6 +146,7 @@ def test_glass_and_lamps_stay_triangles(material):
     assert shapes_of(scene_of(ball(), [np.eye(4)])) == ["Ellipsoids"]
 
 
+@pytest.mark.slow
 def test_a_picture_of_round_bodies_is_that_of_fine_triangles():
     """Each of its own colour, by its material or its vertices, in every micro-image."""
     display = Display("square", Panel(60, 40, 0.5), LensArray("square", 2.5), 3.0, "", float("inf"), 20.0)

@@ -89,6 +89,7 @@ def test_splats_of_every_degree_are_those_of_the_twin(degree):
     assert np.abs(left - true_left).max() < 1.1e-4
 
 
+@pytest.mark.long
 def test_small_and_flat_splats_far_away_are_met():
     random = np.random.default_rng(2)
     count = 200

@@ -70,7 +70,9 @@ def psnr(found, true):
     return -10 * np.log10(np.mean((encode_srgb(np.float64(found)) - encode_srgb(true)) ** 2))
 
 
-@pytest.mark.parametrize(("transfer", "least"), [(SOFT, 50), (SHELL, 45)], ids=["soft", "shell"])
+@pytest.mark.parametrize(
+    ("transfer", "least"), [(SOFT, 50), pytest.param(SHELL, 45, marks=pytest.mark.long)], ids=["soft", "shell"]
+)
 def test_rays_are_those_of_the_twin(transfer, least):
     volume = Volume(blobs(), MATRIX, transfer)
     origins, directions = rays(300)
@@ -96,6 +98,7 @@ def test_empty_bricks_change_nothing():
     assert passed_over.mean() < 0.6 * found.mean()  # what is left are the steps from brick to brick
 
 
+@pytest.mark.long
 def test_slope_and_intercept_stand_for_the_values():
     grid = blobs()
     origins, directions = rays(50)
@@ -122,6 +125,7 @@ def test_a_slab_absorbs_by_its_thickness_alone():
         assert color[:, 0] == pytest.approx(0.5 * (1 - left), rel=1e-5)
 
 
+@pytest.mark.long
 def test_surfaces_are_lit_from_the_light():
     z, y, x = np.mgrid[:24, :24, :24] - 11.5
     ball = (1000 - 60 * np.sqrt(x * x + y * y + z * z)).astype(np.float32)

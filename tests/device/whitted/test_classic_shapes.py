@@ -150,6 +150,7 @@ def agree(actual, expected, tolerance):
     assert wrong.mean() < 2e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [8, 60])
 @pytest.mark.parametrize("groups", [0, 3])
 def test_the_nearest_crossing(count, groups):

@@ -116,6 +116,7 @@ VARIANTS = {
 PUBLISHED_BY_NAME = {f"{number} {values['serial']}": values for number, values in enumerate(PUBLISHED)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "values", [*VARIANTS.values(), *PUBLISHED], ids=[*VARIANTS.keys(), *(name for name in PUBLISHED_BY_NAME)]
 )

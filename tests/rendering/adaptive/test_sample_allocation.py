@@ -147,6 +147,7 @@ def coded(image):
     return encode_srgb(np.clip(image.pixels, 0, 1).astype(np.float64))
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("engine")
 def test_a_room_by_as_many_rays(monkeypatch):
     """A picture of a given number of samples is better for it; one that is to reach a quality is made as ever."""

@@ -84,6 +84,7 @@ def told_and_true(renderer, denoise):
 DENOISERS = {"blur": blur, "flat": lambda p, _: np.full_like(p, 0.3), "brighter": lambda p, _: p + np.float32(0.05)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("denoise", DENOISERS.values(), ids=DENOISERS)
 def test_the_error_is_neither_missed_nor_much_overstated(denoise, seed, as_denoised):
@@ -92,6 +93,7 @@ def test_the_error_is_neither_missed_nor_much_overstated(denoise, seed, as_denoi
     assert told == pytest.approx(true, rel=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("denoise", DENOISERS.values(), ids=DENOISERS)
 def test_samples_that_take_the_place_of_worse_pixels_do_not_flatter(denoise):
     told, true = np.mean([told_and_true(Noise(seed=seed), denoise) for seed in range(8)], axis=0)
@@ -295,6 +297,7 @@ def test_a_single_sample_has_no_halves():
     assert np.array_equal(Denoised(renderer, lambda p, _: p * 2, "srgb").picture(), 2 * renderer.picture())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("samples", [4, 16])
 def test_the_stated_interval_holds_for_open_image_denoise(engine, samples):
     import lippmann

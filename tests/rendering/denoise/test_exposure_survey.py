@@ -24,6 +24,7 @@ def treatment(scene="small-balls", settings=SETTINGS, size=(96, 64)):
     return prepare(make_job(api.load_scene(scene), display, settings, stored="float32", side=128)).treatment
 
 
+@pytest.mark.long
 def test_many_rays_deserve_the_high_effort():
     assert treatment().effort == "fast"
     assert treatment(settings=replace(SETTINGS, spp=64)).effort == "high"
@@ -31,6 +32,7 @@ def test_many_rays_deserve_the_high_effort():
     assert treatment(settings=replace(SETTINGS, denoise="oidn-fast", spp=64)).effort == "fast"
 
 
+@pytest.mark.slow
 def test_plain_settings_need_none():
     assert treatment(settings=RenderRequest(method="full", integrator="direct", spp=1)) is None
 

@@ -184,7 +184,8 @@ def test_views_are_taken_apart_and_put_together_exactly(display, monkeypatch):
     assert shapes == ([(96, 64, 3)] * 8 if display is STRAIGHT else [(12, 20, 3)] * 64)
 
 
-@pytest.mark.parametrize("scene", [flat_scene, far_scene])
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", [pytest.param(flat_scene, marks=pytest.mark.long), far_scene])
 def test_the_form_that_is_chosen_is_the_better_one(scene):
     from lippmann.rendering.denoise.pixel_order import best_form, denoise_views
 

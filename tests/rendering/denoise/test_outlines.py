@@ -152,6 +152,7 @@ def coded(image):
     return encode_srgb(np.clip(image.pixels, 0, 1).astype(np.float64))
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("engine")
 @pytest.mark.parametrize(("method", "samples"), [("full", 1), ("pooled", 1), ("pooled", 4)])
 def test_leaves_before_the_sky(method, samples, monkeypatch):

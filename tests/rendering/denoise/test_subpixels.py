@@ -34,7 +34,10 @@ def rays(window=None, display=SHEET):
     return whole if window is None else WindowRays(whole, window)
 
 
-@pytest.mark.parametrize(("order", "window"), [("rgb", None), ("brg", PixelWindow(20, 10, 40, 30))])
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("order", "window"), [pytest.param("rgb", None, marks=pytest.mark.long), ("brg", PixelWindow(20, 10, 40, 30))]
+)
 def test_own_colours_are_those_that_sub_pixels_have_alone(integrator, order, window):
     from lippmann.rendering.denoise.subpixels import SubpixelBatches
     from lippmann.rendering.film.sample_batches import FullInBatches
@@ -54,6 +57,7 @@ def test_own_colours_are_those_that_sub_pixels_have_alone(integrator, order, win
     assert together.rays == alone.rays
 
 
+@pytest.mark.slow
 def test_a_denoiser_is_given_all_colours(integrator, as_denoised):
     from lippmann.rendering.denoise.dual_buffer import Denoised
     from lippmann.rendering.denoise.subpixels import SubpixelBatches
@@ -112,6 +116,7 @@ def error(image, references):
     return float((first * second).mean())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("method", "samples"), [("pooled", 2), ("full", 1)])
 def test_all_colours_are_worth_more_than_one(references, method, samples, monkeypatch):
     found = picture(method, samples, denoise="oidn-fast")

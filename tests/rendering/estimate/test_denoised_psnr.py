@@ -39,6 +39,7 @@ def truth_of(true):
     return [psnr(float(true.mean())), psnr(float(np.nanmax(micro_image_means(true, SHOWN)[0])))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [0.3, 3, 10])
 @pytest.mark.parametrize("noise", [0.005, 0.05, 0.2])
 def test_intervals_hold_the_truth_however_noisy_the_judges_are(noise, ratio):

@@ -57,6 +57,7 @@ def slow_errors(sums, taken):
     return jackknife + evenness, outliers
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "taken", [[1, 1], [2, 2, 1, 1], [3, 3, 2, 2, 3, 2, 2, 2], [1, 1, 0, 0, 1, 0, 0, 0], [8] * 8], ids=str
 )
@@ -82,6 +83,7 @@ def true_error(batches, truth, taken=None, transfer="srgb"):
     return np.square(code(picture(batches, taken)) - code(np.full(1, truth))).mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transfer", ["srgb", "linear"])
 @pytest.mark.parametrize("number", [2, 4, 8])
 def test_plain_noise_is_measured_without_bias(number, transfer):

@@ -225,6 +225,7 @@ def test_placements_of_a_mesh_kept_once_are_shapes_of_their_own():
     assert sides[0] != sides[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("bsdf", "albedo"),
     [
@@ -290,6 +291,7 @@ def test_normal_maps_count():
 # ---- Guides ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_guides_average_over_the_pixel():
     built = of_mitsuba(ball_and_wall())
     one, many = guided(built, samples=1, box_filter=False), guided(built, samples=16)
@@ -301,6 +303,7 @@ def test_guides_average_over_the_pixel():
     assert np.abs(many.albedo - one.albedo).mean() < 0.05
 
 
+@pytest.mark.long
 def test_guides_do_not_depend_on_tiles_and_passes():
     from lippmann.rendering.film.feature_buffers import trace_guides
     from lippmann.rendering.film.wavefront_plan import make_plan
@@ -317,6 +320,7 @@ def test_guides_do_not_depend_on_tiles_and_passes():
     assert parts.normal == pytest.approx(whole.normal, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_guides_show_what_a_mirror_shows():
     """A mirror at 45 degrees, and above it a red ceiling that faces down."""
     normal = np.array([0.0, 1.0, 1.0]) / np.sqrt(2)
@@ -344,6 +348,7 @@ def test_guides_show_lamps_and_sky():
     assert not guides.normal[~on_lamp].any()
 
 
+@pytest.mark.long
 def test_sub_pixels_have_guides_of_their_own():
     from lippmann.rendering.transport.ray_source import DisplayRays
 

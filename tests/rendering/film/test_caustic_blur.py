@@ -75,6 +75,7 @@ def test_pictures_without_photons_have_none():
     assert SquaredBlur(integrator, source, WHOLE, 1).after(8) is None
 
 
+@pytest.mark.long
 def test_smooth_light_is_held_for_three_times_as_blurred_as_it_is():
     """A parabola's: the second moment of the kernel is a sixth of the squared radius."""
     radius, bend = 0.2, 5.0
@@ -83,6 +84,7 @@ def test_smooth_light_is_held_for_three_times_as_blurred_as_it_is():
     assert found == pytest.approx((3 * bias) ** 2, rel=0.15)
 
 
+@pytest.mark.slow
 def test_an_edge_is_told_to_a_factor():
     radius = 0.1
     found = blur_of(lambda x: np.where(x > 0, 1.0, 0.0), radius).mean()
@@ -93,6 +95,7 @@ def test_an_edge_is_told_to_a_factor():
     assert found == pytest.approx(true / 2.315, rel=0.15)
 
 
+@pytest.mark.long
 def test_pixels_are_the_same_in_parts_and_fewer_stand_for_all(monkeypatch):
     from lippmann.rendering.film import caustic_blur
 
@@ -110,6 +113,7 @@ def test_pixels_are_the_same_in_parts_and_fewer_stand_for_all(monkeypatch):
     assert every.mean() == pytest.approx(looked_at * np.square((1 + 5 / 6) / 2 / (5 / 6)), rel=0.3)
 
 
+@pytest.mark.long
 def test_a_look_is_repeated_at_twice_the_share(monkeypatch):
     from lippmann.rendering.film import caustic_blur
 
@@ -123,6 +127,7 @@ def test_a_look_is_repeated_at_twice_the_share(monkeypatch):
     assert looked[3] > 0.95
 
 
+@pytest.mark.long
 def test_the_estimate_of_a_picture_counts_it():
     from lippmann.color.transfer import coding_slope
     from lippmann.rendering.film.sample_batches import FullInBatches

@@ -71,6 +71,7 @@ def far_from(share, truth, samples):
     return float((np.abs(found - true) / np.sqrt(np.maximum(variance, 1e-3) / (64 * samples))).max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("subpixels", [False, True])
 def test_paths_and_guides_tell_the_same(session, truth, subpixels):
     source = rays(subpixels)

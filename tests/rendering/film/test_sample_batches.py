@@ -67,6 +67,7 @@ def batches(integrator, *, seed=1, memory=2**30, subpixels=False, **options):
 TIGHT = SIZE * SIZE * (8 * 12 + 36) + (1 << 14) * 96
 
 
+@pytest.mark.long
 def test_the_picture_is_the_same_however_it_is_cut(integrator):
     whole, cut = batches(integrator), batches(integrator, memory=TIGHT)
     whole.add(37)
@@ -75,6 +76,7 @@ def test_the_picture_is_the_same_however_it_is_cut(integrator):
     assert whole.samples == cut.samples == 37
 
 
+@pytest.mark.slow
 def test_bands_of_rows_are_the_picture_in_one_piece(integrator):
     from lippmann.rendering.film.sample_batches import trace_in_batches
 
@@ -122,6 +124,7 @@ def test_every_sample_of_both_streams_is_taken_once(engine, rounds, shares, memo
     assert found[..., 2].var() == pytest.approx(1 / 24, rel=0.2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("subpixels", [False, True])
 def test_the_mean_is_that_of_full_and_the_error_what_it_says(integrator, subpixels):
     from lippmann.color.transfer import encode_srgb
@@ -142,6 +145,7 @@ def test_the_mean_is_that_of_full_and_the_error_what_it_says(integrator, subpixe
     assert found.worst_low <= -10 * np.log10(worst) <= found.worst_high
 
 
+@pytest.mark.slow
 def test_a_quality_that_is_asked_for_is_kept(integrator):
     from lippmann.color.transfer import encode_srgb
     from lippmann.rendering.adaptive.goal import Goal
@@ -302,6 +306,7 @@ def test_chosen_pixels_take_each_sample_once_across_passes_of_photons(engine, mo
         assert half[corner()][:, 1] == pytest.approx(7 * 15 / 6)
 
 
+@pytest.mark.long
 def test_wavefronts_of_any_size_share_a_kernel(engine):
     """With photons, light vertices and chosen pixels: the kernel of paths takes seconds to compile."""
     import drjit as dr

@@ -32,6 +32,7 @@ def test_the_warning_names_the_way_out():
     assert "(nothing)" in nothing_seen(0)[0]
 
 
+@pytest.mark.slow
 def test_glowing_surfaces_before_black_are_something(engine):
     """They send no rays on, which an environment's bound goes by."""
     from lippmann import api

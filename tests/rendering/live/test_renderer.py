@@ -65,6 +65,7 @@ def render(scene, name, **options):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("eye", EYES)
 @pytest.mark.parametrize("name", DISPLAYS)
 def test_a_frame_is_the_replay_of_a_render(teapot, renderers, name, eye):
@@ -77,6 +78,7 @@ def test_a_frame_is_the_replay_of_a_render(teapot, renderers, name, eye):
     assert psnr(frame.pixels, replayed) > 60
 
 
+@pytest.mark.slow
 def test_a_rest_that_is_left_half_way_frees_its_pictures(renderers):
     """At once, not when Python looks for objects that hold each other, which may be hours later."""
     renderer = renderers("lenticular")
@@ -99,7 +101,8 @@ def test_a_rest_that_is_left_half_way_frees_its_pictures(renderers):
         gc.enable()
 
 
-@pytest.mark.parametrize("name", ["slanted", "square"])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["slanted", pytest.param("square", marks=pytest.mark.long)])
 def test_native_pixels_at_rest_are_those_of_a_render_with_as_many_samples(teapot, renderers, name):
     window = PixelWindow(20, 10, 30, 25)
     request = RenderRequest(placement=PLACED, integrator="path", depth=3, tone_map="pbr-neutral")
@@ -113,6 +116,7 @@ def test_native_pixels_at_rest_are_those_of_a_render_with_as_many_samples(teapot
     assert psnr(frames[2].pixels, quantize(image.pixels[window.slices], 8, "srgb")) > 60
 
 
+@pytest.mark.long
 def test_rest_comes_near_a_long_render(teapot, renderers):
     renderer, eye = renderers("lenticular"), EYES[0]
     view = LiveView(eye, SIZE, request=RenderRequest(placement=PLACED, tone_map="pbr-neutral"))
@@ -129,6 +133,7 @@ def test_rest_comes_near_a_long_render(teapot, renderers):
     assert last > first + 3
 
 
+@pytest.mark.slow
 def test_samples_go_where_the_noise_is(renderers):
     """An empty background needs few; each pixel of it has some, and no sample is counted twice."""
     renderer = renderers("square")
@@ -145,6 +150,7 @@ def test_samples_go_where_the_noise_is(renderers):
     assert frame.samples == round(2 * rest._taken.mean())
 
 
+@pytest.mark.slow
 def test_a_move_compiles_nothing(teapot):
     import drjit as dr
 
@@ -186,6 +192,7 @@ def test_a_move_compiles_nothing(teapot):
     assert renderer.recordings == recordings
 
 
+@pytest.mark.long
 def test_light_is_that_of_a_render(renderers):
     scene = lippmann.load_scene("gears")
     display = DISPLAYS["square"]
@@ -242,6 +249,7 @@ def test_of_some_rows_one_is_traced_and_stands_for_all(renderers, name, top, hei
     np.testing.assert_array_equal(coarse, whole[rows])
 
 
+@pytest.mark.long
 def test_a_newer_view_drops_the_samples_of_the_last(renderers):
     renderer = renderers("square")
     view = LiveView(None, request=RenderRequest(placement=PLACED))
@@ -249,6 +257,7 @@ def test_a_newer_view_drops_the_samples_of_the_last(renderers):
     assert renderer.refine(replace(view, request=RenderRequest(placement=PLACED, seed=1))).samples == 2
 
 
+@pytest.mark.long
 def test_heights_are_the_depth_that_a_render_shows(teapot, renderers):
     request = RenderRequest(placement=PLACED, pixel_filter="point")
     view = LiveView(EYES[0], SIZE, request=request)
@@ -288,6 +297,7 @@ def test_splats_and_volumes_are_refused_and_the_scene_before_stays(renderers):
     assert renderer.scene is scene
 
 
+@pytest.mark.long
 def test_a_display_or_a_scene_takes_the_place_of_another(teapot):
     renderer = LiveRenderer(teapot, DISPLAYS["square"])
     view = LiveView(EYES[0], SIZE, request=RenderRequest(placement=PLACED))

@@ -73,6 +73,7 @@ def test_denoised_pictures_of_sharp_surfaces_have_them(engine):
     assert chains(picture(0.02, method="lens-view", denoise="oidn")) == 0
 
 
+@pytest.mark.long
 def test_pictures_with_them_state_their_error_as_before(balls):
     scene = balls(3.0)
     first, second = (rendered(scene, seed=seed, spp=32) for seed in (1, 2))

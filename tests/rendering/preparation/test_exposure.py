@@ -50,6 +50,7 @@ def picture(what, **options):
     return api.render(what, "mla-square", spp=4, method="full", **LINEAR, **options)
 
 
+@pytest.mark.slow
 def test_the_median_of_what_is_lit_is_mid_grey():
     image = picture(scene())
     lit = image.pixels[image.pixels.max(-1) > 0].mean(-1)
@@ -59,6 +60,7 @@ def test_the_median_of_what_is_lit_is_mid_grey():
     assert any(f"exposure {exposure:+.2f} EV" in note for note in image.provenance.notes)
 
 
+@pytest.mark.slow
 def test_an_exposure_that_is_given_is_kept():
     plain = picture(scene(), exposure=0.0)
     assert "exposure" not in plain.provenance.options
@@ -124,11 +126,13 @@ def test_light_that_is_not_physical_stays_as_it_is():
     assert np.median(image.pixels[image.pixels.max(-1) > 0]) == pytest.approx(2.0 * 0.5 / np.pi, rel=0.02)
 
 
+@pytest.mark.long
 def test_the_background_keeps_its_colour():
     image = picture(scene(background=(0.25, 0.5, 0.75)), placement=api.PlacementOptions(scale=0.3))
     np.testing.assert_allclose(image.pixels[0, 0], (0.25, 0.5, 0.75), rtol=1e-5)
 
 
+@pytest.mark.long
 def test_previews_quilts_tiles_and_reuse_choose_alike(tmp_path):
     whole = picture(scene())
     preview = api.preview(scene(), (64, 64), spp=4, **LINEAR)
@@ -148,6 +152,7 @@ def test_values_that_are_no_light_have_no_exposure():
         api.render(scene(), "mla-square", exposure=41.0)
 
 
+@pytest.mark.slow
 def test_a_sequence_keeps_the_exposure_of_the_motions_first_frame():
     from lippmann.display import load_display
     from lippmann.rendering.request.render_request import RenderRequest

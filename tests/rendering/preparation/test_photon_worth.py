@@ -78,6 +78,7 @@ def test_photons_are_left_out_where_paths_hardly_make_noise(engine, intensity, e
         assert np.square(picture.pixels - asked.pixels).mean() < LEAST_WORTH
 
 
+@pytest.mark.long
 def test_they_are_left_out_where_the_eye_does_not_look(engine):
     """A glass ball under a point light before a wall that is seen, and behind it before another one."""
     from lippmann.scene.values.description import Light

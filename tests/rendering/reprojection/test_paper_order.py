@@ -71,6 +71,7 @@ def table(display, disparity):
 # ---- Lens-view -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_plane_moves_by_its_disparity():
     display = straight(4)
     tracer = Scripted(table(display, -0.25))
@@ -211,6 +212,7 @@ def test_a_single_micro_image():
 # ---- There and back --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @given(
     name=st.sampled_from(sorted(DISPLAYS)),
     place=st.tuples(st.floats(0, 0.999), st.floats(0, 0.999)),

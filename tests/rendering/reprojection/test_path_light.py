@@ -59,11 +59,11 @@ def means_of_lenses(image):
 @pytest.mark.parametrize(
     ("preset", "size", "spp", "method", "careful"),
     [
-        ("seed-lenticular", (128, 96), 2, "lens-view", True),
+        pytest.param("seed-lenticular", (128, 96), 2, "lens-view", True, marks=pytest.mark.long),
         pytest.param("seed-lenticular", (128, 96), 4, "interpolated", True, marks=pytest.mark.long),
         pytest.param("seed-lenticular", (128, 96), 4, "lens-view", False, marks=pytest.mark.long),
-        ("seed-lenticular", (128, 96), 4, "interpolated", False),
-        ("mla-square", (120, 120), 2, "interpolated", True),
+        pytest.param("seed-lenticular", (128, 96), 4, "interpolated", False, marks=pytest.mark.long),
+        pytest.param("mla-square", (120, 120), 2, "interpolated", True, marks=pytest.mark.long),
     ],
 )
 def test_micro_images_have_the_mean_colors_of_full_tracing(scenes, full, name, preset, size, spp, method, careful):

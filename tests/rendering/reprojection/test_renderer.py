@@ -77,6 +77,7 @@ def psnr_of_lenses(frame, full):
     return -10 * np.log10(means + 1e-12), -10 * np.log10(means.mean() + 1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["teapot", "tree", "small-balls"])
 @pytest.mark.parametrize("method", ["lens-view", "interpolated"])
 def test_with_care_every_micro_image_is_right(case, name, method):
@@ -88,6 +89,7 @@ def test_with_care_every_micro_image_is_right(case, name, method):
     assert frame.shares["traced"] < 0.75
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["mla-square", "mla-hexagonal"])
 @pytest.mark.parametrize(("name", "method"), [("tree", "lens-view"), ("tree", "interpolated"), ("gears", "lens-view")])
 def test_with_care_every_micro_image_of_an_array_is_right(case, name, method, preset):
@@ -102,6 +104,7 @@ def test_with_care_every_micro_image_of_an_array_is_right(case, name, method, pr
     assert frame.shares["traced"] < 0.9
 
 
+@pytest.mark.long_cases("interpolated-small-balls")
 @pytest.mark.parametrize("name", ["teapot", "small-balls"])
 @pytest.mark.parametrize("method", ["lens-view", "interpolated"])
 def test_without_care_few_pixels_are_traced(case, name, method):
@@ -113,6 +116,8 @@ def test_without_care_few_pixels_are_traced(case, name, method):
     assert 0.05 < frame.shares["traced"] <= 0.25
 
 
+@pytest.mark.long_cases(but=["False-1-lens-view", "False-3-interpolated"])
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["lens-view", "interpolated"])
 @pytest.mark.parametrize(("careful", "samples"), [(True, 1), (False, 1), (False, 3)])
 def test_traced_pixels_equal_the_full_renderer_s(case, method, careful, samples):
@@ -147,6 +152,7 @@ def test_what_a_frame_tells(case):
     assert reports[-1].done == reports[-1].total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("careful", [True, False])
 def test_threads_do_not_matter(case, careful):
     made = [case("room").reused(careful=careful, threads=threads) for threads in (1, 2, 3)]
@@ -184,6 +190,7 @@ def test_lanes_follow_the_memory():
         wavefront_lanes(64 << 20, 512, 512, 1 << 22)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["lens-view", "interpolated"])
 @pytest.mark.parametrize("order", ["default", "paper"])
 def test_orders_are_different_ways_to_like_pictures(case, method, order):

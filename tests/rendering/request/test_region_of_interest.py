@@ -41,6 +41,8 @@ def placed(scene, display, options):
     return at, scene_corners(build(scene), at.display_from_world)
 
 
+@pytest.mark.long_cases("leaning-place0", "square-place0")
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [{}, {"turn": (30.0, 20.0, 10.0)}, {"shift": (9.0, -7.0, -30.0), "scale": 0.25}])
 @pytest.mark.parametrize("display", DISPLAYS, ids=lambda display: display.name)
 def test_nothing_of_the_scene_is_outside_a_panels_window(ball, display, place):
@@ -66,6 +68,7 @@ def test_nothing_of_the_scene_is_outside_a_panels_window(ball, display, place):
     assert found.width * found.height < 4 * tight + 15000
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("display", DISPLAYS[:2], ids=lambda display: display.name)
 def test_nothing_of_the_scene_is_outside_a_quilts_windows(ball, display, monkeypatch):
     from lippmann.rendering import quilt as module
@@ -90,6 +93,7 @@ def test_nothing_of_the_scene_is_outside_a_quilts_windows(ball, display, monkeyp
     assert ours == pytest.approx(theirs, abs=1.0)
 
 
+@pytest.mark.long
 def test_denoised_frames_are_traced_where_the_scene_is(ball):
     display = DISPLAYS[0]
     options = {
@@ -121,6 +125,7 @@ def test_pictures_that_are_not_denoised_are_traced_whole(ball):
     assert image.stats["traced_fraction"] == 1.0
 
 
+@pytest.mark.slow
 def test_before_a_sky_that_is_seen_denoised_frames_are_traced_whole():
     scene = {
         "type": "scene",

@@ -159,6 +159,7 @@ def test_sub_pixels_in_full_colour_take_from_where_sub_pixels_lie(order):
     assert np.abs(shared(light, lenses=moved) - exact).max() > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DISPLAYS)
 def test_a_window_is_a_part_of_the_whole_and_threads_do_not_show(name):
     display = DISPLAYS[name]

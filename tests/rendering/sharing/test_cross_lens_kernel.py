@@ -68,6 +68,7 @@ def surface(seed):
     return normal.astype(np.float32), height.astype(np.float32)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize("stop", [0.0, 40.0])
 @pytest.mark.parametrize(("cylindrical", "reach"), [(True, (4, 0)), (False, (3, 3))])

@@ -53,6 +53,7 @@ def gray(values):
     return np.repeat(np.asarray(values, np.float32)[..., None], 3, axis=2)
 
 
+@pytest.mark.slow
 @given(z=st.floats(-60, 60))
 @settings(max_examples=15, deadline=None)
 def test_views_meet_at_the_same_point(z):
@@ -119,6 +120,7 @@ def quilt(**options):
     return made.pixels, made.provenance
 
 
+@pytest.mark.long
 def test_a_pooled_quilt_is_nearer_to_the_truth_and_knows_it():
     truth, _ = quilt(spp=64, seed=9, method="full", denoise="none")
     (plain, _), (pooled, told) = quilt(spp=4, method="full"), quilt(spp=4, method="pooled")

@@ -134,6 +134,8 @@ def case(request, made):
     return made(request.param, make(), kind)
 
 
+@pytest.mark.long_cases("diffuse", "hard shadow")
+@pytest.mark.slow
 def test_the_error_falls_with_samples_and_the_mean_comes_right(case):
     few, some, many = (np.mean([case.errors(pooled(case, samples, seed))[0] for seed in SEEDS]) for samples in SAMPLES)
     assert some < 0.8 * few
@@ -144,6 +146,8 @@ def test_the_error_falls_with_samples_and_the_mean_comes_right(case):
     assert abs(case.bias(pooled(case, 64))) < 0.015
 
 
+@pytest.mark.long_cases("hard shadow")
+@pytest.mark.slow
 def test_no_micro_image_is_given_up_for_the_others(case):
     whole, worst = case.psnr(pooled(case, 64))
     # Caustics are seen by few lenses; elsewhere the target is 4 dB, and highlights on a small ball take most.
@@ -151,6 +155,7 @@ def test_no_micro_image_is_given_up_for_the_others(case):
     assert 0 < whole - worst < allowed.get(case.name, 4)
 
 
+@pytest.mark.slow
 def test_what_a_picture_says_of_itself_does_not_flatter(case):
     for samples in SAMPLES[1:]:
         stated = pooled(case, samples).provenance.estimate
@@ -161,6 +166,7 @@ def test_what_a_picture_says_of_itself_does_not_flatter(case):
         assert case.name in ("mirror", "glass") or stated["psnr"] > whole - 4
 
 
+@pytest.mark.slow
 def test_errors_flicker_less_from_view_to_view_than_those_of_full(case):
     """At equal PSNR, the flicker is to that of ``full`` as the shares of the error are that change between views."""
     reference = case.references[0].with_pixels(case.mean)
@@ -196,10 +202,13 @@ def fine(made):
     return made("fine", make(), "fine")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "dearer"),
     [
-        (lambda pixels, guides: (pixels, replace(guides, height=-guides.height)), 2),
+        pytest.param(
+            lambda pixels, guides: (pixels, replace(guides, height=-guides.height)), 2, marks=pytest.mark.long
+        ),
         (lambda pixels, guides: (pixels, replace(guides, height=2 * guides.height)), 1.5),
         (lambda pixels, guides: (1.1 * pixels, guides), 5),
     ],
@@ -229,6 +238,7 @@ def test_light_that_is_shared_wrongly_gives_way_to_each_lens_s_own(smooth, monke
     assert smooth.psnr(wrong)[0] > smooth.psnr(alone)[0] - 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("samples", "left"), [(4, 0.8), (16, 0.72)])
 def test_sharing_is_worth_it_where_lenses_have_many_pixels(fine, as_denoised, samples, left):
     """Over six seeds it leaves 0.71 to 0.74 of the error with 4 samples, and 0.66 to 0.68 with 16."""
@@ -247,6 +257,7 @@ def command(*words):
     return run([str(word) for word in words])
 
 
+@pytest.mark.long
 def test_a_promised_quality_is_reached_by_the_whole_command(tmp_path, small, capfd):
     words = ("render", "teapot", "--display", small, "--json")
     assert command(*words, "--method", "pooled", "--quality-worst", 34, "-o", tmp_path / "pooled.exr") == 0
@@ -259,6 +270,7 @@ def test_a_promised_quality_is_reached_by_the_whole_command(tmp_path, small, cap
     assert json.loads(capfd.readouterr().out)["micro_images"]["worst"]["psnr"] >= 33
 
 
+@pytest.mark.long
 def test_a_quality_is_reached_by_pooled_light_however_few_samples_it_takes(tmp_path, small, capfd):
     words = ("render", "tree", "--integrator", "path", "--display", small, "--json", "-o", tmp_path / "a.exr")
     assert command(*words, "--quality", 30) == 0

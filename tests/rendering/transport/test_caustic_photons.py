@@ -58,6 +58,7 @@ def lamp(position, intensity=2.0):
     return {"type": "point", "position": position, "intensity": {"type": "rgb", "value": [intensity, 1.0, 0.5]}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", [1.5, 4.0])
 def test_flux_through_a_glass_ball(distance):
     """A lamp's flux within the cone of the ball, less what either boundary reflects."""
@@ -75,6 +76,7 @@ def test_flux_through_a_glass_ball(distance):
     np.testing.assert_allclose(reflected / [2.0, 1.0, 0.5], whole - first, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_flux_from_a_mirror_cylinder():
     """All that the cylinder catches: the lamp's intensity times the solid angle."""
     cylinder = {
@@ -95,6 +97,7 @@ def test_flux_from_a_mirror_cylinder():
     np.testing.assert_allclose(photons.power.sum(axis=0) / [2.0, 1.0, 0.5], solid, rtol=0.01)
 
 
+@pytest.mark.slow
 def test_flux_through_a_prism(tmp_path):
     """Parallel light straight onto one face, and out of another at an angle of 30 degrees within."""
     import trimesh
@@ -129,6 +132,7 @@ def test_flux_through_a_prism(tmp_path):
     np.testing.assert_allclose(np.abs(np.arctan2(out[:, 1], out[:, 0])), np.pi - turned, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_photons_pass_holes_on_their_way():
     """A half-transparent sheet between lamp and mirror, and one behind it, let through their share each."""
     import mitsuba as mi
@@ -167,6 +171,7 @@ def traced(scene_dict, view, *, photons, size=24, spp=64, seed=0, depth=6, sampl
     return trace_frame(integrator, CameraRays(view, size, size), plan, seed=seed).pixels
 
 
+@pytest.mark.slow
 def test_a_lamp_s_mirror_image_lights_a_wall():
     """What no path can find: the wall is lit by the lamp and, through the mirror on the floor, by its image below."""
     import mitsuba as mi
@@ -219,6 +224,7 @@ def caustics_of_a_large_lamp(floor):
     }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "floor",
     [
@@ -247,6 +253,7 @@ def test_pictures_with_photons_are_those_of_paths(floor):
     assert mean[True].mean() == pytest.approx(mean[False].mean(), rel=0.004)
 
 
+@pytest.mark.long
 def test_a_picture_is_the_same_however_it_is_cut(monkeypatch):
     """The same seed gives the same photons and the same bytes."""
     scene, view = caustics_of_a_large_lamp({"type": "diffuse"}), camera(5.0)
@@ -268,6 +275,7 @@ def test_without_casters_or_lamps_there_are_no_photons():
     assert find_casters(mi.load_dict({"type": "scene", "ball": mirror, "lamp": lamp([0, 0, 9])})).pairs == 1
 
 
+@pytest.mark.long
 def test_instances_and_curves_throw_what_the_shapes_throw(tmp_path):
     """Shapes that give no points get photons through the boxes about them: the same flux."""
     import mitsuba as mi
@@ -312,6 +320,7 @@ def photons_of(scene_dict, **options):
     return CausticPhotons(scene, features, find_casters(scene), **({"samples": 1, "seed": 2} | options))
 
 
+@pytest.mark.long
 def test_passes_have_photons_of_their_own_and_shrinking_radii():
     from lippmann.rendering.transport.caustic_photons import radius_of_pass
 
@@ -329,6 +338,7 @@ def test_passes_have_photons_of_their_own_and_shrinking_radii():
     assert radius_of_pass(999) ** 2 == pytest.approx(1000 ** (-1 / 3), rel=0.15)
 
 
+@pytest.mark.long
 def test_what_is_not_seen_gets_few_photons():
     """Two balls, of which one throws its light outside of the region."""
     ball = {"type": "sphere", "bsdf": {"type": "dielectric"}}

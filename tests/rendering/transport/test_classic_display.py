@@ -57,6 +57,7 @@ def test_physically_based_light_sees_it_the_same_way_round(corners):
     assert [bool(hit[16 + 32 * y, 16 + 32 * x]) for y in (0, 1) for x in (0, 1)] == [False, True, True, False]
 
 
+@pytest.mark.slow
 def test_every_bundled_scene_renders_by_the_classic_model(engine):
     from lippmann.scene import bundled
 

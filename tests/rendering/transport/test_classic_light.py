@@ -155,6 +155,7 @@ def test_what_lets_light_through_adds_to_what_lies_behind():
     close(lab.look((0, 0, 2), DOWN, shading=faded).color[0], 0.3 * 0.75 + 0.25 * 0.2 * C)
 
 
+@pytest.mark.long
 def test_both_ways_at_once():
     """A surface that mirrors and lets through, before a wall and under a ceiling, seen twice."""
     pane = ClassicMaterial(color=(1, 1, 1), ambient=0.1, diffuse=0, specular=0.5, opacity=0.75)
@@ -184,6 +185,7 @@ def test_both_ways_at_once():
         close(lab.look((0, 0, 2), DOWN, depth).color[0], expected(0, depth), 1e-4)
 
 
+@pytest.mark.slow
 def test_shadows_are_filtered_once_per_crossing():
     lab = Lab()
     lab.plane(0, ClassicMaterial(color=(1, 1, 1), ambient=0, diffuse=1))
@@ -251,6 +253,7 @@ def test_modes():
     assert modes["medium"].shadow[0] == 0
 
 
+@pytest.mark.slow
 def test_only_so_many_transparent_surfaces_are_shaded():
     lab = Lab()
     for z in (0, -1, -2):
@@ -304,6 +307,7 @@ def slab(lab, material, low, high):
     lab.builder.mesh(bottom, [(0, 2, 1), (0, 3, 2)], index)
 
 
+@pytest.mark.slow
 def test_nff_refracts_by_snells_law():
     """Seen through a block of glass a line on the wall is shifted by t (tan a - tan b), sin b = sin a / n."""
     ior, thick, angle = 1.5, 2.0, np.radians(50)

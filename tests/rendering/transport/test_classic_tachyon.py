@@ -119,6 +119,7 @@ BESIDE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BESIDE)
 def test_each_feature(tachyon, tmp_path, name):
     body = BESIDE[name]
@@ -133,6 +134,7 @@ def test_each_feature(tachyon, tmp_path, name):
     check(tachyon, tachyon.ours(tmp_path / "scene.dat"), reference, 32, 40)
 
 
+@pytest.mark.long
 def test_depth_of_field(tachyon, tmp_path):
     """Random in both programs: what lies at distance 1 is sharp, the rest equally blurred."""
     head = HEAD.format(projection="PROJECTION PERSPECTIVE_DOF FOCALLENGTH 1 APERTURE 0.3", zoom=1.2, depth=3)
@@ -148,6 +150,7 @@ def test_depth_of_field(tachyon, tmp_path):
     assert tachyon.psnr(tachyon.ours(tmp_path / "scene.dat"), reference) < 25  # one sample: sharp everywhere
 
 
+@pytest.mark.slow
 def test_sky_light(tachyon, tmp_path):
     """Random in both programs, Tachyon taking the same 64 directions for every pixel: a mean is 0.03 off at most."""
     mode = "SHADER_MODE FULL AMBIENT_OCCLUSION AMBIENT_COLOR 0.6 0.6 0.6 RESCALE_DIRECT 0.5 SAMPLES 64 END_SHADER_MODE"

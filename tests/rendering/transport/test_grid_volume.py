@@ -38,6 +38,7 @@ def rendered(description, **options):
     return lippmann.render(scene, SHEET, placement=IN_PLACE, **options)
 
 
+@pytest.mark.long
 def test_native_rays_run_as_far_through_a_slab_as_they_are_slanted():
     image = rendered(SceneDescription("slab", volume=SLAB))
     assert (image.provenance.spp, image.provenance.method) == (1, "full")
@@ -45,7 +46,10 @@ def test_native_rays_run_as_far_through_a_slab_as_they_are_slanted():
     np.testing.assert_allclose(image.pixels, (1 - left)[..., None] * [0.5, 0.25, 0.125], rtol=2e-4)
 
 
-@pytest.mark.parametrize(("z", "thickness"), [(-20.0, 4.0), (-6.0, 2.0), (-3.0, 0.0)])
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("z", "thickness"), [pytest.param(-20.0, 4.0, marks=pytest.mark.long), (-6.0, 2.0), (-3.0, 0.0)]
+)
 def test_surfaces_are_seen_through_a_volume_and_hide_what_is_behind(z, thickness):
     description = SceneDescription("both", [wall(z)], [WALL], [Instance(0, np.eye(4))], volume=SLAB)
     image = rendered(description, spp=1, pixel_filter="point")

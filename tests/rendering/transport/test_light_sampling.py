@@ -101,6 +101,7 @@ def test_the_scene_stays_as_it_was():
     assert np.array_equal(estimate_emitter_weights(integrator, source), first)
 
 
+@pytest.mark.slow
 def test_pdf_of_samples_is_that_of_scattered_rays():
     """Emitters are chosen by their weights, whatever those add up to, and both ways to ask for a pdf agree."""
     import drjit as dr
@@ -176,6 +177,7 @@ def test_white_furnace_is_one_by_any_weights(weights):
     assert pixels.mean() == pytest.approx(1.0, abs=2e-3)
 
 
+@pytest.mark.long
 def test_delta_emitters_give_the_same_picture_by_any_weights():
     """A point light, a spot light and a sun above a floor: no scattered ray hits them, and their pdf has no angle."""
     import mitsuba as mi
@@ -209,6 +211,7 @@ def test_delta_emitters_give_the_same_picture_by_any_weights():
         assert weighted.mean() == pytest.approx(uniform.mean(), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_more_emitters_than_are_weighed_have_a_picture():
     """Beyond the most emitters the scene's own sampling is used, and each light still arrives."""
     from lippmann.rendering.preparation.emitter_weights import make_light_sampler
@@ -226,6 +229,7 @@ def test_more_emitters_than_are_weighed_have_a_picture():
     assert picture(integrator, source, 1, 0) == pytest.approx(picture(one, source, 1, 0), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_picture_stays_and_its_noise_falls():
     from lippmann.rendering.preparation.emitter_weights import make_light_sampler
 
@@ -289,6 +293,7 @@ def test_no_emitter_one_or_very_many_keep_the_weights_of_the_scene(monkeypatch):
     assert emitter_weights.estimate_emitter_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
 
 
+@pytest.mark.slow
 def test_two_renders_of_one_scene_leave_each_other_alone(engine):
     """Prepared in either order, or both before either is traced, each gives the bytes that it gives alone."""
     import lippmann
@@ -326,6 +331,7 @@ def test_two_renders_of_one_scene_leave_each_other_alone(engine):
     assert [traced(*each) for each in again] == alone[::-1]
 
 
+@pytest.mark.slow
 def test_the_callers_own_scene_is_not_changed(cut_display):
     """Whoever hands over a loaded scene finds it as it was; nor is one of our own written into."""
     import mitsuba as mi
@@ -342,6 +348,7 @@ def test_the_callers_own_scene_is_not_changed(cut_display):
     assert sampling_weights(described.physical.scene()) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["lens-view", "interpolated"])
 def test_recorded_kernels_are_shown_the_samplers_arrays(engine, method):
     """Kernels of reuse are recorded once, with all arrays that they read: of scenes with several emitters, too."""

@@ -134,6 +134,7 @@ def noise(found):
     return np.median(found.var(axis=0, ddof=1))
 
 
+@pytest.mark.long_cases(but=["spot"])
 @pytest.mark.parametrize("name", ["sphere", "mesh", "rectangle", "disk", "textured", "point", "spot"])
 def test_light_of_every_emitter_is_whole_and_less_noisy(name):
     integrator, source = prepared(room(name))
@@ -142,6 +143,7 @@ def test_light_of_every_emitter_is_whole_and_less_noisy(name):
     assert noise(joined) < 0.8 * noise(plain)
 
 
+@pytest.mark.long_cases(but=["matt"])
 @pytest.mark.parametrize("name", ["matt", "plastic", "principled", "metal", "mirror", "frosted", "bumps", "hole"])
 def test_every_surface_scatters_as_much(name):
     integrator, source = prepared(room("sphere", surface=surfaces()[name]), has_null=name == "hole")
@@ -149,6 +151,7 @@ def test_every_surface_scatters_as_much(name):
     agree(plain, joined)
 
 
+@pytest.mark.long
 def test_several_emitters_share_the_rays():
     integrator, source = prepared(room("mesh", "point", "spot", more=emitter_outside()))
     plain, joined = (pictures(integrator, source, way, seeds=range(24)) for way in (False, True))
@@ -160,6 +163,7 @@ def emitter_outside():
     return {"outside": {"type": "sphere", "center": [9, 9, 9], "radius": 0.1, "emitter": light}}
 
 
+@pytest.mark.long
 def test_weights_are_those_of_the_light_sampler_in_use():
     """Emitters chosen unevenly: the pdf of next-event estimation is that of the sampler in use."""
     from lippmann.rendering.transport.light_sampling import WeightedLightSampler
@@ -170,6 +174,7 @@ def test_weights_are_those_of_the_light_sampler_in_use():
     agree(plain, joined)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("depth", [1, 2, 7])
 def test_paths_are_no_longer_than_asked(depth):
     integrator, source = prepared(room("point"), depth=depth)
@@ -192,6 +197,7 @@ def test_a_limit_on_indirect_light_holds_for_joins():
     assert direct.mean() < limited.mean() < direct.mean() + 0.06
 
 
+@pytest.mark.long
 def test_coloured_glass_takes_its_light():
     """Light that crosses glass is left to the paths that know how far they went through it."""
     from lippmann.device.pbr import build_description
@@ -279,7 +285,9 @@ def glowing_room(kind):
     return SceneDescription("glowing", meshes, materials, instances, lights=lights)
 
 
-@pytest.mark.parametrize("kind", ["glow", "two-sided", "cone"])
+@pytest.mark.parametrize(
+    "kind", ["glow", pytest.param("two-sided", marks=pytest.mark.long), pytest.param("cone", marks=pytest.mark.long)]
+)
 def test_glowing_surfaces_and_cones_light_as_much(kind):
     from lippmann.device.pbr import build_description
 

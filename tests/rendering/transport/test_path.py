@@ -81,6 +81,7 @@ def mixed_scene():
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", [1, 2, 5])
 def test_agrees_with_mitsubas_path_block_by_block(depth):
     size, runs = 32, 4
@@ -110,6 +111,7 @@ def hole(opacity):
     return {"type": "mask", "opacity": opacity, "nested": {"type": "diffuse", "reflectance": 0.0}}
 
 
+@pytest.mark.slow
 def test_light_falls_through_holes_of_masked_surfaces():
     """A black sheet of opacity 0.25 between a point light and a floor lets 3/4 of its light through, at depth 1."""
     import mitsuba as mi
@@ -240,6 +242,7 @@ def four_emitters():
     return {"type": "scene", "floor": floor} | emitters
 
 
+@pytest.mark.slow
 def test_first_samples_take_several_emitter_samples_each(monkeypatch):
     from lippmann.rendering.transport import path_weights
 

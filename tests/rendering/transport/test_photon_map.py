@@ -68,6 +68,7 @@ def test_one_photon_stands_for_all_in_proportion_to_its_power():
     assert chosen == {tuple(way) for way in np.round(some.toward[near], 4).tolist()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [0.004, 0.05, 0.3, 2.0])
 @pytest.mark.parametrize("flat", [True, False])
 def test_a_look_up_is_the_sum_over_all_photons(radius, flat):
@@ -86,6 +87,7 @@ def test_a_look_up_is_the_sum_over_all_photons(radius, flat):
     assert (looked_up(photon_map, points, 0, 0) == 0).all()  # each has had one event at least
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seen", [True, False])
 def test_parts_of_the_photons_have_the_mean_of_all(seen):
     from lippmann.rendering.transport.photon_map import PhotonMap
@@ -128,7 +130,8 @@ def gathered_slowly(photons, points, normal, shading, wi, lobe, radius):
     return result * 2 / (np.pi * radius**2)
 
 
-@pytest.mark.parametrize("with_lobe", [False, True])
+@pytest.mark.slow
+@pytest.mark.parametrize("with_lobe", [pytest.param(False, marks=pytest.mark.long), True])
 def test_a_look_up_on_shaded_surfaces_is_the_slow_one(with_lobe):
     import drjit as dr
     import mitsuba as mi
@@ -169,6 +172,7 @@ def tilted(normal, count, seed):
 NORMALS = [(0.0, 0.0, 1.0), (0.6, 0.0, -0.8), (-0.48, 0.6, 0.64), (0.01, -0.02, 0.99975)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("normal", NORMALS)
 def test_surfaces_that_are_not_seen_have_the_light_of_their_cell(normal):
     from lippmann.rendering.transport.photon_map import PhotonMap, irradiance_of_cell
@@ -189,6 +193,7 @@ def at_place(photons, position):
     return replace(photons, position=position)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("normal", NORMALS)
 def test_cells_keep_the_flux(normal):
     from lippmann.rendering.transport.photon_map import PhotonMap

@@ -120,6 +120,7 @@ def small_quilt(**options):
     return lippmann.render_quilt("teapot", SHEET, views=(3, 4), size=(256, 256), **({"tone_map": "none"} | options))
 
 
+@pytest.mark.slow
 def test_a_quilt_is_the_direct_pictures_of_its_cameras():
     """Normals of the first surface: Mitsuba's camera, traced apart, sees the same in every view."""
     import mitsuba as mi
@@ -164,6 +165,7 @@ def test_a_quilt_is_the_direct_pictures_of_its_cameras():
         assert (same | flipped).mean() > 0.995
 
 
+@pytest.mark.slow
 def test_the_rest_of_the_sides_is_black_and_the_views_tell_their_error():
     quilt = small_quilt(spp=2, method="full", integrator="direct")
     assert quilt.pixels.shape == (256, 256, 3)
@@ -192,6 +194,7 @@ def test_estimates_are_those_of_the_views():
     assert found.worst == pytest.approx(-10 * math.log10(3e-3), abs=1.5)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_quilt_and_more_samples_a_better_one():
     first, again, other = (small_quilt(spp=4, integrator="direct", method="full", seed=seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first.pixels, again.pixels)
@@ -201,12 +204,14 @@ def test_the_same_seed_gives_the_same_quilt_and_more_samples_a_better_one():
     assert np.mean(np.square(0.5 * (first.pixels + other.pixels) - fine.pixels)) < 0.7 * coarse
 
 
+@pytest.mark.long
 def test_noise_is_taken_out_view_by_view():
     fine = small_quilt(spp=64, seed=5).pixels
     noisy, clean = (small_quilt(spp=2, denoise=way).pixels for way in ("none", "oidn"))
     assert np.mean(np.square(clean - fine)) < 0.2 * np.mean(np.square(noisy - fine))
 
 
+@pytest.mark.long
 def test_a_woven_quilt_is_near_the_direct_picture():
     """Many views of a flat scene in and near the lens plane, woven: what the display's own rays see."""
     place = PlacementOptions(mode="fit")

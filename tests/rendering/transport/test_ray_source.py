@@ -12,6 +12,17 @@ pytestmark = pytest.mark.usefixtures("engine")
 TURN = np.array([[0.0, -2.0, 0.0, 5.0], [2.0, 0.0, 0.0, -7.0], [0.0, 0.0, 2.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
 
 
+@pytest.mark.long_cases(
+    but=[
+        "looking-glass-portrait-True",
+        "mla-hexagonal-True",
+        "mla-square-True",
+        "panel-8k-True",
+        "print-60lpi-True",
+        "seed-lenticular-True",
+    ]
+)
+@pytest.mark.slow
 @pytest.mark.parametrize("subpixels", [False, True])
 @pytest.mark.parametrize("display", list_displays(), ids=lambda display: display.name)
 def test_device_rays_equal_numpy_rays(display, subpixels):

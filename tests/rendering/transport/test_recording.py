@@ -41,6 +41,7 @@ EXPECTED = {
 }
 
 
+@pytest.mark.long_cases(but=["tree"])
 @pytest.mark.parametrize("name", EXPECTED)
 def test_loops_are_recorded_once(name, recordings):
     import lippmann

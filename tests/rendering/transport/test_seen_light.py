@@ -159,6 +159,7 @@ def small_emitter_in_glazed_balls():
     return SceneDescription("balls", meshes, materials, instances, lights=[light])
 
 
+@pytest.mark.long
 def test_narrow_lobes_are_weighed_as_paths_weigh_them():
     integrator, source = described(small_emitter_in_glazed_balls())
     plain, further = (pictures(integrator, source, chains, seeds=range(40)) for chains in (0, 7))
@@ -167,6 +168,7 @@ def test_narrow_lobes_are_weighed_as_paths_weigh_them():
     assert further.var(axis=0).mean() < 0.5 * plain.var(axis=0).mean()
 
 
+@pytest.mark.long
 def test_emitters_without_size_are_seen_in_narrow_lobes():
     """No ray meets them: chains sample them where the half vector makes the event sharp, and paths leave out just that.
 
@@ -188,6 +190,7 @@ def test_emitters_without_size_are_seen_in_narrow_lobes():
         assert further.var(axis=0).mean() < 0.7 * plain.var(axis=0).mean()
 
 
+@pytest.mark.long
 def test_their_highlights_go_past_a_denoiser():
     """All that is seen in sharp lobes is told apart, that of emitters without size, too."""
 
@@ -254,6 +257,7 @@ def polished_plate():
     return SceneDescription("plate", meshes, materials, [Instance(0, np.eye(4)), Instance(1, beside)], lights=[light])
 
 
+@pytest.mark.long
 def test_chains_count_the_emitter_samples_of_their_path():
     """With one sample a pixel the first surface has four, which the weights of what is met there know."""
     integrator, source = described(polished_plate())
@@ -290,6 +294,7 @@ def test_seen_light_is_told_apart_and_is_all_that_is_seen(all_events):
     assert 0.05 < share < 0.95
 
 
+@pytest.mark.long
 def test_what_one_chain_brings_beyond_a_limit_is_excess(all_events):
     """Chain by chain, and of several chains together; colours keep their hue."""
     import drjit as dr
@@ -325,6 +330,7 @@ def test_what_one_chain_brings_beyond_a_limit_is_excess(all_events):
     assert together[1] == pytest.approx(alone[1], rel=1e-4, abs=1e-3)
 
 
+@pytest.mark.long
 def test_of_many_chains_each_counts_as_a_whole(all_events):
     """The emitter is 15 times white: one of 8 chains counts up to 5.7 of that, one of 64 as a whole."""
     import mitsuba as mi

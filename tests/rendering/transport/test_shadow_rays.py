@@ -77,6 +77,7 @@ def test_opaque_shapes_have_a_structure_of_their_own():
         assert (opaque.opaque, opaque.asked) == (wall, None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("undivided", ["many", "instanced"])
 def test_scenes_that_are_not_divided_give_the_same(monkeypatch, undivided):
     import mitsuba as mi
@@ -101,6 +102,7 @@ def test_scenes_that_are_not_divided_give_the_same(monkeypatch, undivided):
     assert light.tolist() == [1.0, 0.375, 0.0, 0.0]
 
 
+@pytest.mark.slow
 def test_many_panes_block():
     import mitsuba as mi
 

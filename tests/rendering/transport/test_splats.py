@@ -64,6 +64,7 @@ def psnr(found, true):
     return -10 * np.log10(np.mean((encode_srgb(np.float64(found)) - encode_srgb(true)) ** 2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("display", "degree"),
     [(SHEET, 0), (SHEET, 1), (SLANTED, 2), (SLANTED, 3), (HEXAGONS, 3)],
@@ -95,6 +96,7 @@ def beside_wall(splats, z, color=(0.5, 0.25, 0.125), **material):
     return SceneDescription("both", [wall(z)], [glow], [Instance(0, np.eye(4))], splats=splats)
 
 
+@pytest.mark.long
 def test_surfaces_are_seen_through_splats_and_hide_those_behind():
     splats = random_splats(150, 1)
     color = np.array([0.5, 0.25, 0.125])
@@ -110,6 +112,7 @@ def test_surfaces_are_seen_through_splats_and_hide_those_behind():
         )
 
 
+@pytest.mark.slow
 def test_nothing_behind_a_near_wall_is_seen():
     splats = random_splats(50, 0)
     behind = Splats(
@@ -120,6 +123,7 @@ def test_nothing_behind_a_near_wall_is_seen():
     np.testing.assert_allclose(image.pixels, np.broadcast_to([0.5, 0.25, 0.125], image.pixels.shape), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_holes_of_surfaces_show_the_splats_behind():
     splats = random_splats(50, 0)
     hole = lippmann.load_scene(beside_wall(splats, 9.0, alpha=0.0, alpha_mode="mask"), environment="none")

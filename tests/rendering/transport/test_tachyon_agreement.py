@@ -149,6 +149,7 @@ def _write_sky(path):
     path.write_bytes(b"P6\n512 256\n255\n" + texels.tobytes())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_scenes_agree_off_edges(tachyon, tmp_path, name):
     _write_sky(tmp_path / "sky.ppm")

@@ -91,6 +91,8 @@ def camera_of(scene):
     return MitsubaSource("fog", scene).cameras()[0]
 
 
+@pytest.mark.long_cases(but=["homogeneous-0.8"])
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", [4.0, 0.8])
 @pytest.mark.parametrize("medium", [homogeneous, grid])
 def test_means_are_those_of_volpath(medium, distance):
@@ -114,6 +116,7 @@ def test_means_are_those_of_volpath(medium, distance):
     assert (error < 0.03 * b.mean(axis=0)).all()  # the test can tell
 
 
+@pytest.mark.slow
 def test_light_through_a_slab_decays_by_beer_and_lambert():
     import mitsuba as mi
 
@@ -128,6 +131,7 @@ def test_light_through_a_slab_decays_by_beer_and_lambert():
     assert middle == pytest.approx(np.array([0.2, 0.3, 0.5]) * np.exp(-1.5 * np.array([0.25, 0.5, 1.0])), rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_white_medium_in_white_light_cannot_be_seen():
     import mitsuba as mi
 
@@ -137,6 +141,7 @@ def test_a_white_medium_in_white_light_cannot_be_seen():
     assert pixels.mean(axis=(0, 1)) == pytest.approx(np.array([0.2, 0.3, 0.5]), rel=0.01)
 
 
+@pytest.mark.slow
 def test_fog_around_everything_reaches_the_eye():
     """A sensor's medium that no shape holds surrounds the scene."""
     import mitsuba as mi
@@ -174,11 +179,13 @@ class TestPictures:
         """Media are made before the scene is loaded: for the device that a picture takes by itself."""
         start()
 
+    @pytest.mark.slow
     def test_are_told_of(self):
         image = lippmann.render(fog_room(homogeneous()), self.display, spp=2)
         assert any("participating media" in note for note in image.provenance.notes)
         assert image.pixels.mean() > 0.05
 
+    @pytest.mark.slow
     def test_seek_a_quality_denoised_but_not_pooled(self):
         image = lippmann.render(fog_room(homogeneous()), self.display, quality_worst=15.0)
         assert image.provenance.method == "full"
@@ -199,6 +206,7 @@ class TestPictures:
             parts = {"type": "scene", "group": group, "copy": copy}
             assert has_media(lippmann.load_scene(parts).description.scene()) is expected
 
+    @pytest.mark.slow
     def test_what_has_no_media_has_the_integrator_for_surfaces(self):
         """So that its pictures stay the same to the last bit."""
         from lippmann.rendering.request.plan import resolve

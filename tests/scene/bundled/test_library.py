@@ -75,6 +75,7 @@ def test_counts_and_lamps(scenes, name):
     assert scenes[name].name == name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", bundled.names())
 def test_made_twice_is_the_same(scenes, name):
     assert same(scenes[name], bundled.make_classic(name))

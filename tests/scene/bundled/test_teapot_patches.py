@@ -124,6 +124,7 @@ def test_normals_point_outward():
         assert np.all(tube.normals[cut][:, 2] * tube.positions[cut][:, 2] > 0)
 
 
+@pytest.mark.slow
 def test_volume_of_the_body():
     """Divergence theorem over the triangles and the flat lid on its rim, against the integral along the profile."""
     mesh = teapot_patches.tessellate(64, ["body"])

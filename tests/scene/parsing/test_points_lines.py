@@ -14,7 +14,7 @@ def volume(positions, faces):
     return (np.cross(a, b) * c).sum() / 6.0
 
 
-@pytest.mark.parametrize("copies", [1, 20_001])
+@pytest.mark.parametrize("copies", [1, pytest.param(20_001, marks=pytest.mark.long)])
 def test_balls_lie_about_their_points_and_face_outwards(copies):
     elements = np.tile([[2], [1]], (copies, 1))
     drawn = balls(POINTS, elements, 0.25)

@@ -75,6 +75,7 @@ def test_an_outline_that_crosses_itself_still_ends():
     assert set(triangles.ravel()) <= set(range(5))
 
 
+@pytest.mark.slow
 def test_a_polygon_of_a_hundred_thousand_corners_takes_no_time_to_speak_of():
     """A comb of ears that grows with the square of the corners would take hours."""
     angles = np.linspace(0, 2 * np.pi, 100_000, endpoint=False)
@@ -105,6 +106,7 @@ def flat_star(radii: list[float]) -> np.ndarray:
     return np.array(radii)[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(st.integers(4, 20).flatmap(lambda n: st.lists(st.lists(st.floats(0.1, 10), min_size=n, max_size=n), min_size=1)))
 def test_triangles_cover_the_outline_once(radii):

@@ -219,6 +219,7 @@ def test_the_real_pyvista():
     assert plane.uvs[0][low_left].tolist() == [0, 1]
 
 
+@pytest.mark.slow
 def test_neither_library_is_loaded_for_the_others(tmp_path):
     import subprocess
 

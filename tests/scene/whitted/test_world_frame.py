@@ -32,6 +32,7 @@ def every_shape(handedness="left", material=None):
     return builder
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 2**32 - 1))
 def test_bounds_in_a_frame_hold_every_point_and_touch_it(seed):

@@ -73,6 +73,8 @@ def end_to_end(monitor):
     }
 
 
+@pytest.mark.long_cases(but=["cells"])
+@pytest.mark.slow
 def test_pixels_are_those_of_the_patterns(open_page, monitor):
     tab = open_page(monitor)
     for key, name in enumerate(("slope", "pitch", "center"), start=1):
@@ -88,6 +90,7 @@ def test_pixels_are_those_of_the_patterns(open_page, monitor):
     tab.assert_clean()
 
 
+@pytest.mark.long
 def test_pixels_stay_exact_far_from_the_origin(open_page):
     wide = Monitor("wide", replace(load_display("panel-8k").panel, width=3840, height=80), 60.013, -6.0717, 0.111)
     tab = open_page(wide)
@@ -96,6 +99,7 @@ def test_pixels_stay_exact_far_from_the_origin(open_page):
     assert wrong < 1e-5 * 3 * 3840 * 80
 
 
+@pytest.mark.long
 def test_turned_values_are_drawn_and_saved(open_page, slanted, tmp_path):
     tab = open_page(slanted)
     press(tab, "4", "Shift+ArrowRight", "ArrowUp", "Alt+Comma", "Period")
@@ -113,6 +117,7 @@ def test_turned_values_are_drawn_and_saved(open_page, slanted, tmp_path):
     tab.assert_clean()
 
 
+@pytest.mark.slow
 def test_turning_leaves_the_middle_of_the_panel_as_it_is(open_page, slanted):
     tab = open_page(slanted)
     press(tab, "Shift+ArrowRight", "Shift+ArrowDown")
@@ -124,6 +129,7 @@ def test_turning_leaves_the_middle_of_the_panel_as_it_is(open_page, slanted):
     assert difference % 1 == pytest.approx(0, abs=1e-9) or difference % 1 == pytest.approx(1, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_key_turns_by_a_tenth_of_a_lens_from_end_to_end(open_page, slanted):
     tab = open_page(slanted)
     press(tab, "ArrowRight")
@@ -131,6 +137,7 @@ def test_a_key_turns_by_a_tenth_of_a_lens_from_end_to_end(open_page, slanted):
     assert more * slanted.panel.width == pytest.approx(0.1, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_click_takes_the_value_of_a_field(open_page, slanted):
     tab = open_page(slanted, size=(1200, 900))
     tab.page.mouse.click(slanted.panel.width - 3, 20)  # the rightmost of the fields, beside which the panel ends
@@ -146,6 +153,7 @@ def test_a_click_takes_the_value_of_a_field(open_page, slanted):
     assert turned(tab) == before
 
 
+@pytest.mark.slow
 def test_values_can_be_typed_and_nonsense_is_marked(open_page, slanted):
     tab = open_page(slanted, size=(1000, 800))
     tab.page.fill("#pitch", "46.25")
@@ -164,6 +172,7 @@ def test_values_can_be_typed_and_nonsense_is_marked(open_page, slanted):
     assert turned(tab)["pitch"] == pytest.approx(slanted.pitch)
 
 
+@pytest.mark.long
 def test_sub_pixels_can_be_swapped(open_page, slanted):
     tab = open_page(slanted, size=(1000, 800))
     press(tab, "4")
@@ -176,6 +185,7 @@ def test_sub_pixels_can_be_swapped(open_page, slanted):
     assert not found[:, panel.width :].any()
 
 
+@pytest.mark.long
 def test_windows_of_the_page_follow_each_other(open_page, slanted):
     tab = open_page(slanted, size=(1000, 800))
     press(tab, "4", "ArrowRight")
@@ -199,6 +209,7 @@ def test_windows_of_the_page_follow_each_other(open_page, slanted):
     tab.wait_until(follows)
 
 
+@pytest.mark.slow
 def test_a_stopped_server_is_said(open_page, slanted):
     tab = open_page(slanted, size=(1000, 800))
     tab.server.close()
@@ -207,6 +218,7 @@ def test_a_stopped_server_is_said(open_page, slanted):
     assert "does not answer" in tab.page.inner_text("[role=alert]")
 
 
+@pytest.mark.slow
 def test_a_file_that_cannot_be_written_is_said(open_page, slanted, tmp_path):
     tab = open_page(slanted, size=(1000, 800))
     (tmp_path / "mine.toml").mkdir()
@@ -215,6 +227,7 @@ def test_a_file_that_cannot_be_written_is_said(open_page, slanted, tmp_path):
     assert "mine.toml" in tab.page.inner_text("[role=alert]")
 
 
+@pytest.mark.slow
 def test_a_lost_drawing_comes_back(open_page, slanted):
     tab = open_page(slanted)
     before = drawn(tab)
@@ -232,6 +245,7 @@ def test_a_lost_drawing_comes_back(open_page, slanted):
     np.testing.assert_array_equal(drawn(tab), before)
 
 
+@pytest.mark.slow
 def test_all_controls_are_reached_by_keyboard_and_fit_a_narrow_window(open_page, slanted):
     tab = open_page(slanted, size=(360, 700))
     names = set()
@@ -243,6 +257,7 @@ def test_all_controls_are_reached_by_keyboard_and_fit_a_narrow_window(open_page,
     assert tab.evaluate("document.getElementById('controls').scrollWidth <= innerWidth")
 
 
+@pytest.mark.slow
 def test_whole_lenses_are_taken_off_in_double_precision(open_page, slanted):
     tab = open_page(slanted)
     code = """async () => {

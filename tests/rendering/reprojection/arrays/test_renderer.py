@@ -293,6 +293,7 @@ def test_a_traced_point_is_missing_beside_unless_something_hides_it(shown, missi
 # ---- Interpolated ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long_cases("slanted")
 @pytest.mark.parametrize("name", DISPLAYS)
 def test_only_even_micro_images_are_interpolated(name, flat_tracer, sheet):
     from lippmann.rendering.reprojection.common.lens_map import LensField

@@ -68,6 +68,7 @@ def fill(truth, rules, edges, known=()):
     return points, tracer
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(st.lists(st.integers(1, 12), min_size=1, max_size=6), st.data())
 def test_no_pixel_stays_missed_and_traced_ones_are_true(widths, data):

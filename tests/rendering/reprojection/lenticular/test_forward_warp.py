@@ -63,6 +63,7 @@ def draw(points, rows, targets, sources, rules):
     return unsettled
 
 
+@pytest.mark.long
 @QUICK
 @given(
     st.floats(-0.9, 0.9).filter(lambda s: abs(s) > 0.02),

@@ -56,6 +56,7 @@ def error(points, full):
 
 
 # The fixtures are classes: nothing is carried from example to example.
+@pytest.mark.long
 @settings(
     deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 )
@@ -75,6 +76,7 @@ def test_a_soft_plane_at_any_height_is_nearly_exact(flat_tracer, sheet, z, shape
     assert points.share(0) < 0.75
 
 
+@pytest.mark.slow
 def test_a_plane_far_behind_costs_few_rays(flat_tracer, sheet):
     display = display_of(32, 32)
     tracer = flat_tracer(display, [sheet(-200.0, lambda x, y: soft(x / 16, y))])
@@ -83,6 +85,7 @@ def test_a_plane_far_behind_costs_few_rays(flat_tracer, sheet):
     assert points.share(0) < 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["lens_view", "interpolated"])
 @pytest.mark.parametrize("careful", [False, True])
 def test_every_pixel_gets_a_color_and_traced_ones_are_true(flat_tracer, sheet, method, careful):

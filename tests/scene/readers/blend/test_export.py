@@ -101,6 +101,7 @@ def test_blender_is_asked_for_no_scripts_and_no_input(give, blend, tmp_path):
     assert json.loads(json.loads(told.read_text())[0][-1])["folder"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "message"),
     [
@@ -167,6 +168,7 @@ VALUES = st.recursive(
 KEYS = st.sampled_from(["world", "camera", "exposure", "notes", "error", "outside"])
 
 
+@pytest.mark.slow
 @given(st.dictionaries(KEYS, VALUES).map(lambda told: json.dumps(told).encode()) | st.binary(max_size=40))
 @example(b"[" * 100_000)
 @example(b'{"exposure": 1e999, "notes": 3}')
@@ -189,6 +191,7 @@ def test_whatever_the_outcome_says(tmp_path_factory, told):
     assert math.isfinite(outcome["exposure"])
 
 
+@pytest.mark.slow
 def test_a_time_limit(fake_blender, blend, monkeypatch, tmp_path):
     pid = tmp_path / "pid"
     child = "[sys.executable, '-c', 'import time; time.sleep(60)']"

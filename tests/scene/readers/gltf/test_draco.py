@@ -59,6 +59,7 @@ def written(folder, ball, *, data=None, **changes):
     return folder / "mesh.gltf"
 
 
+@pytest.mark.slow
 def test_it_is_the_mesh_that_was_compressed(tmp_path, ball):
     points, faces, uvs, colors = ball
     scene = load_scene(written(tmp_path, ball))
@@ -82,6 +83,7 @@ def test_all_meshes_of_a_file_are_decoded_by_one_process(tmp_path, ball, monkeyp
     assert len(calls) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("data", [b"DRACO" + bytes(90), b"nothing of Draco's"])
 def test_damaged_data_is_one_line(tmp_path, ball, data):
     with pytest.raises(SceneError, match="is no mesh that Draco decodes") as caught:
@@ -89,6 +91,7 @@ def test_damaged_data_is_one_line(tmp_path, ball, data):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.long
 def test_cut_and_mutated_data_end_in_a_result_or_an_error(tmp_path, ball):
     points, faces, uvs, colors = ball
     good = DracoPy.encode(points, faces=faces, tex_coord=uvs, colors=colors)
@@ -101,6 +104,7 @@ def test_cut_and_mutated_data_end_in_a_result_or_an_error(tmp_path, ball):
             load_scene(written(tmp_path, ball, data=bytes(bad)))
 
 
+@pytest.mark.slow
 def test_other_counts_than_the_accessors_say_are_refused(tmp_path, ball):
     points, faces, uvs, colors = ball
     fewer = DracoPy.encode(points, faces=faces[:-4], tex_coord=uvs, colors=colors)

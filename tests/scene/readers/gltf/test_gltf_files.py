@@ -264,6 +264,7 @@ def _compressed(writer, extension, **accessor):
     return writer
 
 
+@pytest.mark.slow
 def test_draco_beside_uncompressed_data_is_not_needed(writer, read):
     scene = read(_compressed(writer, "KHR_draco_mesh_compression"))
     assert scene.notes == ()

@@ -172,6 +172,7 @@ def test_changed_json(tmp_path, original, data):
     _is_sound(tmp_path / "changed.gltf")
 
 
+@pytest.mark.long
 def test_every_member_replaced_by_every_kind_of_value(tmp_path, original):
     """The same, without chance: each member in turn becomes something else."""
     for path in _places(original):

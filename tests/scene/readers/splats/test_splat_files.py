@@ -66,6 +66,7 @@ def test_ply_of_trainers_is_read_as_gsply_reads_it(tmp_path, degree):
     check_same(splats, gsply.plyread(tmp_path / "a.ply"), exact=True)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("degree", [0, 1, 2, 3])
 def test_packed_ply_is_read_as_gsply_reads_it(tmp_path, degree):
     gsply.plywrite(tmp_path / "a.ply", *trained(degree), compressed=True)
@@ -75,6 +76,7 @@ def test_packed_ply_is_read_as_gsply_reads_it(tmp_path, degree):
     check_same(splats, gsply.plyread(path))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("degree", [0, 1, 2, 3])
 def test_spz_is_read_as_gsply_reads_it(tmp_path, degree):
     gsply.plywrite(tmp_path / "a.ply", *trained(degree))
@@ -216,6 +218,7 @@ def sog(degree=0, version=2, seed=0, count=COUNT, told=None, told_version=2, **c
     return stream.getvalue()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("version", [1, 2])
 @pytest.mark.parametrize("degree", [0, 1, 3])
 def test_sog_is_read_as_gsply_reads_it(tmp_path, degree, version):

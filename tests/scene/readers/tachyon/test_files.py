@@ -54,6 +54,7 @@ def test_include_cycles_are_refused(tmp_path, inner):
         read_tachyon(scene(tmp_path, "INCLUDE a.inc"))
 
 
+@pytest.mark.slow
 def test_includes_that_double_at_every_level_end_in_time(tmp_path):
     for level in range(30):
         write(tmp_path, f"{level}.inc", f"INCLUDE {level + 1}.inc INCLUDE {level + 1}.inc")

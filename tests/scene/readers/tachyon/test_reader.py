@@ -304,9 +304,10 @@ def test_text_after_the_end_is_said(read):
         ("IMAGEDEF a FORMAT RGB24 RESOLUTION 60000 60000 60000", "expected a resolution that the file can fill"),
         ("IMAGEDEF a FORMAT RGB24 RESOLUTION 1 1 1 ENCODING HEX 12345", "expected a colour of 3, 6, 9 or 12"),
         ("SCAPE RES 100000 100000", "2: found '100000'; expected a whole number from 2 to 1024"),
-        (
+        pytest.param(
             f"SCAPE RES 1000 500 SCALE 1 1 CENTER 0 0 0 {TEXTURE} SCAPE RES 1000 500",
             "2: found '500'; expected at most 524288 samples in all landscapes together",
+            marks=pytest.mark.long,
         ),
         ("SCAPE RES 1 2", "2: found '1'; expected a whole number from 2"),
         ("", "the scene has no geometry"),

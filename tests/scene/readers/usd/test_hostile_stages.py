@@ -20,6 +20,7 @@ from .conftest import HEAD, triangle
 from .test_stage_materials import packed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["references", "payload", "subLayers"])
 def test_layers_outside_the_folder_are_refused(read, tmp_path, kind):
     outside = tmp_path.parent / "elsewhere.usda"
@@ -114,6 +115,7 @@ def test_what_takes_more_memory_than_allowed_is_refused(read):
         limit_inputs(None)
 
 
+@pytest.mark.slow
 def test_a_process_that_ends_is_one_line(read, monkeypatch):
     read(triangle())
     ask = process._process.ask
@@ -140,6 +142,7 @@ def test_a_stage_that_takes_too_long_is_given_up(read, monkeypatch):
     assert process._process._process is None
 
 
+@pytest.mark.slow
 def test_damaged_stages_end_in_a_scene_or_one_line(tmp_path):
     """Mutations of a stage in text, and some of one in USD's binary form."""
     sound = (

@@ -151,6 +151,7 @@ def test_an_empty_plotter_is_refused(plotter):
         load_scene(plotter)
 
 
+@pytest.mark.slow
 def test_a_plotter_is_rendered(engine, plotter):
     plotter.add_mesh(pyvista.Sphere(), color="red")
     image = lippmann.render(plotter, "seed-lenticular", spp=1, method="full")
@@ -161,6 +162,7 @@ def wavelet():
     return pyvista.ImageData(dimensions=(4, 3, 2), spacing=(1, 2, 3), origin=(5, 6, 7))
 
 
+@pytest.mark.slow
 def test_files(tmp_path):
     sphere = pyvista.Sphere()
     sphere["height"] = sphere.points[:, 2]

@@ -27,6 +27,7 @@ def windows(tmp_path_factory):
         return dict(pictures)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_pictures_are_those_of_the_plotter(engine, windows, name):
     plotter = make(name)
