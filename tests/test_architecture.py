@@ -1,7 +1,7 @@
 """The shape of the code, held by reading its source: who may import whom, and what may be loaded when."""
 
 import ast
-import itertools
+import json
 import re
 import subprocess
 import sys
@@ -377,36 +377,173 @@ def test_paths_of_one_machine_are_recognised(line):
     assert MACHINE_PATH.search(line)
 
 
-#: How ``lippmann render`` gets from the command to the file, a hop a function: CONTRIBUTING.md shows it to readers.
+#: How ``lippmann render`` gets from the command to the file, in the order in which it first calls each function;
+#: CONTRIBUTING.md shows it to readers.
 WALK = (
-    ("cli.commands.render", "render"),
-    ("rendering.picture", "render_picture"),
-    ("rendering.request.plan", "resolve"),
-    ("rendering.session", "open_session"),
-    ("rendering.methods", "trace"),
-    ("rendering.methods", "trace_samples"),
-    ("rendering.film.sample_batches", "trace_in_batches"),
-    ("rendering.transport.path", "sample"),
-    ("image.integral_image", "save"),
-    ("image.write", "write_picture"),
-    ("image.encoding", "encode_values"),
-    ("codecs.png", "encode_png"),
+    "cli.commands.render.render",
+    "rendering.picture.render_picture",
+    "rendering.request.plan.make_plan",
+    "rendering.session.open_session",
+    "rendering.methods.trace",
+    "rendering.methods.trace_samples",
+    "rendering.film.sample_batches.add",
+    "rendering.transport.path.sample_with_hit",
+    "image.integral_image.save",
+    "image.write.write_picture",
+    "image.encoding.encode_values",
+    "codecs.png.encode_png",
 )
 
+#: How large the centre of the program may be. Raised by hand alone, and only where a user is worth it.
+MOST_LINES = 18_330
+MOST_CONSTANTS = 360
+MOST_BRANCHES = 293
+#: Files of which a default render calls a function, and calls from a file to one of a part above its own.
+MOST_FILES = 178
+MOST_CLIMBING = 4
 
-def test_a_render_is_followed_in_twelve_hops():
-    """Each step is defined where the walk says and named by a step before it; it turns upward three times at most."""
-    named: set[str] = {"render"}
-    for module, function in WALK:
-        tree = ast.parse((SOURCE / f"{module.replace('.', '/')}.py").read_text(encoding="utf-8"))
-        defined = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
-        assert function in defined, f"{module} has no function {function}"
-        assert function in named, f"nothing before {module}.{function} calls it"
-        named |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-        named |= {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
-    assert len(WALK) <= 12
-    ranks = [ORDER.index(module.rpartition(".")[0]) for module, _ in WALK]
-    assert sum(after > before for before, after in itertools.pairwise(ranks)) <= 3
+#: What decides how a picture is made, below ``rendering``: packages and modules.
+DECIDES = ("request", "preparation", "adaptive", "methods", "session", "picture", "job", "light_statements")
+
+#: Decorators, by whose functions others are called: these call for whoever calls them.
+DECORATORS = {"device.syntax", "runtime.cached_property", "runtime.engine_lock", "runtime.row_threads"}
+
+#: Writes which function called which of the program's files, in the order of the first calls, as JSON into the file
+#: that the last word names. Bodies of modules and classes are no functions.
+TRACING = """
+import json, sys, threading
+from pathlib import Path
+from types import FunctionType
+
+file, source = sys.argv.pop(), sys.argv.pop()
+calls = {}
+
+def name(code):
+    return code.co_filename[len(source) + 1 :], code.co_qualname
+
+def note(frame, event, argument):
+    caller = frame.f_back
+    if event != "call" or caller is None or not frame.f_code.co_flags & 2:
+        return
+    if frame.f_code.co_filename.startswith(source):
+        while name(caller.f_code)[0] in DECORATORS and caller.f_back is not None:
+            caller = caller.f_back
+        is_ours = caller.f_code.co_filename.startswith(source) and caller.f_code.co_flags & 2
+        calls[name(caller.f_code) if is_ours else None, name(frame.f_code)] = None
+
+threading.setprofile(note)
+sys.setprofile(note)
+from lippmann.cli import main
+try:
+    main()
+finally:
+    sys.setprofile(None)
+    json.dump(list(calls), open(file, "w"))
+"""
+
+
+@dataclass(frozen=True)
+class Call:
+    """A function of the program that another of its functions called; None where foreign code called it."""
+
+    caller: str | None
+    module: str
+    function: str
+
+
+@pytest.fixture(scope="module")
+def default_render(engine, tmp_path_factory) -> list[Call]:
+    """All calls between functions of a default render, in the order in which each was first made."""
+    del engine  # the child would fail without
+    folder = tmp_path_factory.mktemp("traced")
+    preset = (SOURCE / "display" / "presets" / "seed-lenticular.toml").read_text("utf-8")
+    (folder / "small.toml").write_text(preset.replace("= 512", "= 64"), "utf-8")
+    decorators = {f"{name.replace('.', '/')}.py" for name in DECORATORS}
+    program = f"DECORATORS = {decorators!r}{TRACING}"
+    words = ["render", "teapot", "-d", "small.toml", "-q", "-o", "picture.png"]
+    file = folder / "calls.json"
+    command = [sys.executable, "-W", "ignore", "-c", program, *words, str(SOURCE), str(file)]
+    subprocess.run(command, cwd=folder, check=True)
+    names = {str(path.relative_to(SOURCE)): module for module, path in modules().items()}
+    return [
+        Call(caller and names[caller[0]], names[path], function)
+        for caller, (path, function) in json.loads(file.read_text(encoding="utf-8"))
+    ]
+
+
+def test_a_render_is_followed_in_twelve_hops(default_render):
+    first_calls = dict.fromkeys(f"{call.module}.{call.function.rpartition('.')[2]}" for call in default_render)
+    assert [name for name in first_calls if name in WALK] == list(WALK)
+
+
+def test_a_default_render_enters_few_files(default_render):
+    files = {call.module for call in default_render}
+    assert len(files) <= MOST_FILES, sorted(files)
+
+
+def test_few_calls_of_a_default_render_climb(default_render):
+    rank = {name: position for position, name in enumerate(ORDER)}
+    climbing = {
+        (call.caller, call.module)
+        for call in default_render
+        if call.caller is not None and rank[part(call.module)] > rank[part(call.caller)]
+    }
+    assert len(climbing) <= MOST_CLIMBING, sorted(climbing)
+
+
+def rendering_trees() -> dict[str, ast.Module]:
+    """The syntax trees of ``rendering`` by dotted name below it."""
+    sources = {name: path for name, path in modules().items() if inside(name, ("rendering",))}
+    return {name.removeprefix("rendering."): ast.parse(path.read_text("utf-8")) for name, path in sources.items()}
+
+
+def constants_of(tree: ast.Module, *, is_tuning: bool) -> int:
+    """Numbers that stand in assignments of a module, and in the classes of one of tuned constants."""
+    bodies = [tree.body, *(each.body for each in tree.body if is_tuning and isinstance(each, ast.ClassDef))]
+    values = [each.value for body in bodies for each in body if isinstance(each, (ast.Assign, ast.AnnAssign))]
+    return sum(numbers_in(value) for value in values if value is not None)
+
+
+def numbers_in(value: ast.expr) -> int:
+    """How many numbers, or sums and products of such, an expression names."""
+    if isinstance(value, (ast.Tuple, ast.List)):
+        return sum(numbers_in(each) for each in value.elts)
+    if isinstance(value, ast.UnaryOp):
+        return numbers_in(value.operand)
+    if isinstance(value, ast.BinOp):
+        return min(1, numbers_in(value.left) + numbers_in(value.right))
+    return int(isinstance(value, ast.Constant) and type(value.value) in (int, float))
+
+
+def test_rendering_is_short():
+    lines = sum(path.read_text("utf-8").count("\n") for path in (SOURCE / "rendering").rglob("*.py"))
+    assert lines <= MOST_LINES
+
+
+def test_few_constants_are_tuned():
+    found = {name: constants_of(tree, is_tuning=name.endswith("tuning")) for name, tree in rendering_trees().items()}
+    assert sum(found.values()) <= MOST_CONSTANTS, {name: count for name, count in found.items() if count}
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        ("A = 1\nB, C = 2, -3.0\nD: int = 1 << 4", 4),
+        ("A = True\nB = 'x'\nC = f(2)\ndef f(): x = 1", 0),
+        ("class Tuning:\n a: int = 1\n b: tuple = (2, (3, 4))\n c = other", 4),
+    ],
+)
+def test_constants_are_counted(source, expected):
+    assert constants_of(ast.parse(source), is_tuning=True) == expected
+
+
+def test_few_branches_decide():
+    found = {
+        name: sum(isinstance(node, (ast.If, ast.IfExp, ast.match_case)) for node in ast.walk(tree))
+        for name, tree in rendering_trees().items()
+        if inside(name, DECIDES)
+    }
+    assert sum(found.values()) <= MOST_BRANCHES, found
 
 
 #: Names by which integrators go in the source.
