@@ -160,9 +160,38 @@ def test_opacity_by_the_alpha_of_the_colours_picture(read):
     assert (material.alpha_mode, material.alpha_cutoff) == ("mask", 0.25)
 
 
-def test_plain_opacity_blends(read):
-    material = read(surface("float inputs:opacity = 0.5")).materials[0]
+@pytest.mark.parametrize("mode", ["transparent", "presence"])
+def test_plain_opacity_blends(read, mode):
+    """By opacityMode, highlights stay where opacity fades the rest, or fade with it."""
+    scene = read(surface(f'float inputs:opacity = 0.5\ntoken inputs:opacityMode = "{mode}"'))
+    material = scene.materials[0]
     assert (material.alpha_mode, material.alpha) == ("blend", 0.5)
+    told = ["highlights fade with opacity, as opacityMode 'presence' has it"]
+    assert scene.notes == (told if mode == "transparent" else [])
+
+
+@pytest.mark.parametrize("purpose", ["", ":preview", ":full"])
+def test_materials_are_bound_for_a_purpose_or_for_all(read, purpose):
+    body = surface("color3f inputs:diffuseColor = (0.1, 0.2, 0.3)")
+    scene = read(body.replace("rel material:binding =", f"rel material:binding{purpose} ="))
+    assert scene.materials[scene.meshes[0].material].name == "/mat"
+
+
+def test_a_preview_is_shown_before_what_is_bound_for_finished_pictures(read):
+    body = surface("color3f inputs:diffuseColor = (0.1, 0.2, 0.3)")
+    body = body.replace(
+        "rel material:binding =", "rel material:binding:full = </other>\nrel material:binding:preview ="
+    )
+    scene = read(body + 'def Material "other" {\n}\n')
+    assert scene.materials[scene.meshes[0].material].name == "/mat"
+
+
+def test_textures_of_shapes_without_coordinates_are_named(read):
+    body = surface("color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>", texture())
+    body += 'def Sphere "ball" (prepend apiSchemas = ["MaterialBindingAPI"]) {\nrel material:binding = </mat>\n}\n'
+    scene = read(body, files={"t.png": png(PICTURE)})
+    assert scene.notes == ["mesh /ball has no texture coordinates 'st': its textures show one texel"]
+    assert [len(mesh.uvs) for mesh in scene.meshes] == [1, 1]
 
 
 def test_normal_maps_as_exporters_write_them(read):

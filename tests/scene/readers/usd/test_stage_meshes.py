@@ -256,6 +256,18 @@ def PointInstancer "many" {
     assert second[:, :3, 3].tolist() == [[2, 10, 10]]
 
 
+@pytest.mark.parametrize(("holder", "copies"), [("over", 2), ("class", 0)])
+def test_prototypes_below_an_over_are_placed_and_not_shown_by_themselves(read, holder, copies):
+    """As UsdImaging populates them; abstract prims are none."""
+    body = triangle("seen") + f'{holder} "apart" {{\n' + triangle("a") + "}\n"
+    body += 'def PointInstancer "many" {\npoint3f[] positions = [(1, 0, 0), (2, 0, 0)]\nint[] protoIndices = [0, 0]\n'
+    scene = read(body + "rel prototypes = </apart/a>\n}\n")
+    places = [np.reshape(each.world_from_mesh, (-1, 4, 4))[:, 0, 3].tolist() for each in scene.instances]
+    assert places == [[0], [1, 2]][: 1 + copies // 2]
+    lost = "/apart/a: a prototype that is abstract or not there; its copies are left out"
+    assert scene.notes == ([] if copies else [lost])
+
+
 def test_instancers_that_hold_themselves_end(read):
     body = (
         'def PointInstancer "a" {\npoint3f[] positions = [(1, 0, 0)]\nint[] protoIndices = [0]\n'
@@ -281,6 +293,24 @@ def test_copies_beyond_all_bounds_are_refused(read):
 def test_what_is_not_drawn_is_named(read):
     curve = 'def BasisCurves "c" {\nint[] curveVertexCounts = [2]\npoint3f[] points = [(0, 0, 0), (1, 0, 0)]\n}\n'
     assert read(triangle() + curve).notes == ["1 prim(s) of type BasisCurves are not drawn"]
+
+
+def test_schemas_that_change_what_is_shown_are_named(read):
+    body = 'def Xform "x" (prepend apiSchemas = ["GeomModelAPI", "ColorSpaceAPI"]) {\n'
+    body += 'uniform token model:drawMode = "cards"\nuniform token colorSpace:name = "lin_ap1_scene"\n'
+    assert read(body + triangle() + "}").notes == [
+        "/x: model:drawMode 'cards' is not honoured: its meshes are shown",
+        "/x: colours in the space 'lin_ap1_scene' are taken as linear Rec. 709",
+    ]
+    body = body.replace("cards", "default").replace("lin_ap1_scene", "lin_rec709_scene")
+    assert read(body + triangle() + "}").notes == []
+
+
+@pytest.mark.parametrize(("scheme", "flat"), [("none", True), ("bilinear", True), ("loop", False)])
+def test_polygons_that_no_scheme_rounds_are_flat(read, scheme, flat):
+    """The limit of bilinear subdivision is the polygons themselves."""
+    (mesh,) = read(triangle().replace('"none"', f'"{scheme}"')).meshes
+    assert (mesh.normals is None) == flat
 
 
 def test_a_stage_without_meshes_is_refused(read):

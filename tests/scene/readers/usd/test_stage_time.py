@@ -119,6 +119,17 @@ def test_skins_and_blend_shapes(stage):
     assert points(1) == [[0, 0, 2], [1, 2, 1], [0, 5, 1]]
 
 
+def test_normals_are_skinned_and_stay_sharp(stage):
+    """Joint b turns by a quarter about z: the normal of what it holds turns from x to y; no others are rounded."""
+    body = SKINNED.replace("UNIT", "((1,0,0,0),(0,1,0,0),(0,0,1,0),(0,0,0,1))")
+    body = body.replace("quatf[] rotations = [(1, 0, 0, 0)]", "quatf[] rotations = [(0.70710678, 0, 0, 0.70710678)]")
+    normals = "normal3f[] normals = [(1, 0, 0), (0, 0, 1), (1, 0, 0)] (interpolation = %s)\n        point3f[] points"
+    for interpolation in ('"vertex"', '"faceVarying"'):
+        scene = MovingStage(stage(body.replace("point3f[] points", normals % interpolation))).at(0)
+        (mesh,) = scene.meshes
+        assert mesh.normals[mesh.faces[0]] == pytest.approx(np.array([[1, 0, 0], [0, 0, 1], [0, 1, 0]]), abs=1e-5)
+
+
 VARIANTS = (
     'def Xform "chair" (variants = { string paint = "red" }\nprepend variantSets = "paint") {\nvariantSet "paint" = {\n'
     + '"red" {\n'

@@ -139,6 +139,8 @@ class SurfaceReader:
             carrier = texture if own is None else own
             material = replace(material, base_color_texture=replace(carrier, image=image, srgb=True))
         mode: AlphaMode = "mask" if threshold > 0.0 else "blend"
+        if mode == "blend" and inputs.get("opacityMode", {}).get("value") != "presence":
+            self.notes["highlights fade with opacity, as opacityMode 'presence' has it"] = None
         return replace(material, alpha=opacity, alpha_mode=mode, alpha_cutoff=threshold or 0.5)
 
     def _with_coat(self, material: Material, inputs: Record) -> Material:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lippmann.errors import SceneError
 from lippmann.runtime.input_memory import check_input
 from lippmann.scene.parsing.triangulation import triangulate
+from lippmann.scene.readers.gltf.nodes import normal_matrices
 from lippmann.scene.readers.gltf.skinning import unit_normals
 from lippmann.scene.readers.usd.materials import Surface
 from lippmann.scene.readers.usd.primitives import primitive_polygons, unit_ball
@@ -113,10 +114,16 @@ class MeshReader:
         mesh = replace(mesh, name=record["name"])
         if record["left_handed"]:
             mesh = replace(mesh, faces=mesh.faces[:, ::-1], stands_for=None)
+        for uv_name in self._surface(record["material"]).uv_names:
+            self._note_no_uvs(record, uv_name)
+            mesh = replace(mesh, uvs=(*mesh.uvs, np.zeros((len(mesh.positions), 2), np.float32)))
         colors = self._colors(record, record["material"], lambda primvar, _: self._array(primvar, "values")[:1])
         if colors is not None:
             mesh = replace(mesh, colors=np.broadcast_to(colors, (len(mesh.positions), colors.shape[1])))
         return [Part(record["material"], mesh, scale)]
+
+    def _note_no_uvs(self, record: Record, uv_name: str) -> None:
+        self.notes[f"mesh {record['name']} has no texture coordinates '{uv_name}': its textures show one texel"] = None
 
     def _surface(self, material: int) -> Surface:
         return self._surfaces[material] if material >= 0 else _PLAIN
@@ -169,7 +176,8 @@ class MeshReader:
             self.notes["meshes of Loop subdivision are shown as their cages, shaded smoothly"] = None
         check_input(_BYTES_PER_CORNER * len(indices), f"mesh {record['name']}", where=self._where)
         plain = _Polygons(points, counts, indices, faces, None, None)
-        if not len(counts) or (scheme == "none" and not record["is_skinned"]):
+        # What bilinear subdivision makes of a polygon lies in it.
+        if not len(counts) or scheme in ("none", "bilinear"):
             return plain
         cage = self._cage(record, len(points), counts, indices)
         if scheme != "catmullClark":
@@ -246,11 +254,14 @@ class MeshReader:
             normals = _smooth_normals(polygons, record["left_handed"])
         elif record["normals"] is not None:
             normals = self._values(sampler, record["normals"], name, "normals")
+            if "turns" in record["normals"]:
+                turns = normal_matrices(np.asarray(self._array(record["normals"], "turns"), np.float64))
+                normals = np.einsum("cij,cj->ci", turns[polygons.indices], normals).astype(np.float32)
         uvs = []
         for uv_name in self._surface(material).uv_names:
             found = record["uvs"].get(uv_name)
             if found is None:
-                self.notes[f"mesh {name} has no texture coordinates '{uv_name}': its textures show one texel"] = None
+                self._note_no_uvs(record, uv_name)
                 uvs.append(np.zeros((len(polygons.indices), 2), np.float32))
                 continue
             values = self._values(sampler, found, name, f"texture coordinates '{uv_name}'")

@@ -10,7 +10,7 @@ from pxr import Usd, UsdGeom, UsdShade
 from lippmann.scene.readers.usd.records import Arrays, Record
 from lippmann.scene.readers.usd.stage_layers import StageError
 from lippmann.scene.readers.usd.stage_shading import MaterialTable
-from lippmann.scene.readers.usd.stage_skinning import Skin, skinned_points
+from lippmann.scene.readers.usd.stage_skinning import Skin, skinned_points, skinned_turns
 
 #: Types that are given by numbers, and which.
 PRIMITIVES = {
@@ -38,7 +38,10 @@ def mesh_record(
 
     prim = mesh.GetPrim()
     points = mesh.GetPointsAttr().Get(time)
+    normals = _normals(mesh, time, arrays)
     if skin is not None and points:
+        if normals is not None:
+            normals["turns"] = arrays.add(skinned_turns(skin, prim, points, time))
         points = skinned_points(skin, prim, points, time)
     crease_lengths = np.asarray(mesh.GetCreaseLengthsAttr().Get(time) or [], np.int64)
     return {
@@ -54,8 +57,7 @@ def mesh_record(
         "corner_sharpnesses": arrays.add(_floats(mesh.GetCornerSharpnessesAttr().Get(time), 1).ravel()),
         "scheme": str(mesh.GetSubdivisionSchemeAttr().Get(time) or "catmullClark"),
         "boundary": str(mesh.GetInterpolateBoundaryAttr().Get(time) or "edgeAndCorner"),
-        "normals": None if skin is not None else _normals(mesh, time, arrays),
-        "is_skinned": skin is not None,
+        "normals": normals,
         "uvs": _uv_sets(prim, time, arrays),
         "subsets": _subsets(prim, time, arrays, materials),
     }

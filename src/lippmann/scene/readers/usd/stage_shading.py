@@ -30,7 +30,10 @@ class MaterialTable:
 
     def bound(self, prim: Usd.Prim) -> int:
         """The number of the material that is bound to a prim, by itself or by what lies above it; -1 for none."""
-        material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+        binding = UsdShade.MaterialBindingAPI(prim)
+        # Materials for all purposes stand in for those of a preview, whose surfaces are those that are read.
+        material = binding.ComputeBoundMaterial(UsdShade.Tokens.preview)[0]
+        material = material or binding.ComputeBoundMaterial(UsdShade.Tokens.full)[0]
         if not material:
             return -1
         own = material.GetPrim()

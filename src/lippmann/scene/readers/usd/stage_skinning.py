@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from pxr import Usd, UsdSkel, Vt
 
 
@@ -44,6 +45,17 @@ def skinned_points(skin: Skin, prim: Usd.Prim, points: Any, time: Usd.TimeCode) 
     if skin.skinning.HasJointInfluences():
         skin.skinning.ComputeSkinnedPoints(skin.query.ComputeSkinningTransforms(time), points, time)
     return points
+
+
+def skinned_turns(skin: Skin, prim: Usd.Prim, points: Any, time: Usd.TimeCode) -> np.ndarray:
+    """What skinning does to directions at each point: matrices ``(n, 3, 3)``, by points moved along each axis."""
+    rest = np.asarray(points, np.float64)
+    step = float(np.abs(rest).max()) or 1.0  # as long as the mesh, for the sake of single precision
+    moved = [
+        np.asarray(skinned_points(skin, prim, Vt.Vec3fArray.FromNumpy((rest + way).astype(np.float32)), time))
+        for way in (np.zeros(3), *(step * np.eye(3)))
+    ]
+    return np.stack([(each - moved[0]) / step for each in moved[1:]], axis=-1)
 
 
 def _blend(skin: Skin, prim: Usd.Prim, points: Any, time: Usd.TimeCode) -> None:

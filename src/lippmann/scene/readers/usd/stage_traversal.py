@@ -24,6 +24,13 @@ _MOST_COPIES = 1 << 21
 _DEEPEST = 16
 
 _PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract & Usd.PrimIsLoaded)
+#: Prototypes may lie below an ``over``, which keeps them from being shown by themselves (UsdImaging's own rule).
+_OF_PROTOTYPES = Usd.TraverseInstanceProxies(Usd.PrimIsActive & ~Usd.PrimIsAbstract & Usd.PrimIsLoaded)
+
+#: Ways of drawing a model that show its meshes; others put cards, its bounds or its origin in their place.
+_AS_MESHES = (None, "", "default", "inherited")
+#: Names of colour spaces whose values are taken as they stand.
+_AS_REC709 = (None, "", "lin_rec709_scene", "lin_rec709", "raw", "data", "identity", "unknown")
 
 
 class Traversal:
@@ -77,11 +84,12 @@ class Traversal:
 
     def _visit(self, root: Usd.Prim, base: Matrices, base_from_world: Matrices, depth: int) -> None:
         """Take over what ``root`` and all below it show, at ``base`` ``(k, 4, 4)``, in a frame of their own."""
-        prims = iter(Usd.PrimRange(root, _PREDICATE))
+        prims = iter(Usd.PrimRange(root, _OF_PROTOTYPES if depth else _PREDICATE))
         for prim in prims:
             if prim.IsPseudoRoot():
                 continue
             kind = str(prim.GetTypeName())
+            self._note_schemas(prim)
             if not prim.IsA(UsdGeom.Imageable):
                 if kind.startswith(PARTICLES):  # which usd-core before 26 does not know
                     self._leave_out(kind)
@@ -109,6 +117,14 @@ class Traversal:
                     self.notes[f"{writer[:40]} writes suns at a quarter of the strength of its other lights"] = None
             elif prim.IsA(UsdGeom.Boundable) and not prim.IsA(UsdSkel.Root) and not prim.IsA(UsdSkel.Skeleton):
                 self._leave_out(kind)
+
+    def _note_schemas(self, prim: Usd.Prim) -> None:
+        """Name what schemas applied to a prim, and to what is below it, would change."""
+        applied = prim.GetAppliedSchemas()
+        if "GeomModelAPI" in applied and (mode := prim.GetAttribute("model:drawMode").Get()) not in _AS_MESHES:
+            self.notes[f"{prim.GetPath()}: model:drawMode '{mode}' is not honoured: its meshes are shown"] = None
+        if "ColorSpaceAPI" in applied and (space := prim.GetAttribute("colorSpace:name").Get()) not in _AS_REC709:
+            self.notes[f"{prim.GetPath()}: colours in the space '{space}' are taken as linear Rec. 709"] = None
 
     def _leave_out(self, kind: str) -> None:
         self._unread[kind] = self._unread.get(kind, 0) + 1
@@ -160,7 +176,10 @@ class Traversal:
         for number, target in enumerate(targets):
             own = places[(kinds == number) & shown]
             prim = self._stage.GetPrimAtPath(target)
-            if not len(own) or not prim:
+            if not len(own):
+                continue
+            if not prim or prim.IsAbstract():
+                self.notes[f"{target}: a prototype that is abstract or not there; its copies are left out"] = None
                 continue
             if len(own) * len(worlds) > _MOST_COPIES:
                 self._count(len(own) * len(worlds))
