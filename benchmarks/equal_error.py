@@ -142,17 +142,13 @@ def _measure(stage: Stage, references: Path | None, reference_samples: int) -> d
 
 
 def pooled_batches(stage: Stage, samples: int) -> Any:
-    """The samples of a pooled picture, as the program traces them: chains go by what a denoiser leaves, and half of the
-    samples to the pixels in which it leaves noise."""
+    """The samples of a pooled picture, as the program traces them."""
     from lippmann.rendering.film.sample_batches import FullInBatches
-    from lippmann.rendering.job import Job
-    from lippmann.rendering.methods import allocation, divides_samples
 
     request = replace(stage.session.request, method="pooled", denoise="oidn", spp=samples, seed=3)
     light_up(stage, request)
     batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30, for_denoiser=True)
-    job = Job(replace(stage.session, request=request), stage.integrator, stage.source, stage.display_from_world)
-    (allocation(job, batches) if divides_samples(job) else batches).add(samples)
+    batches.add(samples)
     return batches
 
 

@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 
 from lippmann.rendering.adaptive.extra_samples import extra_samples
 from lippmann.rendering.adaptive.goal import Goal, goal_of
-from lippmann.rendering.adaptive.sample_allocation import SampleAllocation
 from lippmann.rendering.adaptive.stopping import Costs, Outcome, reach
 from lippmann.rendering.adaptive.tuning import TUNING
-from lippmann.rendering.denoise.cost_model import denoising_cost, effort_of, traced_work
+from lippmann.rendering.denoise.cost_model import effort_of, traced_work
 from lippmann.rendering.denoise.dual_buffer import Denoised
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 from lippmann.rendering.denoise.light_apart import clean_light, without_excess
-from lippmann.rendering.denoise.oidn import Effort
 from lippmann.rendering.denoise.outlines import by_coverage
 from lippmann.rendering.denoise.subpixels import SubpixelBatches
 from lippmann.rendering.estimate.denoised_psnr import DenoisedEstimator
@@ -43,8 +41,6 @@ Floats = NDArray[np.float32]
 #: The layer of a picture with the number of samples that each pixel had.
 SAMPLES_LAYER = "samples"
 
-#: Samples per pixel from which on cheap ones are divided among the pixels.
-FEWEST_DIVIDED = 8
 #: What putting a picture together and writing it takes, as a rule.
 _SECONDS_PER_PIXEL_WRITTEN = 1e-7
 
@@ -136,10 +132,9 @@ def _denoised_samples(job: Job) -> Traced:
     denoiser = _denoiser(job, batches)
     picture = _denoised(job, batches, denoiser)
     estimator = _estimator(job, DenoisedEstimator)
-    sampler = allocation(job, batches, picture) if divides_samples(job) else batches
     reserve, samples = job.request.spp_reserve, job.request.samples
     while samples:
-        sampler.add(samples, job.progress)
+        batches.add(samples, job.progress)
         errors = picture.squared_error()
         estimate = estimator.estimate(errors)
         samples, reserve = extra_samples(estimate, batches.samples, reserve), None
@@ -187,32 +182,13 @@ def _traced(
     estimate: Estimate | None,
     notes: tuple[str, ...] = (),
 ) -> Traced:
-    """The picture of batches, with the maps of its samples and errors."""
+    """The picture of batches, with the map of its errors."""
     frame = Frame(picture.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
-    frame.maps[SAMPLES_LAYER] = batches.samples_of_pixels()
     if errors is not None:
         frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
     seconds = {} if denoiser is None else {"denoise": denoiser.seconds}
     options = {} if denoiser is None else _denoiser_options(denoiser)
     return Traced(frame, batches.samples, estimate, notes, options, seconds, errors)
-
-
-def divides_samples(job: Job) -> bool:
-    """Whether samples are divided among the pixels by their noise.
-
-    Not where a quality is promised: what is noisy is seen, but not what all samples of a pixel have missed. Few samples
-    that are cheap are taken in one launch.
-    """
-    is_worth = job.request.samples >= FEWEST_DIVIDED or _is_costly(job.integrator)
-    return is_worth and not job.request.is_open_ended
-
-
-def allocation(job: Job, batches: FullInBatches, denoised: Denoised | None = None) -> SampleAllocation:
-    """Divides the samples of ``batches``: by the ``denoised`` picture where it is at hand, else by a quick one."""
-    threads = job.session.engine.threads
-    denoiser = _denoiser(job, batches, "fast")
-    quick = Denoised(batches, denoiser.denoise, job.request.transfer, threads, coverage=denoiser.coverage)
-    return SampleAllocation(batches, denoised, quick, denoising_cost("fast") / job.traced.channels, threads)
 
 
 def _batches(job: Job) -> FullInBatches:
@@ -305,11 +281,9 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     return replace(traced, options=_denoiser_options(denoiser), seconds={"denoise": denoiser.seconds})
 
 
-def _denoiser(job: Job, samples: FullInBatches | Frame, effort: Effort | None = None) -> GuidedDenoiser:
-    """By the effort that the rays of ``samples`` are worth, or by that which is given."""
+def _denoiser(job: Job, samples: FullInBatches | Frame) -> GuidedDenoiser:
+    """By the effort that the rays of ``samples`` are worth, or by that of all parts of the picture."""
     common, asked = job.treatment, job.request.denoise
-    if common is not None:
-        effort = common.effort
     return GuidedDenoiser(
         job.session.built,
         job.traced,
@@ -318,7 +292,7 @@ def _denoiser(job: Job, samples: FullInBatches | Frame, effort: Effort | None = 
         box_filter=job.request.box_filter,
         memory=job.session.memory,
         threads=job.session.engine.threads,
-        effort=lambda: effort or effort_of(asked, _rays_per_pixel(job, samples.rays)),
+        effort=lambda: effort_of(asked, _rays_per_pixel(job, samples.rays)) if common is None else common.effort,
         exposure=None if common is None else common.exposure,
         shares=job.request.shares_light,
         progress=job.progress,

@@ -348,21 +348,3 @@ def test_blur_of_caustics_counts_in_full():
     counted = Denoised(renderer, blur, "srgb").squared_error()
     np.testing.assert_allclose(counted.values - plain.values, 0.01, rtol=1e-4)
     assert counted.blur is renderer.blurred
-
-
-def test_noise_is_what_denoised_halves_differ_by_and_goes_on_beyond_white():
-    renderer = Noise()
-    low, high = (np.full(SHAPE, value, np.float32) for value in (0.0, 0.0))
-    for column, (first, second) in enumerate([(0.2, 0.3), (0.99, 1.01), (1.02, 1.04), (3.0, 5.0)]):
-        low[:, column], high[:, column] = first, second
-    renderer._halves = [low, high]
-    denoised = Denoised(renderer, lambda p, _: p.copy(), "srgb")
-    assert not denoised.is_current
-    noise = denoised.noise()
-    assert denoised.is_current
-    assert noise[0, 0] == pytest.approx((encode_srgb(0.3) - encode_srgb(0.2)) ** 2 / 4, rel=0.05)
-    assert noise[0, 1] == pytest.approx(noise[0, 2], rel=0.05)
-    assert noise[0, 1] > 0
-    assert noise[0, 3] == 0
-    renderer.add(2)
-    assert not denoised.is_current

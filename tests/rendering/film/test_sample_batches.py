@@ -224,91 +224,9 @@ def test_samples_of_one_pass_are_taken_together():
     assert [count for _, count in _stretches(integrator, 64, 32)] == [32]
 
 
-def corner():
-    """A quarter of the pixels."""
-    chosen = np.zeros((SIZE, SIZE), dtype=np.bool_)
-    chosen[: SIZE // 2, : SIZE // 2] = True
-    return chosen
-
-
-@pytest.mark.parametrize("memory", [2**30, TIGHT])
-def test_chosen_pixels_take_each_sample_once(engine, memory):
-    """Between rounds of all pixels; the others have theirs."""
-    found = batches(SampleNumbers(), memory=memory)
-    chosen = corner()
-    for step in ("all", "chosen", "all", "chosen"):
-        if step == "all":
-            found.add(8)
-        else:
-            found.add_at(chosen, 16, 4)
-    assert found.samples == 24
-    assert found.rays.primary == SIZE * SIZE * 16 + chosen.sum() * 32
-    counts = found.samples_of_pixels()
-    assert np.array_equal(counts, np.where(chosen, 48, 16))
-    for half in found.traced_halves():
-        number = np.where(chosen, 24, 8)
-        assert half[..., 0] == pytest.approx((number - 1) / 2)
-        assert half[..., 1] == pytest.approx((number - 1) * (2 * number - 1) / 6)
-
-
-def test_pixels_chosen_one_and_all_are_a_round_of_all(integrator):
-    plain, chosen = (batches(integrator, for_denoiser=True) for _ in range(2))
-    plain.add(24)
-    chosen.add(8)
-    chosen.add_at(np.ones((SIZE, SIZE), np.bool_), 8, 8)
-    chosen.add(8)
-    assert chosen.rays == plain.rays
-    assert chosen.picture() == pytest.approx(plain.picture(), rel=1e-5, abs=1e-6)
-    for a, b in zip(chosen.traced_halves(), plain.traced_halves(), strict=True):
-        assert a == pytest.approx(b, rel=1e-5, abs=1e-6)
-    for a, b in zip(chosen.coverage_halves(), plain.coverage_halves(), strict=True):
-        assert a.share == pytest.approx(b.share)
-        assert np.all(a.samples == b.samples)
-    assert chosen.rays_of_sample() == pytest.approx(plain.rays_of_sample())
-    error, other = chosen.squared_error(), plain.squared_error()
-    assert error.values.mean() == pytest.approx(other.values.mean(), rel=0.1)
-
-
-def test_other_pixels_stay_and_nothing_is_chosen_of_none(integrator):
-    before, after = batches(integrator), batches(integrator)
-    before.add(8)
-    after.add(8)
-    after.add_at(np.zeros((SIZE, SIZE), np.bool_), 8, 2)
-    assert after.samples == 8
-    after.add_at(corner(), 32, 8)
-    assert np.array_equal(before.picture()[~corner()], after.picture()[~corner()])
-    assert (before.picture() != after.picture())[corner()].mean() > 0.9
-    told = before.squared_error().values, after.squared_error().values
-    assert told[1][~corner()] == pytest.approx(told[0][~corner()], rel=1e-3, abs=1e-6)
-    ratio = np.median(told[1][corner()]) / np.median(told[0][corner()])
-    assert 0.1 < ratio < 0.35  # 8 samples to 40
-
-
-def test_rays_of_a_sample_are_told_pixel_by_pixel(integrator):
-    found = batches(integrator, for_denoiser=True)
-    found.add(8)
-    found.add_at(corner(), 16, 4)
-    total = (found.rays_of_sample() * found.samples_of_pixels()).sum()
-    assert total == pytest.approx(found.rays.primary + found.rays.secondary + found.rays.shadow, rel=1e-4)
-    assert np.array_equal(batches(integrator).rays_of_sample(), np.ones((SIZE, SIZE)))
-
-
-def test_chosen_pixels_take_each_sample_once_across_passes_of_photons(engine, monkeypatch):
-    """Each pass has a part of the samples; what a part of a batch comes to is rounded, not lost."""
-    monkeypatch.setattr(
-        "lippmann.rendering.film.sample_batches._stretches", lambda each, *_: ((each, n) for n in (1, 2, 1))
-    )
-    found = batches(SampleNumbers())
-    found.add_at(corner(), 16, 4)
-    assert np.array_equal(found.samples_of_pixels(), np.where(corner(), 16, 0))
-    for half in found.traced_halves():
-        assert half[corner()][:, 0] == pytest.approx(3.5)
-        assert half[corner()][:, 1] == pytest.approx(7 * 15 / 6)
-
-
 @pytest.mark.long
 def test_wavefronts_of_any_size_share_a_kernel(engine):
-    """With photons, light vertices and chosen pixels: the kernel of paths takes seconds to compile."""
+    """With photons and light vertices: the kernel of paths takes seconds to compile."""
     import drjit as dr
 
     import lippmann
@@ -326,8 +244,8 @@ def test_wavefronts_of_any_size_share_a_kernel(engine):
         dr.kernel_history_clear()
         found.add(1)
         found.add(7)
-        found.add_at(corner(), 16, 4)
         found.add(8)
+        found.add(16)
         kernels = [kernel["hash"] for kernel in dr.kernel_history() if kernel.get("operation_count", 0) > 5000]
     assert len(kernels) >= 4
     assert len(set(kernels)) == 1

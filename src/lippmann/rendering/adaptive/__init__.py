@@ -1,1 +1,1 @@
-"""Adaptive sampling: convergence, stopping rules, and the choice between methods."""
+"""Sample budgets: stopping rules of a goal, and the reserve of a default picture."""

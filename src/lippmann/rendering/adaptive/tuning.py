@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class AdaptiveTuning:
-    """Constants of the stopping rule, of the reserve of samples, and of their allocation to pixels.
+    """Constants of the stopping rule and of the reserve of samples.
 
     Attributes
     ----------
@@ -42,15 +42,6 @@ class AdaptiveTuning:
         (``equal_time.py``).
     clean_worst:
         Estimated PSNR in dB from which on the worst micro-image needs no more samples, and for which they are reckoned.
-    chosen_samples:
-        Samples of a noisy pixel for one of all in the second half of a picture's samples (``equal_time.py``).
-    noise_radius:
-        Pixels to either side over which noise and cost are averaged, as halves of one pixel differ by chance.
-    least_noise:
-        Share of the noise that the chosen pixels hold, at least; 0.63 would be even by theory, scenes with 0.74 and
-        less lose (docs/research/adaptive-sampling.md).
-    most_of_look:
-        Share of the cost of the samples so far that a denoised picture may cost which only shows where they are needed.
     """
 
     step: int = 8
@@ -69,10 +60,6 @@ class AdaptiveTuning:
     clean: float = 35.5
     aim: float = 35.0
     clean_worst: float = 25.0
-    chosen_samples: int = 4
-    noise_radius: int = 1
-    least_noise: float = 0.75
-    most_of_look: float = 0.25
 
 
 TUNING = AdaptiveTuning()

@@ -58,8 +58,6 @@ DROWNED = 8.0
 MANY = 16
 #: Share of the samples' error that is taken to rest on outliers where too few batches tell them.
 UNTOLD_OUTLIERS = 0.25
-#: Linear value up to which noise counts for :meth:`Denoised.noise`.
-_BEYOND_WHITE = 1.5
 #: Linear steps below this are as good as a slope, and hold rounding.
 _LEAST_STEP = 1e-4
 #: A clean picture from a noisy one; and whether that is to be turned, see
@@ -168,21 +166,6 @@ class Denoised:
         outliers = self._seen_outliers(samples, slope)
         return PixelErrors(common + apart, outliers, CROSS_NOISE, samples, apart, samples.blur)
 
-    @property
-    def is_current(self) -> bool:
-        """Whether the halves are clean already with the samples that there are."""
-        return self._cleaned is not None and self._cleaned_samples == self._renderer.samples
-
-    def noise(self) -> Floats:
-        """``(H, W)``: squared error of every pixel's code that is not common to both halves.
-
-        As if codes went on a little beyond white: else pixels that are white by chance would have none, and those that
-        by chance are not, some.
-        """
-        first, second = (np.minimum(half, np.float32(_BEYOND_WHITE)) for half in self._clean_halves())
-        mean = np.minimum(np.float32(0.5) * (first + second), np.float32(1))
-        return _apart((first, second), coding_slope(mean, self._transfer))
-
     def _seen_outliers(self, samples: PixelErrors, slope: Floats) -> Floats | None:
         """What of ``apart`` rests on outliers of seen light: what one half has met of it, and the other has not.
 
@@ -199,7 +182,7 @@ class Denoised:
 
     def _clean_halves(self) -> tuple[Floats, Floats]:
         # The samples may have come by another way than through :meth:`add`.
-        if self._cleaned is None or not self.is_current:
+        if self._cleaned is None or self._cleaned_samples != self._renderer.samples:
             self._cleaned_samples = self._renderer.samples
             self._noisy = self._noisy_halves()
             clean = self._best_of_halves()

@@ -28,12 +28,3 @@ class SubpixelBatches(FullInBatches):
     def shown(self, values: Floats) -> Floats:
         """``(..., H, W, 3)`` from ``(..., H, 3 W, 3)``: the own colour of each sub-pixel."""
         return self._source.own_colors(values)
-
-    def of_picture(self, values: Floats) -> Floats:
-        """``(H, W)`` of ``(pixels,)``: the mean of the sub-pixels of each pixel."""
-        mean: Floats = values.reshape(self.shape[0], -1, 3).mean(axis=2)
-        return mean
-
-    def traced(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """``(H, 3 W)``: all sub-pixels of pixels."""
-        return np.repeat(chosen, 3, axis=1)

@@ -41,9 +41,7 @@ OUTLIER_STEP = 0.15
 OUTLIERS_TOLD_FROM = 4
 
 
-def error_of_batches(
-    sums: Floats, taken: Sequence[int], transfer: Transfer, further: Floats | None = None
-) -> tuple[Floats, Floats]:
+def error_of_batches(sums: Floats, taken: Sequence[int], transfer: Transfer) -> tuple[Floats, Floats]:
     """Expected squared error of the codes of the mean of all samples, averaged over the three channels.
 
     Parameters
@@ -55,8 +53,6 @@ def error_of_batches(
         How many samples each batch has of every pixel; each stream has at least one.
     transfer:
         How values become codes.
-    further:
-        ``(pixels,)``: samples that each batch has beyond these of single pixels; None for none.
 
     Returns
     -------
@@ -70,11 +66,7 @@ def error_of_batches(
     for first in range(0, pixels, _CHUNK):
         part = slice(first, min(first + _CHUNK, pixels))
         values = [mi.Color3f(np.ascontiguousarray(batch[part].T)) for batch in sums]
-        if further is None:
-            of_part = _Batches(values, counts, transfer)
-        else:
-            more = mi.Float(np.ascontiguousarray(further.ravel()[part]))
-            of_part = _Batches(values, [count + more for count in counts], transfer)
+        of_part = _Batches(values, counts, transfer)
         jackknife, alone = of_part.jackknife()
         result = jackknife + of_part.evenness()
         dr.eval(result, alone)

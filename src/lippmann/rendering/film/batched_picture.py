@@ -1,7 +1,4 @@
-"""A picture whose samples are kept in batches: their sums, how many they are, and what follows from both.
-
-Pixels that are worth it may have more samples than others, but as many in each batch.
-"""
+"""A picture whose samples are kept in batches: their sums, how many they are, and what follows from both."""
 
 from __future__ import annotations
 
@@ -36,8 +33,8 @@ class BatchedPicture:
         1, or 3 where each pixel has samples of its sub-pixels.
     transfer:
         How values become codes; errors are measured between codes.
-    keeps_seen, keeps_coverage, keeps_rays:
-        Whether seen light, coverage, and the rays of each pixel are kept, too.
+    keeps_seen, keeps_coverage:
+        Whether seen light and coverage are kept, too.
     blur_after:
         What blur adds to the squared error of each traced pixel ``(H, W, 3)``, linear, after so many samples; None
         where there is none.
@@ -52,21 +49,16 @@ class BatchedPicture:
         *,
         keeps_seen: bool,
         keeps_coverage: bool,
-        keeps_rays: bool,
         blur_after: Callable[[int], Floats | None],
     ) -> None:
         pixels = shape[0] * shape[1]
-        self._shape, self._channels, self._transfer = shape, channels, transfer
+        self._shape, self._transfer = shape, transfer
         self._sums = np.zeros((batches, pixels, 3), dtype=np.float32)
         self._seen = np.zeros((STREAMS, pixels, 3), dtype=np.float32) if keeps_seen else None
         self._excess = np.zeros((1, pixels, 3), dtype=np.float32) if keeps_seen else None
         self._covered = np.zeros((STREAMS, pixels, channels), dtype=np.float32) if keeps_coverage else None
-        #: Samples that each batch has of every pixel; how many more of single ones, and of all on the average.
+        #: Samples that each batch has of every pixel.
         self._taken = [0] * batches
-        self._further = np.zeros(pixels, dtype=np.uint32)
-        self._further_mean = 0
-        #: Rays of each pixel, where it is told what else differs from pixel to pixel.
-        self._rays_of_pixels = np.zeros(pixels, dtype=np.float32) if keeps_rays else None
         # Plain and denoised pictures of the same samples both ask for their errors.
         self._errors: PixelErrors | None = None
         self._blur_after = blur_after
@@ -78,35 +70,17 @@ class BatchedPicture:
 
     @property
     def samples(self) -> int:
-        """Samples that each pixel has had, on the average."""
-        return sum(self._taken) + self._further_mean
+        """Samples that each pixel has had."""
+        return sum(self._taken)
 
     @property
     def batches(self) -> int:
-        """Samples of single pixels come in multiples of this."""
+        """How many batches there are."""
         return len(self._taken)
 
     @property
     def _batches_of_stream(self) -> int:
         return self.batches // STREAMS
-
-    def samples_of_pixels(self) -> NDArray[np.uint32]:
-        """``(H, W)``: samples that each pixel of the picture has had."""
-        return self.of_picture(self._counts(sum(self._taken), self.batches)).astype(np.uint32)
-
-    def rays_of_sample(self) -> Floats:
-        """``(H, W)``: rays that a sample of each pixel takes, as its samples so far show; 1 where they do not."""
-        counts = np.maximum(1, self._counts(sum(self._taken), self.batches) * self._channels)
-        rays = np.float32(0) if self._rays_of_pixels is None else self._rays_of_pixels
-        return self.of_picture(np.maximum(1, rays / counts))
-
-    def of_picture(self, values: Floats) -> Floats:
-        """``(H, W)`` of ``(pixels,)`` of what is traced."""
-        return values.reshape(self.shape)
-
-    def traced(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Of pixels ``(H, W)`` of the picture those of what is traced."""
-        return chosen
 
     def picture(self) -> Floats:
         """``(H, W, 3)`` float32: the mean of all samples, linear; black where there are none."""
@@ -133,11 +107,8 @@ class BatchedPicture:
         """As the samples of either of :meth:`traced_halves` tell it; None where it is not told, or not kept."""
         if self._covered is None:
             return None
-        shares, counts = self._means(list(self._covered)), self._per_stream()
-        if not self._further_mean:
-            return Coverage(shares[0], counts[0]), Coverage(shares[1], counts[1])
-        further = (self._batches_of_stream * self._further).reshape(*self.shape, 1)
-        return Coverage(shares[0], counts[0] + further), Coverage(shares[1], counts[1] + further)
+        first, second = map(Coverage, self._means(list(self._covered)), self._per_stream())
+        return first, second
 
     def excess(self) -> Floats | None:
         """What of :meth:`picture` rests on single chains of seen light, see
@@ -147,28 +118,16 @@ class BatchedPicture:
     def _mean(self, sums: Floats) -> Floats:
         """Of all samples, whose sums lie in several parts."""
         total: Floats = sums.sum(axis=0)
-        total *= self._weights(sum(self._taken), self.batches)
+        total *= np.float32(1 / max(1, self.samples))
         return total.reshape(*self.shape, 3)
-
-    def _weights(self, of_all: int, batches: int) -> Floats | np.float32:
-        """Of a sample in each pixel's mean ``(pixels, 1)`` over so many batches; one number where all have as many."""
-        if not self._further_mean:
-            return np.float32(1 / max(1, of_all))
-        return np.reciprocal(np.maximum(1, self._counts(of_all, batches)))[:, None]
-
-    def _counts(self, of_all: int, batches: int) -> Floats:
-        """``(pixels,)``: samples in so many batches that together have ``of_all`` of every pixel."""
-        counts: Floats = of_all + batches * self._further.astype(np.float32)
-        return counts
 
     def _means(self, sums: Sequence[Floats]) -> tuple[Floats, Floats]:
         """Of the sums of each stream."""
-        each = self._batches_of_stream
-        parts = [
-            (total * self._weights(n, each)).reshape(*self.shape, -1)
+        first, second = (
+            (total * np.float32(1 / max(1, n))).reshape(*self.shape, -1)
             for total, n in zip(sums, self._per_stream(), strict=True)
-        ]
-        return parts[0], parts[1]
+        )
+        return first, second
 
     def _per_stream(self) -> list[int]:
         """Samples of every pixel that each stream has had."""
@@ -187,10 +146,7 @@ class BatchedPicture:
         if self.samples < STREAMS:
             raise UsageError("one sample per pixel does not tell its own error", rule="two or more do")
         if self._errors is None:
-            further = None
-            if self._further_mean:
-                further = self.of_picture(self._further.astype(np.float32))
-            error, outliers = error_of_batches(self.shown(self._sums), self._taken, self._transfer, further)
+            error, outliers = error_of_batches(self.shown(self._sums), self._taken, self._transfer)
             shape = self.shape[0], -1
             error = error.reshape(shape)
             blur = self.squared_blur()
@@ -215,15 +171,10 @@ class BatchedPicture:
         """Of values ``(..., W, 3)`` of what is traced those that the picture shows."""
         return values
 
-    def _keep(self, run: Run, sums: dict[str, Floats], chosen: NDArray[np.uint32] | None = None) -> None:
-        """Add to its batches what :func:`~lippmann.rendering.film.wavefront.sums_of` gives for a run: of all pixels, or
-        of those with the numbers ``chosen``.
-        """
+    def _keep(self, run: Run, sums: dict[str, Floats]) -> None:
+        """Add to its batches what :func:`~lippmann.rendering.film.wavefront.sums_of` gives for a run."""
         per_stream = self._batches_of_stream
-        pixels = slice(run.first, run.last) if chosen is None else chosen[run.first : run.last]
-        rays = sums.pop("rays", None)
-        if self._rays_of_pixels is not None and rays is not None:
-            self._rays_of_pixels[pixels] += rays
+        pixels = slice(run.first, run.last)
         for place, batch in enumerate(run.batches):
             kept = {
                 "radiance": (self._sums, batch),

@@ -17,14 +17,14 @@ class Coverage:
     share:
         ``(H, W, C)`` float32 in [0, 1]; C is 3 where each sub-pixel has rays of its own, else 1.
     samples:
-        Of each pixel; ``(H, W, 1)`` where these differ.
+        Of each pixel.
     """
 
     share: NDArray[np.float32]
-    samples: int | NDArray[np.integer]
+    samples: int
 
     def __add__(self, other: Coverage) -> Coverage:
         """By the samples of both."""
         samples = self.samples + other.samples
         hits = self.samples * self.share + other.samples * other.share
-        return Coverage((hits / np.maximum(1, samples)).astype(np.float32), samples)
+        return Coverage((hits / max(1, samples)).astype(np.float32), samples)

@@ -28,8 +28,6 @@ BATCH_ERRORS = 12
 SEEN = 3 * BATCH
 #: Coverage of two halves, of each channel.
 COVERAGE = 8
-#: Further samples of a pixel, and its rays.
-COUNTS = 8
 #: One emission of photons, which lands about once, with what sorting takes, in bytes.
 PHOTON = 128
 #: One ray from an emitter to a light vertex, with what it takes to trace it, in bytes.

@@ -33,7 +33,6 @@ from lippmann.rendering.film.wavefront import (
     RayTotals,
     compile_seconds,
     evaluate,
-    rays_of,
     sample_pixels,
     sums_of,
 )
@@ -109,7 +108,6 @@ class FullInBatches(BatchedPicture):
         keeps_coverage = for_denoiser and isinstance(integrator, PathIntegrator)
         keeps_seen = isinstance(integrator, PathIntegrator) and for_denoiser and integrator.light.chains is not None
         further = memory_model.COVERAGE * source.channels * keeps_coverage + memory_model.SEEN * keeps_seen
-        further += memory_model.COUNTS * for_denoiser
         batches, self._lanes = _sizes(pixels, source.channels, memory, further)
         super().__init__(
             batches,
@@ -118,7 +116,6 @@ class FullInBatches(BatchedPicture):
             transfer,
             keeps_seen=keeps_seen,
             keeps_coverage=keeps_coverage,
-            keeps_rays=for_denoiser,
             blur_after=SquaredBlur(integrator, source, self._window, seed).after,
         )
 
@@ -144,42 +141,6 @@ class FullInBatches(BatchedPicture):
             self._taken = taken
         self.seconds_compile += compiled
         self.seconds_trace += time.perf_counter() - started - compiled
-
-    def add_at(self, chosen: NDArray[np.bool_], each: int, mean: int, progress: ProgressCallback = silent) -> None:
-        """Take more samples of some pixels.
-
-        Parameters
-        ----------
-        chosen:
-            ``(H, W)``: which pixels of the picture.
-        each:
-            Samples of each of them, a multiple of :attr:`batches`.
-        mean:
-            Samples that these are on the average of all pixels, about; as many as so many of all pixels, they share the
-            passes of photons.
-        """
-        pixels = np.flatnonzero(self.traced(chosen)).astype(np.uint32)
-        if not len(pixels):
-            return
-        channels, number = self._source.channels, self.batches
-        started, done = time.perf_counter(), 0
-        self._errors = None
-        per_batch, before, gone = each // number, 0, 0
-        for integrator, stretch in _stretches(self._integrator, self.samples, mean):
-            gone += stretch
-            count = round(per_batch * gone / mean) - before
-            if count:
-                starts = [had + place * count for had in self._per_stream() for place in range(self._batches_of_stream)]
-                lanes = self._lanes // channels
-                for run in cut_batches(len(pixels), tuple(range(number)), tuple(starts), count, lanes, lanes + 1):
-                    together = sum(self._taken) + number * count
-                    self._keep(run, self._trace(integrator, run, together, pixels), pixels)
-                    done += (run.last - run.first) * channels * run.count * len(run.batches)
-                    progress(Progress("trace", done, len(pixels) * channels * each))
-                self._further[pixels] += np.uint32(count)
-                before += count
-            self._further_mean += stretch
-        self.seconds_trace += time.perf_counter() - started
 
     def probe(self) -> float:
         """Seconds that one sample of every pixel takes, by a few samples that are not kept."""
@@ -232,13 +193,9 @@ class FullInBatches(BatchedPicture):
                 strip = STRIP_ROWS * self._window.width
                 yield from cut_batches(pixels, batches, tuple(starts), count, lanes, strip)
 
-    def _trace(
-        self, integrator: Integrator, run: Run, together: int, chosen: NDArray[np.uint32] | None = None
-    ) -> dict[str, Floats]:
+    def _trace(self, integrator: Integrator, run: Run, together: int) -> dict[str, Floats]:
         """What :func:`~lippmann.rendering.film.wavefront.sums_of` gives for a run; excess by the samples that every
-        pixel then has ``together``, and what single ones had more.
-
-        Of the pixels that are ``chosen``, if any are; their numbers.
+        pixel then has ``together``.
 
         Lanes are ordered pixel (see :mod:`.lane_order`), then channel, then batch, then sample. What differs from run
         to run is opaque to the compiler, so that all share a kernel.
@@ -250,31 +207,22 @@ class FullInBatches(BatchedPicture):
         rest, place = divide(rest, dr.opaque(mi.UInt32, number))
         pixel, channel = divide(rest, channels)
         pixel = dr.opaque(mi.UInt32, run.first) + pixel * dr.opaque(mi.UInt32, run.step)
-        is_chosen = dr.opaque(mi.Bool, chosen is not None)
-        listed = dr.gather(mi.UInt32, _table([] if chosen is None else chosen), pixel, is_chosen)
-        pixel = dr.select(is_chosen, listed, pixel)
         strips = in_strips(self._sums.shape[1], window.width) if run.in_strips else 0
         row, column = pixel_at(pixel, window.width, dr.opaque(mi.UInt32, strips))
-        has_further = dr.opaque(mi.Bool, self._further_mean > 0)
-        table = _table(self._further if self._further_mean else [])
-        further = dr.gather(mi.UInt32, table, row * window.width + column, has_further)
         row += dr.opaque(mi.UInt32, window.top)
         column += dr.opaque(mi.UInt32, window.left)
         pixel = pixel_number(self._source, column, row)
-        sample += dr.gather(mi.UInt32, _table(run.starts), place) + further * per_stream
+        sample += dr.gather(mi.UInt32, _table(run.starts), place)
         stream_of = dr.gather(mi.UInt32, _table([batch // per_stream for batch in run.batches]), place)
         seed = dr.opaque(mi.UInt32, self._seed) + stream_of * SEED_STEP
 
         stream = SampleStream.of_pixels(pixel * channels + channel, sample, seed)
         stream.half = stream_of
         pixels = PixelRays(self._source, column, row, channel, self._box_filter)
-        samples = dr.opaque(mi.Float, together) + mi.Float(further * self.batches)
-        samples = None if self._covered is None else samples
+        samples = None if self._covered is None else dr.opaque(mi.Float, together)
         traced = sample_pixels(integrator, pixels, stream, samples)
         evaluate(traced, lanes, self.rays)
         sums = sums_of(traced, channels, number, run.count)
-        if self._rays_of_pixels is not None:
-            sums["rays"] = rays_of(traced, channels * number * run.count)
         return {name: to_rows(part, window.width) for name, part in sums.items()} if run.in_strips else sums
 
 
@@ -362,7 +310,7 @@ def _sizes(pixels: int, channels: int, memory: int, further: int) -> tuple[int, 
     return batches, memory_model.lanes_within(memory, kept, needed, what)
 
 
-def _table(numbers: Sequence[int] | NDArray[np.uint32]) -> UInt32:
+def _table(numbers: Sequence[int]) -> UInt32:
     """``numbers`` on the device, and two more: a single number would become a constant of the kernel."""
     table: UInt32 = upload(np.append(numbers, [0, 0]).astype(np.uint32))
     return table

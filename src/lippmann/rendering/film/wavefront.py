@@ -223,12 +223,6 @@ def sums_of(sample: PixelSample, channels: int, batches: int, count: int) -> dic
     return sums
 
 
-def rays_of(sample: PixelSample, lanes: int) -> NDArray[np.float32]:
-    """``(pixels,)``: rays of evaluated samples, of so many lanes for each pixel."""
-    rays = 1 + sample.counts.secondary + sample.counts.shadow
-    return np.array(dr.block_sum(rays, lanes)).astype(np.float32)
-
-
 def shown_colors(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """``(pixels, ..., 3)``: of ``(pixels, channels, ..., 3)`` what the pixels show.
 
