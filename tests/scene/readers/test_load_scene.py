@@ -74,6 +74,9 @@ def test_up_of_what_says_it_itself_is_refused():
         ("cup.3mf", "save it as .stl"),
         ("cup.zae", "unzip it"),
         ("water.sdf", "obabel in.sdf"),
+        ("room.splat", "SuperSplat"),
+        ("tower.laz", "CloudCompare"),
+        ("virus.mrc", "mrcfile"),
     ],
 )
 def test_files_of_other_programs_are_told_how_to_become_gltf(save, name, said):

@@ -110,6 +110,19 @@ def test_vertices_without_colours_beside_coloured_ones_are_white(read):
     (mesh,) = read(text).meshes
     assert mesh.colors.tolist() == [[1, 1, 1]] * 3 + np.eye(3).tolist()
     assert mesh.positions[:3].tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    (of_bytes,) = read(
+        text.replace("1 0 0\nv 1 0 1", "255 0 0\nv 1 0 1")
+        .replace("0 1 0\nv 0 1 1", "0 255 0\nv 0 1 1")
+        .replace("0 0 1\nf 4", "0 0 255\nf 4")
+    ).meshes
+    np.testing.assert_array_equal(of_bytes.colors, mesh.colors)
+
+
+@pytest.mark.parametrize("top", [1.0, 255.0])
+def test_colours_count_to_1_or_to_255(read, top):
+    (mesh,) = read(f"v 0 0 0 {top} 0 0\nv 1 0 0 0 {0.5 * top} 0\nv 0 1 0 0 0 0\nf 1 2 3\n").meshes
+    assert mesh.colors[0].tolist() == [1, 0, 0]
+    assert mesh.colors[1, 1] == pytest.approx(decode_srgb(np.array(0.5)), abs=1e-6)
 
 
 def test_a_weight_is_no_colour(read):
@@ -129,8 +142,9 @@ def test_layout_of_lines(read):
 
 
 def test_what_cannot_be_drawn_is_counted_in_a_note(read):
-    scene = read(SQUARE + "curv 0 1 1 2\ncurv 0 1 2 3\nmystery 3\nf 1 2 3\n")
-    assert scene.notes == ["2 curves are not rendered", "1 statements 'mystery' are not rendered"]
+    scene = read(SQUARE + "curv 0 1 1 2\ncurv 0 1 2 3\nmystery 3\nusemap wood\nf 1 2 3\n")
+    statements = ["1 statements 'mystery' are not rendered", "1 statements 'usemap' are not rendered"]
+    assert scene.notes == ["2 curves are not rendered", *statements]
 
 
 def test_points_and_lines_are_drawn(read):

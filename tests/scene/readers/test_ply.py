@@ -104,11 +104,42 @@ def test_colours_and_uvs_of_faces_part_the_vertices(read):
     assert mesh.uvs[0][mesh.faces][2].tolist() == [[0, 1], [1, 1], [0, 0]]
 
 
+def test_alpha_hides_what_it_is_less_than_full_of(read):
+    """Opaque throughout, or 0 throughout as programs fill it in that have none: no colour is transparent."""
+    vertex = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue", "alpha"))
+    for alphas, mode in (([0, 51, 255, 255, 255], "blend"), ([255] * 5, "opaque"), ([0] * 5, "opaque")):
+        rows = [" ".join(map(str, (*place, 255, 0, 0, alpha))) for place, alpha in zip(VERTICES, alphas, strict=True)]
+        scene = read((header("ascii", vertex) + "\n".join(rows) + "\n4 0 1 2 3\n3 1 4 2\n").encode())
+        colors = scene.meshes[0].colors
+        assert (colors.shape[1] == 4, scene.materials[0].alpha_mode) == (mode == "blend", mode)
+        if mode == "blend":
+            assert colors[:, 3] == pytest.approx([0, 0.2, 1, 1, 1])
+
+
+@pytest.mark.parametrize("top", [1.0, 255.0])
+def test_real_colours_count_to_1_or_to_255(read, top):
+    vertex = "".join(f"property float {name}\n" for name in ("red", "green", "blue"))
+    rows = [" ".join(map(str, (*place, top, 0.5 * top, 0))) for place in VERTICES]
+    (mesh,) = read((header("ascii", vertex) + "\n".join(rows) + "\n4 0 1 2 3\n3 1 4 2\n").encode()).meshes
+    assert mesh.colors[0] == pytest.approx([1, float(decode_srgb(0.5)), 0], abs=1e-6)
+
+
+def test_colours_of_faces_beside_those_of_vertices_are_named(read):
+    colors = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
+    rows = [" ".join(map(str, (*place, 255, 0, 0))) for place in VERTICES]
+    faces = "\n4 0 1 2 3 0 255 0\n3 1 4 2 0 255 0\n"
+    scene = read((header("ascii", colors, colors) + "\n".join(rows) + faces).encode())
+    assert scene.meshes[0].colors[0].tolist() == [1, 0, 0]
+    assert "colours of faces are not shown: vertices have their own" in scene.notes
+
+
 def test_elements_between_are_stepped_over(read):
     text = text_file().decode()
     edges = text.replace("element face", "element edge 2\nproperty int vertex1\nproperty int vertex2\nelement face")
     edges = edges.replace("2 0.5 0\n", "2 0.5 0\n0 1\n1 2\n")
-    assert len(read(edges.encode()).meshes[0].faces) == 3
+    scene = read(edges.encode())
+    assert len(scene.meshes[0].faces) == 3
+    assert "elements not shown: edge" in scene.notes
 
 
 def test_faces_without_area_in_their_list(read):

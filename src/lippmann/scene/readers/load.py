@@ -120,6 +120,12 @@ _ELSEWHERE = {
     ".hdr": "save it as .nii or .nii.gz, which hold header and voxels in one file",
     ".3mf": "save it as .stl or .obj, in the slicer or in Blender",
     ".zae": "unzip it, open the .dae in Blender, then File > Export > glTF 2.0 (.glb)",
+    **dict.fromkeys((".splat", ".ksplat", ".lcc"), "open it in SuperSplat (superspl.at/editor), export it as .ply"),
+    **dict.fromkeys((".las", ".laz", ".e57", ".pcd", ".pts"), "save it as .ply, in CloudCompare for instance"),
+    **dict.fromkeys((".mrc", ".map", ".ccp4"), "save it as .npy: numpy.save('a.npy', mrcfile.read('a.mrc'))"),
+    ".mhd": "save it as .nii.gz, in 3D Slicer for instance",
+    ".nhdr": "save it as .nii.gz, in 3D Slicer for instance",
+    ".xyz": "save molecules as .pdb, by: obabel in.xyz -O out.pdb; clouds of points as .ply, in CloudCompare",
     ".sdf": "save it as .pdb or .cif, in Avogadro or by: obabel in.sdf -O out.pdb",
     ".mol": "save it as .pdb or .cif, in Avogadro or by: obabel in.mol -O out.pdb",
 }

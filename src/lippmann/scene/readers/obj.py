@@ -35,7 +35,7 @@ _UNSUPPORTED = {
 #: Digits of a smoothing group that fits into 64 bits; longer ones count as odd values.
 _LONGEST_NUMBER = 18
 _SILENT = {"g", "o", "vp", "cstype", "deg", "parm", "trim", "hole", "scrv", "sp", "end", "con", "bmat", "step", "mg"}
-_SILENT |= {"bevel", "c_interp", "d_interp", "lod", "maplib", "usemap", "shadow_obj", "trace_obj", "ctech", "stech"}
+_SILENT |= {"bevel", "c_interp", "d_interp", "lod", "maplib", "shadow_obj", "trace_obj", "ctech", "stech"}
 
 
 @dataclass

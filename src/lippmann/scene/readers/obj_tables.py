@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.vertex_colors import full_brightness
 
 Integers = NDArray[np.int64]
 Points = NDArray[np.float64]
@@ -31,6 +32,7 @@ def read_table(lines: Lines, what: str, least: int, where: str, *, colored: bool
     """Numbers ``(n, k)`` of ``v``, ``vt`` or ``vn`` lines; k is the smallest count on any line.
 
     ``colored``: the last three of six numbers are a colour. If some lines have one, the others are white.
+    Where they count to 255, they come divided by it.
 
     Raises
     ------
@@ -47,6 +49,8 @@ def read_table(lines: Lines, what: str, least: int, where: str, *, colored: bool
             table = _ragged_table(lines, what, least, where, colored)
     except ValueError:
         table = _ragged_table(lines, what, least, where, colored)
+    if colored and table.shape[1] in (6, 7):
+        table[:, 3:6] = np.nan_to_num(table[:, 3:6] / full_brightness(table[:, 3:6]), nan=1.0, posinf=np.inf)
     if table.shape[1] < least:
         raise SceneError(
             f"{what} with {table.shape[1]} numbers", where=f"{where}:{lines.numbers[0]}", rule=f"it takes {least}"
@@ -74,7 +78,7 @@ def _ragged_table(lines: Lines, what: str, least: int, where: str, colored: bool
                 f"{what} with {len(rows[-1])} numbers", where=f"{where}:{number}", rule=f"it takes {least}"
             )
     if colored and any(len(row) >= 6 for row in rows):
-        rows = [row[:6] if len(row) >= 6 else [*row[:3], 1.0, 1.0, 1.0] for row in rows]
+        rows = [row[:6] if len(row) >= 6 else [*row[:3], np.nan, np.nan, np.nan] for row in rows]
     width = min(len(row) for row in rows)
     return np.array([row[:width] for row in rows])
 

@@ -6,9 +6,8 @@ files that mix triangles and larger polygons, which is what modelling programs w
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,17 +16,17 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import read_bytes, read_image, resolve
-from lippmann.scene.parsing.ply_header import Element, Header, read_header
+from lippmann.scene.parsing.ply_body import Columns, Integers, Lists, Numbers, read_body
+from lippmann.scene.parsing.ply_header import Element, read_header
 from lippmann.scene.parsing.points_lines import MOST, thinned
 from lippmann.scene.parsing.triangulation import triangulate
+from lippmann.scene.parsing.vertex_colors import full_brightness
 from lippmann.scene.point_clouds import draw_cloud
 from lippmann.scene.readers.splats.ply import holds_splats, read_splat_ply
-from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription, Texture
+from lippmann.scene.values.description import AlphaMode, Instance, Material, Mesh, SceneDescription, Texture
 
 UP_NOTE = "up is taken as +y, for nothing in the data says it (else up=z)"
 
-# Numbers may be followed by remarks, as in the header.
-_REMARK = re.compile(rb"(?m)^[ \t]*comment\b.*$|#.*$")
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _COLOR_NAMES = (
     ("red", "green", "blue", "alpha"),
@@ -37,22 +36,11 @@ _COLOR_NAMES = (
 #: Properties of vertices that are shown.
 _SHOWN = {"x", "y", "z", "nx", "ny", "nz"}.union(*_UV_NAMES, *_COLOR_NAMES)
 
+#: Elements that are shown.
+_ELEMENTS = ("vertex", "face", "tristrips")
+
 #: More vertices than any file has.
 _MOST_VERTICES = 1 << 53
-
-Numbers = NDArray[np.float64]
-Integers = NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class _Lists:
-    """A list property: all values in a row, and how many belong to each entry."""
-
-    values: Numbers
-    sizes: Integers
-
-
-Columns = Mapping[str, "Numbers | _Lists"]
 
 
 def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
@@ -71,7 +59,7 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     header = read_header(data, where)
     if holds_splats(header):
         return read_splat_ply(data, header, path.stem, where)
-    columns = _read_body(data, header, where)
+    columns = read_body(data, header, where)
     if not all(isinstance(columns.get("vertex", {}).get(axis), np.ndarray) for axis in "xyz"):
         raise SceneError("holds no vertices with x, y and z", where=where)
     notes = [*header.notes] if header.up else [UP_NOTE, *header.notes]
@@ -79,10 +67,15 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     unread = sorted({each.name for each in elements["vertex"].properties} - _SHOWN)
     if unread:
         notes.append(f"of vertices not shown: {', '.join(name[:40] for name in unread[:20])}")
+    stepped_over = [each.name[:40] for each in header.elements if each.count and each.name not in _ELEMENTS]
+    if stepped_over:
+        notes.append(f"elements not shown: {', '.join(stepped_over[:20])}")
     outline = _outline(columns, where)
     if not len(outline.sizes):
         return replace(_cloud(columns["vertex"], elements["vertex"], path.stem, notes, where), up=header.up)
     mesh, owners = _mesh(columns, elements, outline, path.stem, where)
+    if "face" in elements and all(_color_names(elements[name]) for name in ("vertex", "face")):
+        notes.append("colours of faces are not shown: vertices have their own")
     textures: list[Texture | None] = []
     for name in header.textures:
         image = resolve(path.parent, name, where=where, what="texture", allow_outside=allow_outside)
@@ -105,7 +98,10 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
 
 def _material(name: str, texture: Texture | None, mesh: Mesh) -> Material:
     plain = (1.0, 1.0, 1.0) if texture is not None or mesh.colors is not None else (0.7, 0.7, 0.7)
-    return Material(name, base_color=plain, base_color_texture=texture, roughness=0.6, double_sided=True)
+    mode: AlphaMode = "blend" if mesh.colors is not None and mesh.colors.shape[1] == 4 else "opaque"
+    return Material(
+        name, base_color=plain, base_color_texture=texture, roughness=0.6, alpha_mode=mode, double_sided=True
+    )
 
 
 def _cloud(vertex: Columns, element: Element, name: str, notes: list[str], where: str) -> SceneDescription:
@@ -121,8 +117,7 @@ def _cloud(vertex: Columns, element: Element, name: str, notes: list[str], where
         notes = [*notes, f"of {len(points)} points one in {step} is drawn"]
         thin = thinned(thin, step)
     meshes, width = draw_cloud([thin])
-    plain = (0.7, 0.7, 0.7) if colors is None else (1.0, 1.0, 1.0)
-    material = Material(name, base_color=plain, roughness=0.6, double_sided=True, unlit=colors is not None)
+    material = replace(_material(name, None, thin), unlit=colors is not None)
     instances = [Instance(number, np.eye(4)) for number in range(len(meshes))]
     return SceneDescription(name, meshes, [material], instances, notes=[*notes, width.note])
 
@@ -137,175 +132,18 @@ def _check_finite(positions: Numbers, where: str) -> None:
         )
 
 
-def _read_body(data: bytes, header: Header, where: str) -> dict[str, Columns]:
-    columns: dict[str, Columns] = {}
-    position = header.end
-    lines: list[bytes] = []
-    if header.order is None:
-        lines = _text_rows(data[header.end :])
-        position = 0
-    for element in header.elements:
-        if header.order is None:
-            rows = lines[position : position + element.count]
-            if len(rows) < element.count:
-                raise _cut_short(element, len(rows), where)
-            columns[element.name] = _text_columns(element, rows, where)
-            position += element.count
-        else:
-            columns[element.name], position = _binary_columns(element, data, position, header.order, where)
-    return columns
-
-
-def _text_rows(body: bytes) -> list[bytes]:
-    """The lines of numbers, without empty ones and remarks."""
-    if b"#" in body or b"comment" in body:
-        body = _REMARK.sub(b"", body)
-    return [line for line in body.split(b"\n") if line.strip()]
-
-
-def _cut_short(element: Element, count: int, where: str) -> SceneError:
-    return SceneError(
-        f"ends after {count} of {element.count} entries of '{element.name}'", where=where, fix="is it cut short?"
-    )
-
-
-def _text_columns(element: Element, rows: list[bytes], where: str) -> Columns:
-    try:
-        table = [[float(word) for word in row.split()] for row in rows]
-    except ValueError as error:
-        raise SceneError(f"element '{element.name}': {error}", where=where, rule="numbers only") from None
-    scalars: dict[str, list[float]] = {each.name: [] for each in element.properties if each.count_type is None}
-    lists: dict[str, tuple[list[float], list[int]]] = {
-        each.name: ([], []) for each in element.properties if each.count_type is not None
-    }
-    for number, row in enumerate(table):
-        place = 0
-        for each in element.properties:
-            if place >= len(row):
-                raise _short_row(element, number, where)
-            if each.count_type is None:
-                scalars[each.name].append(row[place])
-                place += 1
-                continue
-            size = int(row[place]) if np.isfinite(row[place]) else -1
-            if size < 0 or place + 1 + size > len(row):
-                raise _short_row(element, number, where)
-            values, sizes = lists[each.name]
-            values.extend(row[place + 1 : place + 1 + size])
-            sizes.append(size)
-            place += 1 + size
-    columns: dict[str, Numbers | _Lists] = {name: np.array(values) for name, values in scalars.items()}
-    columns |= {name: _Lists(np.array(values), np.array(sizes, int)) for name, (values, sizes) in lists.items()}
-    return columns
-
-
-def _short_row(element: Element, number: int, where: str) -> SceneError:
-    return SceneError(
-        f"entry {number} of '{element.name}' has too few numbers", where=where, fix="is the file cut short?"
-    )
-
-
-@np.errstate(invalid="ignore")  # of damaged floats, which are looked at where they are used
-def _binary_columns(element: Element, data: bytes, start: int, order: str, where: str) -> tuple[Columns, int]:
-    """The element's columns and where the next element begins."""
-    if not element.properties or element.count == 0:
-        return {}, start
-    first = _sizes_at(element, data, start, order, where)
-    kinds: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
-    for number, each in enumerate(element.properties):
-        if each.count_type is not None:
-            kinds.append((f"count {number}", order + each.count_type))
-            kinds.append((f"{number}", order + each.type, (first[number],)))
-        else:
-            kinds.append((f"{number}", order + each.type))
-    row = np.dtype(kinds)
-    fits = start + element.count * row.itemsize <= len(data)
-    if fits:
-        table = np.frombuffer(data, row, element.count, start)
-        if all((table[f"count {number}"] == size).all() for number, size in first.items()):
-            columns: dict[str, Numbers | _Lists] = {}
-            for number, each in enumerate(element.properties):
-                values = table[f"{number}"].astype(np.float64)
-                if each.count_type is None:
-                    columns[each.name] = values
-                else:
-                    columns[each.name] = _Lists(values.ravel(), np.full(element.count, first[number]))
-            return columns, start + element.count * row.itemsize
-    elif not first:
-        raise _cut_short(element, (len(data) - start) // row.itemsize, where)
-    return _mixed_columns(element, data, start, order, where)
-
-
-def _sizes_at(element: Element, data: bytes, start: int, order: str, where: str) -> dict[int, int]:
-    """The size of each list of the entry at ``start``, by the number of its property."""
-    sizes: dict[int, int] = {}
-    place = start
-    for number, each in enumerate(element.properties):
-        if each.count_type is not None:
-            kind = np.dtype(order + each.count_type)
-            if place + kind.itemsize > len(data):
-                raise _cut_short(element, 0, where)
-            sizes[number] = int(np.frombuffer(data, kind, 1, place)[0])
-            if sizes[number] < 0:
-                raise SceneError(f"a list of {sizes[number]} numbers in '{element.name}'", where=where)
-            place += kind.itemsize + sizes[number] * np.dtype(each.type).itemsize
-        else:
-            place += np.dtype(each.type).itemsize
-    if place > len(data):
-        raise _cut_short(element, 0, where)
-    return sizes
-
-
-def _mixed_columns(element: Element, data: bytes, start: int, order: str, where: str) -> tuple[Columns, int]:
-    """Entries of different lengths: one after the other to find their places, then each column in one go."""
-    endian = "little" if order == "<" else "big"
-    shapes = [
-        (
-            np.dtype(each.count_type).itemsize if each.count_type is not None else 0,
-            each.count_type is not None and each.count_type[0] == "i",
-            np.dtype(each.type).itemsize,
-        )
-        for each in element.properties
-    ]
-    starts: list[list[int]] = [[] for _ in shapes]
-    sizes: list[list[int]] = [[] for _ in shapes]
-    place = start
-    for entry in range(element.count):
-        for number, (count_bytes, signed, item_bytes) in enumerate(shapes):
-            size = 1
-            if count_bytes:
-                size = int.from_bytes(data[place : place + count_bytes], endian, signed=signed)  # type: ignore[arg-type]
-                place += count_bytes
-            starts[number].append(place)
-            sizes[number].append(size)
-            place += size * item_bytes
-            if place > len(data) or size < 0:
-                raise _cut_short(element, entry, where)
-    buffer = np.frombuffer(data, np.uint8)
-    columns: dict[str, Numbers | _Lists] = {}
-    for number, each in enumerate(element.properties):
-        size_of = np.array(sizes[number])
-        item = np.dtype(order + each.type)
-        within = np.arange(size_of.sum()) - np.repeat(np.cumsum(size_of) - size_of, size_of)
-        offsets = np.repeat(np.array(starts[number]), size_of) + within * item.itemsize
-        raw = buffer[offsets[:, None] + np.arange(item.itemsize)]
-        values = np.ascontiguousarray(raw).view(item).ravel().astype(np.float64)
-        columns[each.name] = values if each.count_type is None else _Lists(values, size_of)
-    return columns, place
-
-
-def _outline(columns: Mapping[str, Columns], where: str) -> _Lists:
+def _outline(columns: Mapping[str, Columns], where: str) -> Lists:
     for name in ("vertex_indices", "vertex_index"):
         outline = columns.get("face", {}).get(name)
-        if isinstance(outline, _Lists):
+        if isinstance(outline, Lists):
             return outline
         strips = columns.get("tristrips", {}).get(name)
-        if isinstance(strips, _Lists):
+        if isinstance(strips, Lists):
             return _triangles_of_strips(strips)
-    return _Lists(np.zeros(0), np.zeros(0, np.int64))
+    return Lists(np.zeros(0), np.zeros(0, np.int64))
 
 
-def _triangles_of_strips(strips: _Lists) -> _Lists:
+def _triangles_of_strips(strips: Lists) -> Lists:
     """Triangles of strips; -1 begins a strip anew, and every second triangle turns the other way round."""
     values = strips.values
     order = np.arange(len(values))
@@ -321,12 +159,12 @@ def _triangles_of_strips(strips: _Lists) -> _Lists:
     corners = np.stack([values[last - 2], values[last - 1], values[last]], axis=1)
     corners[odd] = corners[odd][:, [1, 0, 2]]
     proper = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
-    return _Lists(corners[proper].ravel(), np.full(int(proper.sum()), 3, np.int64))
+    return Lists(corners[proper].ravel(), np.full(int(proper.sum()), 3, np.int64))
 
 
 @np.errstate(over="ignore")  # of normals and coordinates of textures
 def _mesh(
-    columns: Mapping[str, Columns], elements: Mapping[str, Element], outline: _Lists, name: str, where: str
+    columns: Mapping[str, Columns], elements: Mapping[str, Element], outline: Lists, name: str, where: str
 ) -> tuple[Mesh, Integers]:
     """The triangles, and of each the number of its face."""
     vertex = {key: column for key, column in columns["vertex"].items() if isinstance(column, np.ndarray)}
@@ -375,24 +213,33 @@ def _stack(columns: Mapping[str, Numbers], names: tuple[str, ...]) -> Numbers | 
     return np.stack([columns[name] for name in names], axis=-1) if columns.keys() >= set(names) else None
 
 
-def _corner_uvs(face: Columns, outline: _Lists, keep: NDArray[np.bool_]) -> Numbers | None:
+def _corner_uvs(face: Columns, outline: Lists, keep: NDArray[np.bool_]) -> Numbers | None:
     """uvs ``(corners, 2)`` of the faces in ``keep``, where the file gives one pair per corner."""
     texcoords = face.get("texcoord")
-    if not isinstance(texcoords, _Lists) or not (texcoords.sizes == 2 * outline.sizes).all():
+    if not isinstance(texcoords, Lists) or not (texcoords.sizes == 2 * outline.sizes).all():
         return None
     return texcoords.values.reshape(-1, 2)[np.repeat(keep, outline.sizes)]
 
 
 def _colors(columns: Columns, element: Element) -> NDArray[np.float32] | None:
-    """Linear RGB(A)."""
-    scalars = {each.name: each for each in element.properties if each.count_type is None}
-    known = next((names for names in _COLOR_NAMES if scalars.keys() >= set(names[:3])), ())
-    names = [name for name in known if name in scalars]
+    """Linear RGB; RGBA where something is transparent. An alpha of 0 throughout says nothing."""
+    names = _color_names(element)
     if not names:
         return None
-    values = np.stack([np.asarray(columns[name]) / scalars[name].brightest for name in names], axis=-1)
-    values = np.clip(np.nan_to_num(values), 0.0, 1.0)
-    return np.concatenate([decode_srgb(values[:, :3]), values[:, 3:]], axis=1).astype(np.float32)
+    brightest = {each.name: each.brightest for each in element.properties}
+    values = np.stack([np.asarray(columns[name]) / brightest[name] for name in names], axis=-1)
+    values = np.clip(np.nan_to_num(values) / full_brightness(values), 0.0, 1.0)
+    alpha = values[:, 3:]
+    if not (alpha.any() and (alpha < 1.0).any()):
+        alpha = alpha[:, :0]
+    return np.concatenate([decode_srgb(values[:, :3]), alpha], axis=1).astype(np.float32)
+
+
+def _color_names(element: Element) -> list[str]:
+    """The properties that are its colour, alpha last; none where it has no colour."""
+    scalars = {each.name for each in element.properties if each.count_type is None}
+    known = next((names for names in _COLOR_NAMES if scalars.issuperset(names[:3])), ())
+    return [name for name in known if name in scalars]
 
 
 def _unit(normals: Numbers | None) -> NDArray[np.float32] | None:

@@ -76,6 +76,21 @@ def test_plain_colours_in_place_of_coefficients(tmp_path, kind, full):
     np.testing.assert_allclose(splats.rotations, [[0.5, 0.5, 0.5, 0.5]], atol=1e-6)
 
 
+def test_a_filter_widens_splats_and_thins_them(tmp_path):
+    """Mip-Splatting, equation 8: variances add up, opacity is multiplied by the root of the ratio of determinants."""
+    scene = load_scene(write(tmp_path / "a.ply", [*NAMES, "filter_3D"], [*ROW, 0.2])).description
+    plain = np.exp([-1.0, -2.0, -3.0])
+    wide = np.sqrt(plain**2 + 0.2**2)
+    assert scene.splats.scales[0] == pytest.approx(wide, rel=1e-6)
+    assert scene.splats.opacities[0] == pytest.approx(0.5 * plain.prod() / wide.prod(), rel=1e-6)
+
+
+def test_what_else_splats_have_is_named(tmp_path):
+    path = write(tmp_path / "a.ply", [*NAMES, "nx", "trbf_center", "motion_0"], [*ROW, 0, 1, 2])
+    assert "of splats not shown: motion_0, trbf_center" in load_scene(path).notes
+    assert not any("not shown" in note for note in load_scene(write(path)).notes)
+
+
 @pytest.mark.parametrize(
     ("left_out", "said"),
     [

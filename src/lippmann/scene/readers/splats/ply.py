@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.ply_header import Element, Header
+from lippmann.scene.parsing.vertex_colors import full_brightness
 from lippmann.scene.readers.splats.activation import (
     MOST_SMALL,
     SH_0,
@@ -33,6 +34,10 @@ _TRAINED = ("x", "y", "z", "opacity", "scale_0", "scale_1", "rot_0", "rot_1", "r
 _THIRD_SCALE = "scale_2"
 _DC = ("f_dc_0", "f_dc_1", "f_dc_2")
 _RGB = ("red", "green", "blue")
+#: The standard deviation of the filter by which Mip-Splatting (Yu et al. 2024) widens each splat.
+_FILTER = "filter_3D"
+#: Properties that change no picture: normals, which trainers write as 0.
+_UNUSED = ("nx", "ny", "nz")
 _PACKED = {"packed_position", "packed_rotation", "packed_scale", "packed_color"}
 
 _CHUNK = 256
@@ -163,21 +168,37 @@ def _trained(rows: Rows, element: Element, where: str) -> tuple[Splats, tuple[st
     log_scales = np.full((len(rows), 3), -np.inf, np.float32)
     known = 3 if _THIRD_SCALE in names else 2
     log_scales[:, :known] = _floats(rows, [f"scale_{axis}" for axis in range(known)])
-    return activated(
+    opacities = sigmoid(_floats(rows, ["opacity"])[:, 0])
+    if _FILTER in names:
+        log_scales, opacities = _filtered(log_scales, opacities, _floats(rows, [_FILTER]))
+    splats, notes = activated(
         _floats(rows, ["x", "y", "z"]),
         log_scales,
         _floats(rows, ["rot_1", "rot_2", "rot_3", "rot_0"]),
-        sigmoid(_floats(rows, ["opacity"])[:, 0]),
+        opacities,
         harmonics,
         where=where,
     )
+    unread = sorted(name[:40] for name in names - {*_TRAINED, _THIRD_SCALE, *_DC, *_RGB, _FILTER, *_UNUSED})
+    unread = [name for name in unread if not name.startswith("f_rest_")]
+    return splats, (*notes, *([f"of splats not shown: {', '.join(unread[:20])}"] if unread else []))
+
+
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of damaged numbers, which are left out
+def _filtered(log_scales: FloatArray, opacities: FloatArray, widths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Splats convolved with a Gaussian: variances add up, and opacities fall as volumes grow (Mip-Splatting, 4.1)."""
+    variances = np.exp(2.0 * log_scales.astype(np.float64))
+    wide = variances + np.square(widths.astype(np.float64))
+    shares = np.sqrt((variances / np.where(wide > 0.0, wide, 1.0)).prod(axis=1))
+    return (0.5 * np.log(wide)).astype(np.float32), (opacities * shares).astype(np.float32)
 
 
 def _coefficients_of_colors(rows: Rows, element: Element) -> FloatArray:
     """Coefficients of degree 0 of sRGB colours."""
     brightest = {each.name: each.brightest for each in element.properties}
     tops = np.array([brightest[name] for name in _RGB], np.float32)
-    return (_floats(rows, list(_RGB)) / tops - np.float32(0.5)) / np.float32(SH_0)
+    colors = _floats(rows, list(_RGB)) / tops
+    return (colors / np.float32(full_brightness(colors)) - np.float32(0.5)) / np.float32(SH_0)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of damaged bounds, whose splats are left out
