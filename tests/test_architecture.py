@@ -28,6 +28,7 @@ ORDER = (
     "color",
     "runtime",
     "display",
+    "optics",
     "display.formats",
     "codecs",
     "scene.values",

@@ -25,7 +25,9 @@ from lippmann.display.array_ops import NUMPY, Array, ArrayOps
 from lippmann.display.lattice import Lattice
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_grid import WHOLE_TOLERANCE, LensGrid, lattice_in_front_of
+from lippmann.display.lens_profile import LensProfile
 from lippmann.display.panel import Panel
+from lippmann.display.pixel_aperture import PixelAperture
 from lippmann.display.sheet import Sheet
 from lippmann.display.validation import Table, check_keys, check_text, number, positive
 from lippmann.errors import DisplayError
@@ -37,6 +39,13 @@ from lippmann.wording import html_table
 INFINITE = "infinite"
 
 Vector = tuple[Array, Array, Array]
+
+#: Tables of a display that may be left out.
+OPTIONAL_TABLES: dict[str, type[Sheet] | type[LensProfile] | type[PixelAperture]] = {
+    "sheet": Sheet,
+    "lens": LensProfile,
+    "pixel": PixelAperture,
+}
 
 #: A scene point is resolved while it spreads over at most one lens pitch, or over so small a share of the panel's
 #: shorter side: a large panel of fine lenses is sharp to its viewer long after single lenses are not.
@@ -65,6 +74,11 @@ class Display:
         viewing distance. Nothing nearer to the viewer is recorded.
     sheet:
         Bleed, margin and printing of a print; None for displays that are no prints.
+    lens:
+        Profile of the lenses; None for a pinhole at the gap. The gap of a profile is that of
+        :func:`lippmann.optics.fitting.gap_of`.
+    pixel:
+        The part of a sub-pixel that shines; None for the whole of it.
 
     Notes
     -----
@@ -92,6 +106,8 @@ class Display:
     viewing_distance: float = math.inf
     aperture_distance: float = 0.0
     sheet: Sheet | None = None
+    lens: LensProfile | None = None
+    pixel: PixelAperture | None = None
 
     def __post_init__(self) -> None:
         check_text(self.name, "name", empty=False)
@@ -109,6 +125,10 @@ class Display:
         object.__setattr__(self, "aperture_distance", aperture_distance)
         self._check_pixels_per_lens()
         self._check_sheet()
+        if self.lens is not None:
+            self.lens.check(self.lens_array)
+        if self.pixel is not None:
+            self.pixel.lit_size(self.panel)
 
     def _check_sheet(self) -> None:
         if self.sheet is None:
@@ -373,6 +393,7 @@ class Display:
             "field": f"{self.field_of_view:.1f} deg",
             "depth behind/in front": f"{-back:.0f}/{front:.0f} mm",
             "panel": f"{width:.0f}x{height:.0f} mm",
+            **({} if self.lens is None else {"lens": self.lens.in_words()}),
             "title": self.title,
         }
 
@@ -403,7 +424,7 @@ class Display:
                 "offset": None if lenses.offset is None else list(lenses.offset),
                 "row_pitch": lenses.row_pitch,
             },
-            **({} if self.sheet is None else {"sheet": asdict(self.sheet)}),
+            **self._plain_parts,
         }
 
     @staticmethod
@@ -413,8 +434,9 @@ class Display:
         parts: dict[str, Any] = dict(values)  # any type until the constructors have checked them
         parts["panel"] = Panel(**parts["panel"])
         parts["lens_array"] = LensArray(**parts["lens_array"])
-        if "sheet" in parts:
-            parts["sheet"] = Sheet(**parts["sheet"])
+        for name, kind in OPTIONAL_TABLES.items():
+            if name in parts:
+                parts[name] = kind(**parts[name])
         if parts.get("viewing_distance") == INFINITE:
             parts["viewing_distance"] = math.inf
         return Display(**parts)
@@ -424,6 +446,12 @@ class Display:
     @property
     def _plain_viewing_distance(self) -> float | str:
         return INFINITE if math.isinf(self.viewing_distance) else self.viewing_distance
+
+    @property
+    def _plain_parts(self) -> JsonObject:
+        """The tables that are given; without them, earlier versions read the display too."""
+        parts = {name: getattr(self, name) for name in OPTIONAL_TABLES}
+        return {name: asdict(part) for name, part in parts.items() if part is not None}
 
     @property
     def _plain_cells(self) -> JsonObject:
@@ -447,8 +475,9 @@ def check_tables(values: Table) -> None:
     check_keys(values, Display, "")
     check_keys(values["panel"], Panel, "panel")
     check_keys(values["lens_array"], LensArray, "lens_array")
-    if "sheet" in values:
-        check_keys(values["sheet"], Sheet, "sheet")
+    for name, kind in OPTIONAL_TABLES.items():
+        if name in values:
+            check_keys(values[name], kind, name)
 
 
 def _nonzero(value: Array, ops: ArrayOps) -> Array:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.types import Point2f, Ray3f, UInt32
 from lippmann.display import Display
+from lippmann.optics.lens import lens_notes
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.wavefront_plan import make_plan
@@ -193,7 +194,7 @@ def forecast(
         plan=_plan(session, source, window),
         probe={"samples": found.samples, "seconds": found.seconds},
         device=session.engine.gpu_name or f"cpu, {session.engine.threads} threads",
-        notes=(*session.notes, *placement.warnings),
+        notes=(*session.notes, *placement.warnings, *lens_notes(display)),
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.image import IntegralImage
+from lippmann.optics.lens import lens_notes
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.request.choices import REUSING
 from lippmann.rendering.request.plan import resolve
@@ -78,7 +79,7 @@ def render_picture(
             **placed_options(request, placement),
         },
         estimate=traced.estimate,
-        notes=(*placement.warnings, *traced.notes),
+        notes=(*placement.warnings, *lens_notes(display), *traced.notes),
     )
     # Files hold whole numbers of 32 bits.
     maps = {name: v.astype(np.uint32) if v.dtype.kind in "iu" else v for name, v in frame.maps.items()}

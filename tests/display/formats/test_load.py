@@ -65,7 +65,10 @@ def test_presets_are_what_they_say():
         assert panel.field_of_view == pytest.approx(35, abs=0.1)
     assert print_.size_mm == pytest.approx((200, 150), abs=0.02)
     # Seen from 50 cm there are 60 D / (D + g) lenses per inch.
-    assert 25.4 / print_.micro_image_pitch == pytest.approx(60 * 500 / 500.42)
+    assert 25.4 / print_.micro_image_pitch == pytest.approx(60 * 500 / (500 + print_.gap))
+    # A crest at best focus is nearer to its pinhole than thickness / index, 0.42 mm.
+    assert print_.gap == pytest.approx(0.3825, abs=1e-4)
+    assert [display.name for display in list_displays() if display.lens is not None] == ["print-60lpi"]
     assert {d.name for d in list_displays() if covers_whole_pixels(d)} == {
         "mla-hexagonal",
         "mla-square",

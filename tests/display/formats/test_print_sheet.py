@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from lippmann.display import load_display
 from lippmann.display.formats.print_sheet import Print, print_of_texts
 from lippmann.errors import DisplayError
+from lippmann.optics.first_order import extreme_ray_field
+from lippmann.optics.fitting import gap_of
 
 GOOD = {"lpi": "60", "ppi": "720", "size": "200x300mm", "viewing-distance": "500"}
 
@@ -33,7 +35,8 @@ def test_the_example():
 
 def test_the_preset_can_be_said_so():
     preset = load_display("print-60lpi")
-    same = load_display("print:lpi=60,ppi=720,size=200x150mm,thickness=0.6594mm,index=1.57")
+    same = load_display("print:lpi=60,ppi=720,size=200x150mm,thickness=26mil,index=1.57")
+    assert same.lens == preset.lens
     assert same.gap == pytest.approx(preset.gap)
     assert same.panel == preset.panel
     assert same.lens_array == preset.lens_array
@@ -50,9 +53,9 @@ def test_the_preset_can_be_said_so():
 @settings(deadline=None)
 def test_pitches_gaps_and_fields_agree(lpi, distance, field, thickness, measured):
     if thickness:
-        # Thick sheets of fine lenses have no field to speak of.
+        # Thick sheets of fine lenses have no field to speak of, and thin ones no focus on the print.
         field = None
-        assume(5.1 < math.degrees(2 * math.atan(25.4 / lpi / 2 * 1.57 / thickness)) < 149)
+        assume(5.1 < math.degrees(2 * math.atan(25.4 / lpi / 2 * 1.57 / thickness)) < 90)
     stated = {"print_lpi" if measured else "lpi": lpi, "field": field, "thickness": thickness}
     sheet = Print(ppi=20 * lpi, size=(50, 20), viewing_distance=distance, **stated)
     display = sheet.display()
@@ -61,9 +64,32 @@ def test_pitches_gaps_and_fields_agree(lpi, distance, field, thickness, measured
     assert (sheet.pitch_on_print if measured else sheet.pitch_of_sheet) == pytest.approx(lpi)
     assert sheet.pitch_of_sheet == pytest.approx(sheet.pitch_on_print * (1 + display.gap / distance))
     if thickness:
-        assert display.gap == pytest.approx(thickness / 1.57)
+        assert display.gap == pytest.approx(gap_of(display.lens, display.lens_array))
+        # The smaller, the larger a part of its circle a crest is.
+        assert 0.5 < display.gap * 1.57 / thickness < 1.0
     else:
+        assert display.lens is None
         assert display.field_of_view == pytest.approx(field or 54)
+
+
+def test_a_thickness_makes_a_lens():
+    best = print_of_texts({**GOOD, "thickness": "26mil"}).display()
+    assert best.lens.radius == pytest.approx(1.108 * 0.6604 * 0.57 / 1.57, rel=1e-3)
+    stated = print_of_texts({**GOOD, "thickness": "26mil", "radius": "0.3mm", "conic": "-0.4", "blur": "9um"}).display()
+    assert (stated.lens.radius, stated.lens.conic, stated.pixel.blur) == pytest.approx((0.3, -0.4, 0.009))
+    maker = print_of_texts({**GOOD, "thickness": "26mil", "field": "54"}).display()
+    assert extreme_ray_field(maker.lens, 25.4 / 60) == pytest.approx(54)
+    assert best.pixel is None
+
+
+def test_typical_sheets_are_known_by_name():
+    values = {key: text for key, text in GOOD.items() if key != "lpi"}
+    display = print_of_texts({**values, "sheet": "75lpi"}).display()
+    assert display.lens_array.pitch == pytest.approx(25.4 / 75)
+    assert (display.lens.radius, display.lens.thickness, display.lens.index) == (0.2279, 0.5281, 1.6357)
+    measured = print_of_texts({**values, "sheet": "75lpi", "print-lpi": "74.6"})
+    assert measured.pitch_on_print == 74.6
+    assert measured.lens == display.lens
 
 
 def test_lengths_have_units():
@@ -98,7 +124,19 @@ def test_lengths_have_units():
         ({"thickness": "0"}, "thickness", "thickness is 0 mm"),
         ({"thickness": "-1mm"}, "thickness", "thickness is -1 mm"),
         ({"thickness": "26"}, "thickness", "a field of view of 5 to 150 degrees; look at its unit"),
-        ({"thickness": "0.66", "field": "54"}, "thickness", "thickness and field are both given"),
+        ({"thickness": "0.66", "radius": "0.3", "field": "54"}, "radius", "radius and field are both given"),
+        ({"thickness": "0.66", "field": "20"}, "field", "field is 20 degrees; crests on 0.66 mm of index 1.57 have"),
+        ({"thickness": "0.66", "radius": "0.2"}, "radius", "radius is 0.2 mm; lenses 0.4233 mm wide need more than"),
+        ({"thickness": "0.15"}, "thickness", "thickness is 0.15 mm; the crest alone is 0.1532 mm high"),
+        ({"radius": "0.3"}, "radius", "radius is given without a thickness; it means nothing alone"),
+        ({"conic": "-0.4"}, "conic", "conic is given without a thickness"),
+        ({"thickness": "0.66", "conic": "99"}, "conic", "conic is 99; it must lie between -10 and 10"),
+        ({"thickness": "0.66", "index": "2.5"}, "index", "index is 2.5; it must lie between 1.3 and 2; sheets have"),
+        ({"blur": "1mm"}, "blur", "blur is 1 mm; it must not exceed a pixel of 0.03528 mm"),
+        ({"blur": "-1um"}, "blur", "blur is -0.001 mm"),
+        ({"sheet": "60lpi", "lpi": None}, "sheet", "unknown sheet '60lpi'"),
+        ({"sheet": "50lpi"}, "lpi", "sheet and lpi are both given; a typical sheet has its own"),
+        ({"sheet": "50lpi", "lpi": None, "radius": "1"}, "radius", "sheet and radius are both given"),
         ({"index": "1.5"}, "index", "index is given without a thickness"),
         ({"thickness": "0.66", "index": "0"}, "index", "index is 0"),
         ({"field": "0"}, "field", "field is 0"),
@@ -110,7 +148,7 @@ def test_lengths_have_units():
 )
 def test_nonsense_is_refused(texts, where, said):
     with pytest.raises(DisplayError) as caught:
-        print_of_texts({**GOOD, **texts})
+        print_of_texts({key: text for key, text in {**GOOD, **texts}.items() if text is not None}).display()
     assert caught.value.where == where
     assert said in str(caught.value)
 
@@ -121,7 +159,7 @@ def test_what_is_missing_is_named(missing):
         print_of_texts({key: text for key, text in GOOD.items() if key != missing})
 
 
-@given(st.dictionaries(st.sampled_from([*GOOD, "thickness", "index", "field"]), st.text(max_size=8)))
+@given(st.dictionaries(st.sampled_from([*GOOD, "thickness", "index", "field", "radius", "blur"]), st.text(max_size=8)))
 @settings(deadline=None)
 def test_whatever_is_typed_is_a_print_or_refused(texts):
     with suppress(DisplayError):

@@ -20,6 +20,9 @@ A file holds the keys of :class:`Display`, with the tables ``[panel]`` and ``[le
 
 A file without a ``name`` has its own, less the ending.
 
+Tables ``[lens]`` and ``[pixel]`` describe a real lens, in place of the gap, and the part of a sub-pixel that shines,
+see :mod:`lippmann.display.formats.lens_tables`.
+
 A slanted monitor may be given by pitch, slope and centre instead, see :mod:`lippmann.display.formats.monitor_toml`. A
 JSON file is the calibration of a Looking Glass, see :mod:`lippmann.display.formats.looking_glass`. Prints and monitors
 also have short forms, see :mod:`lippmann.display.formats.inline_spec`.
@@ -37,9 +40,9 @@ from pathlib import Path
 
 from lippmann.display.display import INFINITE, Display, check_tables
 from lippmann.display.formats.inline_spec import display_of_short_form, is_short_form
+from lippmann.display.formats.lens_tables import aperture_of_table, monitor_display, with_profile
 from lippmann.display.formats.looking_glass import display_of_calibration, is_calibration
 from lippmann.display.formats.monitor_toml import TABLE as MONITOR
-from lippmann.display.formats.monitor_toml import monitor_of_tables
 from lippmann.display.formats.recorded_depth import default_aperture
 from lippmann.display.units import MILLIMETRES, length, stripe
 from lippmann.display.validation import Arguments, positive
@@ -147,9 +150,15 @@ def _from_toml(text: str, *, where: str, stem: str) -> Display:
     try:
         values = {"name": stem, **values}
         if MONITOR in values:
-            return monitor_of_tables(values).display()
-        check_tables(values)
-        display = Display.from_dict(_convert_tables(values))
+            return monitor_display(values)
+        lens, pixel = values.pop("lens", None), values.pop("pixel", None)
+        check_tables(values if lens is None else {"gap": None, **values})
+        parts = _convert_tables(values)
+        if lens is not None:
+            parts = with_profile({**parts, "lens": lens})
+        display = Display.from_dict(parts)
+        if pixel is not None:
+            display = replace(display, pixel=aperture_of_table(pixel, display.panel.pixel_pitch))
         return display if "aperture_distance" in values else _with_aperture(display)
     except DisplayError as error:
         place = _locate(text, error.where, where)

@@ -5,41 +5,46 @@ the lens centres, must be a little wider than the lenses, p (D + g) / D: the pri
 ``lpi D / (D + g)``. Sheets differ from their nominal number by more than that, so a pitch test is printed: the strip
 that stands still from D is labelled with the print pitch itself.
 
-The gap is the air-equivalent depth of the lenses. A ray through the middle of a lens is broken at its surface; for
-small angles the print seems to lie at thickness / index. Makers state either the thickness or the field of view F, the
-angle from one flip of the picture to the next: tan(F / 2) = p (D + g) / (2 D g).
+Makers state the thickness or the field of view F, the angle from one flip of the picture to the next, or both. A
+thickness makes a real lens: with a crest radius that is stated, or that has this field, or that focuses best. A field
+alone makes pinholes at the gap of tan(F / 2) = p (D + g) / (2 D g). Typical sheets are known by name.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import cast
 
 from lippmann.display import units
 from lippmann.display.display import INFINITE, Display
 from lippmann.display.formats.recorded_depth import default_aperture
+from lippmann.display.formats.typical_sheets import TypicalSheet, typical_sheet
 from lippmann.display.lens_array import LensArray
+from lippmann.display.lens_profile import DEFAULT_INDEX, LensProfile, check_index
 from lippmann.display.panel import Panel
+from lippmann.display.pixel_aperture import PixelAperture
 from lippmann.display.sheet import Sheet
 from lippmann.display.validation import MAXIMUM_COUNT, finite, number, refuse_unknown
 from lippmann.errors import DisplayError
+from lippmann.runtime.cached_property import cached_property
 
 #: Keys of the short form of a print.
-KEYS = ("lpi", "print-lpi", "ppi", "size", "viewing-distance", "thickness", "index", "field")
+KEYS = (
+    *("lpi", "print-lpi", "ppi", "size", "viewing-distance"),
+    *("thickness", "index", "field", "radius", "conic", "blur", "sheet"),
+)
 
-_NUMBERS = ("lpi", "print-lpi", "ppi", "index", "field")
+_NUMBERS = ("lpi", "print-lpi", "ppi", "index", "field", "conic")
+_LENGTHS = ("thickness", "radius", "blur")
 
 #: Lenses and pixels per inch, far beyond any that are made.
 _LPI = (1.0, 1000.0)
 _PPI = (10.0, 20_000.0)
 
-_INDICES = (1.0, 3.0)
 _FIELDS = (5.0, 150.0)
-
-#: A refractive index of the plastics that sheets are made of: PETG and APET have about 1.57, acrylic has 1.49.
-DEFAULT_INDEX = 1.57
 
 #: Degrees; makers state some 25 (for depth) to 60 (for flips).
 DEFAULT_FIELD = 54.0
@@ -68,10 +73,17 @@ class Print:
     viewing_distance:
         Millimetres from the sheet to the eye, at least 10; ``math.inf`` is allowed.
     thickness, index:
-        Of the sheet, in millimetres, and its refractive index, 1 to 3.
+        Of the sheet, in millimetres, and its refractive index, 1.3 to 2.
     field:
-        Angle in degrees from one flip of the picture to the next, 5 to 150; instead of a thickness. With neither it is
-        54 degrees.
+        Angle in degrees from one flip of the picture to the next, 5 to 150. Without a thickness it is 54 degrees.
+    radius, conic:
+        Crest radius in millimetres and conic constant of the lenses. Without a radius the crest is the one that has
+        the field, or that focuses best.
+    blur:
+        Standard deviation of the blur of ink in millimetres.
+    sheet:
+        Name of a typical sheet, such as ``75lpi``, see :mod:`~lippmann.display.formats.typical_sheets`; in place of
+        its pitch, thickness, index and crest radius.
 
     Raises
     ------
@@ -87,8 +99,14 @@ class Print:
     thickness: float | None = None
     index: float | None = None
     field: float | None = None
+    radius: float | None = None
+    conic: float | None = None
+    blur: float = 0.0
+    sheet: str | None = None
 
     def __post_init__(self) -> None:
+        if self.sheet is not None:
+            self._take_sheet(typical_sheet(self.sheet))
         self._check_choices()
         _check(self._stated_lpi, "lpi" if self.print_lpi is None else "print_lpi", _LPI, "lenses per inch")
         _check(self.ppi, "ppi", _PPI, "pixels per inch")
@@ -97,10 +115,9 @@ class Print:
             raise DisplayError(f"viewing_distance is {self.viewing_distance:g} mm", where="viewing_distance", rule=rule)
         if self.field is not None:
             _check(self.field, "field", _FIELDS, "degrees")
-        if self.index is not None:
-            _check(self.index, "index", _INDICES, "")
         if self.thickness is not None:
             self._check_thickness(self.thickness)
+            _ = self._lens_and_gap
         elif 4 * self._parallel_gap > self.viewing_distance:
             rule = f"lenses of {self._stated_lpi:g} lpi and this field are {self._parallel_gap:.3g} mm deep"
             what, fix = f"viewing_distance is {self.viewing_distance:g} mm", "look from farther away"
@@ -108,23 +125,39 @@ class Print:
         for side in self.size:
             self._check_side(side)
         self._check_pixels_per_lens()
+        _ = self.pixel
 
     def _check_choices(self) -> None:
         if self.lpi is None and self.print_lpi is None:
             rule = "the lenses per inch of the sheet, or print_lpi as a pitch test found it, must be given"
             raise DisplayError("lpi is missing", where="lpi", rule=rule)
-        pairs = (("print_lpi", "lpi", "a pitch test's print_lpi takes its place"), ("thickness", "field", ""))
+        pairs = (
+            ("print_lpi", "lpi", "a pitch test's print_lpi takes its place"),
+            ("radius", "field", "the crest radius of a sheet gives its field of view"),
+        )
         for one, other, rule in pairs:
             if getattr(self, one) is not None and getattr(self, other) is not None:
-                rule = rule or "the thickness of a sheet gives its field of view"
                 raise DisplayError(f"{one} and {other} are both given", where=one, rule=rule, fix="leave one out")
-        if self.index is not None and self.thickness is None:
-            raise DisplayError("index is given without a thickness", where="index", rule="it means nothing alone")
+        for name in ("index", "radius", "conic"):
+            if getattr(self, name) is not None and self.thickness is None:
+                rule = "it means nothing alone: without a thickness the print has no lens"
+                raise DisplayError(f"{name} is given without a thickness", where=name, rule=rule)
+
+    def _take_sheet(self, sheet: TypicalSheet) -> None:
+        """Take the values of a typical sheet, of which a pitch test may have measured the pitch."""
+        for name in ("lpi", "thickness", "index", "field", "radius", "conic"):
+            if getattr(self, name) is not None:
+                rule, fix = "a typical sheet has its own", "leave one out"
+                raise DisplayError(f"sheet and {name} are both given", where=name, rule=rule, fix=fix)
+        if self.print_lpi is None:
+            object.__setattr__(self, "lpi", sheet.lpi)
+        for name in ("thickness", "index", "radius"):
+            object.__setattr__(self, name, getattr(sheet, name))
 
     def _check_thickness(self, thickness: float) -> None:
-        field = 0.0
+        field, index = 0.0, check_index(DEFAULT_INDEX if self.index is None else self.index, "index")
         if finite(thickness, "thickness") > 0:
-            field = math.degrees(2 * math.atan(units.INCH / self._stated_lpi / 2 / self.gap))
+            field = math.degrees(2 * math.atan(units.INCH / self._stated_lpi / 2 * index / thickness))
         if not _FIELDS[0] <= field <= _FIELDS[1]:
             rule = f"such lenses must have a field of view of {_FIELDS[0]:g} to {_FIELDS[1]:g} degrees"
             fix = "look at its unit"
@@ -156,11 +189,49 @@ class Print:
     def gap(self) -> float:
         """Air-equivalent distance from the print to the lens centres in millimetres."""
         if self.thickness is not None:
-            return self.thickness / (DEFAULT_INDEX if self.index is None else self.index)
+            return self._lens_and_gap[1]
         if self.lpi is None:
             return self._parallel_gap
         # The field is that of the micro-images, which are wider than the lenses.
         return self._parallel_gap / (1 - self._parallel_gap / self.viewing_distance)
+
+    @property
+    def lens(self) -> LensProfile | None:
+        """Profile of the lenses; None where no thickness is known."""
+        return None if self.thickness is None else self._lens_and_gap[0]
+
+    @property
+    def pixel(self) -> PixelAperture | None:
+        """Aperture of the pixels; None without a blur of ink."""
+        if not self.blur:
+            return None
+        with _own_keys():
+            aperture = PixelAperture(blur=self.blur)
+            aperture.lit_size(Panel(1, 1, units.INCH / self.ppi))
+        return aperture
+
+    @cached_property
+    def _lens_and_gap(self) -> tuple[LensProfile, float]:
+        from lippmann.optics.fitting import fit_profile, gap_of, profile_behind
+
+        def profile(pitch: float) -> LensProfile:
+            index = DEFAULT_INDEX if self.index is None else self.index
+            return fit_profile(
+                LensArray("lenticular", pitch),
+                thickness=cast(float, self.thickness),
+                index=index,
+                radius=self.radius,
+                field=self.field,
+                conic=0.0 if self.conic is None else self.conic,
+            )
+
+        stated = units.INCH / self._stated_lpi
+        with _own_keys():
+            if self.lpi is None:
+                lens, _, gap = profile_behind(profile, stated, self.viewing_distance)
+                return lens, gap
+            lens = profile(stated)
+            return lens, gap_of(lens, LensArray("lenticular", stated))
 
     @property
     def pitch_on_print(self) -> float:
@@ -199,6 +270,8 @@ class Print:
             viewing_distance=distance,
             aperture_distance=default_aperture(distance, lens_pitch=lens_pitch, gap=gap, pixel_pitch=pixel),
             sheet=Sheet(),
+            lens=self.lens,
+            pixel=self.pixel,
         )
 
 
@@ -206,7 +279,8 @@ def print_of_texts(texts: Mapping[str, str]) -> Print:
     """The print of options as people write them.
 
     Keys are ``lpi`` or ``print-lpi``, ``ppi``, ``size`` (``200x300mm``), and, if wanted, ``viewing-distance``
-    (``500``, ``50cm`` or ``infinite``), ``thickness`` (``0.66mm``, ``26mil``), ``index``, ``field`` (degrees).
+    (``500``, ``50cm`` or ``infinite``), ``thickness`` (``0.66mm``, ``26mil``), ``index``, ``field`` (degrees),
+    ``radius`` and ``conic`` of the crest, ``blur`` of ink (``12um``), ``sheet`` (``75lpi``).
 
     Raises
     ------
@@ -218,15 +292,24 @@ def print_of_texts(texts: Mapping[str, str]) -> Print:
         if key not in texts:
             raise DisplayError(f"{key} is missing", where=key, rule="a print needs lpi (or print-lpi), ppi and size")
     numbers = {key: units.plain_number(texts[key], key) for key in _NUMBERS if key in texts}
-    lengths = {key: units.length(texts[key], key) for key in ("thickness",) if key in texts}
+    lengths = {key: units.length(texts[key], key) for key in _LENGTHS if key in texts}
     distance = texts.get("viewing-distance", str(DEFAULT_DISTANCE))
     lengths["viewing-distance"] = math.inf if distance == INFINITE else units.length(distance, "viewing-distance")
     values = {key.replace("-", "_"): value for key, value in (numbers | lengths).items()}
     try:
-        return Print(size=units.size(texts["size"], "size"), **values)
+        return Print(size=units.size(texts["size"], "size"), sheet=texts.get("sheet"), **values)
     except DisplayError as error:
         where = error.where.replace("_", "-")
         raise DisplayError(error.what, where=where, rule=error.rule, fix=error.fix) from None
+
+
+@contextmanager
+def _own_keys() -> Iterator[None]:
+    """Errors of the tables of a display name the keys of a print, which has no tables."""
+    try:
+        yield
+    except DisplayError as error:
+        raise DisplayError(error.what, where=error.where.rpartition(".")[2], rule=error.rule, fix=error.fix) from None
 
 
 def _check(value: object, key: str, limits: tuple[float, float], unit: str) -> None:

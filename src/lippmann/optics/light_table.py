@@ -1,0 +1,159 @@
+"""Light tables: the share of the light that leaves a lens in a direction and comes from a place of the panel.
+
+The share of a flat, perfectly clear sheet is 1 in all: what a row lacks is reflected, or lies beyond the places.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lippmann.optics.lens import Lens, Real
+from lippmann.optics.trace import Traced, trace
+
+#: Rays through a cylinder, and rows and columns of rays through a micro-lens.
+_LINE_RAYS, _SQUARE_RAYS = 512, 96
+
+#: Places of a table across one lens.
+PLACES_PER_LENS = 96
+
+#: Lenses to both sides of the own one whose places a table holds.
+_NEIGHBOURS = 1
+
+
+@dataclass(frozen=True)
+class LightTable:
+    """Shares of light by direction and place.
+
+    Attributes
+    ----------
+    slopes:
+        ``(directions, 2)`` slopes x and y of the directions.
+    edges:
+        ``(places + 1,)`` edges of the places in mm, relative to the lens's axis; of rows (upwards) as of columns.
+    shares:
+        ``(directions, places)`` across the lens; what a micro-lens shows is summed up along y.
+    squares:
+        ``(directions, rows, columns)`` of a micro-lens; None of a cylinder.
+    """
+
+    slopes: Real
+    edges: Real
+    shares: Real
+    squares: Real | None = None
+
+    @property
+    def places(self) -> Real:
+        """Centres of the places in millimetres."""
+        return 0.5 * (self.edges[1:] + self.edges[:-1])
+
+    @property
+    def light(self) -> Real:
+        """Share of light of each direction that comes from these places."""
+        light: Real = self.shares.sum(axis=1)
+        return light
+
+    @property
+    def mean_places(self) -> Real:
+        """Centre of the light of each direction, in mm; NaN where there is none."""
+        with np.errstate(invalid="ignore"):
+            mean: Real = self.shares @ self.places / self.light
+        return mean
+
+    def widths(self, share: float = 0.8) -> Real:
+        """The point spread by direction: width in mm that holds so much of the light, with equal tails cut off."""
+        sums = np.concatenate([np.zeros((len(self.shares), 1)), np.cumsum(self.shares, axis=1)], axis=1)
+        ends = [np.interp(np.array([0.5 - 0.5 * share, 0.5 + 0.5 * share]) * row[-1], row, self.edges) for row in sums]
+        return np.array([high - low for low, high in ends])
+
+
+def light_table(
+    lens: Lens,
+    slopes: ArrayLike,
+    along: float = 0.0,
+    *,
+    places_per_lens: int = PLACES_PER_LENS,
+    neighbours: int = _NEIGHBOURS,
+) -> LightTable:
+    """The light table of a lens in directions of these slopes across it, and one slope along it.
+
+    Parameters
+    ----------
+    slopes:
+        One slope or an array of them: the tangents of angles.
+    places_per_lens:
+        Places across one lens.
+    neighbours:
+        Lenses to both sides of the own one whose places the table has.
+    """
+    directions, edges = _frame(lens, slopes, along, places_per_lens, neighbours)
+    from lippmann.optics.trace_kernel import fill_lines, fill_squares
+
+    first, step = float(edges[0]), float(edges[1] - edges[0])
+    places = len(edges) - 1
+    if lens.is_cylinder:
+        table = np.zeros((len(directions), places))
+        fill_lines(directions, _nodes(lens), _shape(lens), lens.crests, first, step, table)
+        return LightTable(directions, edges, table)
+    squares = np.zeros((len(directions), places, places))
+    x, y = lens.samples(_SQUARE_RAYS)
+    fill_squares(directions, x, y, _shape(lens), lens.crests, first, step, squares)
+    return LightTable(directions, edges, squares.sum(axis=1), squares)
+
+
+def readable_light_table(
+    lens: Lens,
+    slopes: ArrayLike,
+    along: float = 0.0,
+    *,
+    places_per_lens: int = PLACES_PER_LENS,
+    neighbours: int = _NEIGHBOURS,
+) -> LightTable:
+    """The twin of :func:`light_table` in NumPy: slower, and easier to read."""
+    directions, edges = _frame(lens, slopes, along, places_per_lens, neighbours)
+    if lens.is_cylinder:
+        x = _nodes(lens)
+        rows = [_lines(trace(lens, x, x * 0.0, *direction), edges) for direction in directions]
+        return LightTable(directions, edges, np.array(rows))
+    squares = []
+    x, y = lens.samples(_SQUARE_RAYS)
+    for direction in directions:
+        rays = trace(lens, x, y, *direction)
+        squares.append(np.histogram2d(rays.y, rays.x, bins=(edges, edges), weights=rays.light)[0] / len(x))
+    return LightTable(directions, edges, np.sum(squares, axis=1), np.array(squares))
+
+
+def _lines(rays: Traced, edges: Real) -> Real:
+    """Light of each place: that between two neighbouring rays is spread evenly between where they land."""
+    light = 0.5 * (rays.light[1:] + rays.light[:-1]) / (len(rays.light) - 1)
+    lit = rays.light > 0.0
+    before = np.where(lit[:-1], rays.x[:-1], rays.x[1:])
+    here = np.where(lit[1:], rays.x[1:], rays.x[:-1])
+    low, high = np.minimum(before, here), np.maximum(before, here)
+    # The share of each interval that lies left of each edge.
+    with np.errstate(invalid="ignore", divide="ignore"):
+        left = np.clip((edges - low[:, None]) / (high - low)[:, None], 0.0, 1.0)
+    left = np.where((high > low)[:, None], left, edges > low[:, None])
+    return light @ np.diff(left, axis=1)
+
+
+def _frame(
+    lens: Lens, slopes: ArrayLike, along: float, places_per_lens: int, neighbours: int
+) -> tuple[NDArray[np.float64], Real]:
+    across = np.atleast_1d(np.asarray(slopes, dtype=np.float64))
+    directions = np.ascontiguousarray(np.stack([across, np.full_like(across, along)], axis=1))
+    lenses = 2 * neighbours + 1
+    edges = (np.arange(lenses * places_per_lens + 1) / places_per_lens - 0.5 * lenses) * lens.pitch
+    return directions, edges
+
+
+def _nodes(lens: Lens) -> Real:
+    return np.linspace(-0.5, 0.5, _LINE_RAYS + 1) * lens.pitch
+
+
+def _shape(lens: Lens) -> Real:
+    profile = lens.profile
+    tangential = 0.0 if lens.is_cylinder else 1.0
+    return np.array([profile.radius, profile.thickness, profile.index, profile.conic, lens.reach, lens.rim, tangential])

@@ -1,0 +1,67 @@
+"""Profiles of lenses: sags, and what cannot stand side by side."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from lippmann.display import Display, load_display
+from lippmann.display.lens_array import LensArray
+from lippmann.display.lens_profile import LensProfile
+from lippmann.errors import DisplayError
+
+SQUARE, HEXAGONAL, CYLINDERS = (LensArray(layout, 1.0) for layout in ("square", "hexagonal", "lenticular"))
+
+
+def test_sags_by_hand():
+    assert LensProfile(5.0, 9.0).sag(3.0) == pytest.approx(1.0)  # a circle: 3, 4, 5
+    assert LensProfile(2.0, 9.0, conic=-1.0).sag(2.0) == pytest.approx(1.0)  # a parabola: x^2 / 2R
+    # A hyperbola x^2 = 2 R h + h^2: x = sqrt(2.25) for R = 0.625, h = 1.
+    assert LensProfile(0.625, 9.0, conic=-2.0).sag(1.5) == pytest.approx(1.0)
+
+
+def test_crests_reach_to_where_lenses_meet():
+    profile = LensProfile(2.0, 4.0)
+    assert profile.reach(CYLINDERS) == 0.5
+    assert profile.reach(SQUARE) == pytest.approx(math.sqrt(0.5))
+    assert profile.reach(HEXAGONAL) == pytest.approx(1 / math.sqrt(3))
+    assert replace(profile, diameter=0.8).reach(SQUARE) == 0.4
+
+
+@pytest.mark.parametrize(
+    ("lenses", "values", "said"),
+    [
+        (CYLINDERS, {"radius": 0.5}, "lens.radius: radius is 0.5 mm; lenses 1 mm wide need more than 0.5 mm"),
+        (SQUARE, {"radius": 0.7}, "lenses 1.414 mm wide need more than 0.7071 mm"),
+        (CYLINDERS, {"radius": 0.6, "conic": 1.0}, "need more than 0.7071 mm; sheets have 0.53 to 1.7 pitches"),
+        (
+            CYLINDERS,
+            {"thickness": 0.06},
+            "thickness is 0.06 mm; the crest alone is 0.06351 mm high",
+        ),
+        (CYLINDERS, {"diameter": 1.1}, "diameter is 1.1 mm; lenses 1 mm apart cannot be wider than that"),
+        (CYLINDERS, {"index": math.nan}, "index is nan; it must lie between 1.3 and 2"),
+        (CYLINDERS, {"index": True}, "index is True"),
+        (CYLINDERS, {"conic": -11}, "conic is -11; it must lie between -10 and 10; crests have -1 (parabola) to 0"),
+        (CYLINDERS, {"radius": math.inf}, "radius is inf"),
+        (CYLINDERS, {"thickness": "2 mm"}, "thickness is '2 mm'"),
+    ],
+)
+def test_what_cannot_be_is_refused(lenses, values, said):
+    with pytest.raises(DisplayError) as caught:
+        LensProfile(**{"radius": 2.0, "thickness": 4.0, **values}).check(lenses)
+    assert said in str(caught.value)
+
+
+def test_a_display_checks_its_lens_and_keeps_it():
+    display = load_display("seed-lenticular")
+    with pytest.raises(DisplayError, match="need more than"):
+        replace(display, lens=LensProfile(1.0, 10.0))
+    with_lens = replace(display, lens=LensProfile(3.0, 10.0, 1.5, -0.4, 2.0))
+    assert Display.from_dict(with_lens.to_dict()) == with_lens
+    assert with_lens.in_words()["lens"] == "10 mm thick, index 1.5, crest radius 3 mm, conic -0.4"
+    # A pinhole is written as it always was.
+    assert "lens" not in display.to_dict()
+    assert "lens" not in display.in_words()
