@@ -151,13 +151,13 @@ def _rest(renderer: Any, size: tuple[int, int]) -> dict[str, Any]:
     """Samples and PSNR over the seconds that a view rests, and when it came to the goal."""
     view = _view(renderer.display, size, 30.0)
     references = [_reference(renderer, _view(renderer.display, size, 30.0, seed=seed)) for seed in (101, 202)]
-    renderer.refine(_view(renderer.display, size, 20.0))  # kernels of paths and feature buffers are recorded
+    _refine(renderer, _view(renderer.display, size, 20.0))  # kernels of paths and feature buffers are recorded
     for _ in range(3):
-        renderer.refine(_view(renderer.display, size, 20.0))
+        _refine(renderer, _view(renderer.display, size, 20.0))
     track: list[dict[str, float]] = []
     began, busy = time.perf_counter(), time.process_time()
     while time.process_time() - busy < REST_PROCESSOR_SECONDS and time.perf_counter() - began < REST_SECONDS:
-        frame = renderer.refine(view)
+        frame = _refine(renderer, view)
         if frame is not None:
             first, second = (frame.pixels / 255.0 - reference for reference in references)
             psnr = float(-10 * np.log10(max((first * second).mean(), 1e-9)))
@@ -167,17 +167,24 @@ def _rest(renderer: Any, size: tuple[int, int]) -> dict[str, Any]:
     return {"track": track, "reached": reached, "last": track[-1]}
 
 
+def _refine(renderer: Any, view: Any) -> Any:
+    """One more step for a view at rest, whose steps go on as long as the view stays."""
+    if getattr(renderer, "rest", (None,))[0] != view:
+        renderer.rest = view, renderer.refine_steps(view)
+    return next(renderer.rest[1])
+
+
 def _reference(renderer: Any, view: Any) -> np.ndarray:
     """Codes in [0, 1] of many samples as they are."""
     from lippmann.rendering.live.live_view import LiveView
 
-    renderer.refine(view)
-    progressive = renderer._progressive
+    _refine(renderer, view)
+    progressive = renderer.rest[1].gi_frame.f_locals["progressive"]
     progressive._denoises = False
     enough = min(REFERENCE_SAMPLES, max(16, REFERENCE_WORK // len(progressive._pixels.column)))
     frame = None
     while frame is None or progressive.samples < enough:
-        frame = renderer.refine(view) or frame
+        frame = _refine(renderer, view) or frame
     assert isinstance(view, LiveView)
     return np.asarray(frame.pixels / 255.0)
 
@@ -186,7 +193,7 @@ def _after_rest(renderer: Any, size: tuple[int, int]) -> float:
     times = []
     for number in range(5):
         for _ in range(2):
-            renderer.refine(_view(renderer.display, size, 50.0 + number))
+            _refine(renderer, _view(renderer.display, size, 50.0 + number))
         began = time.perf_counter()
         renderer.frame(_view(renderer.display, size, 60.0 + number))
         times.append(time.perf_counter() - began)
@@ -199,7 +206,7 @@ def _agreement(renderer: Any, scene: Any, size: tuple[int, int]) -> float:
 
     plain = {"tone_map": "none"} if renderer.display.has_slanted_stripes else {}
     view = _view(renderer.display, size, 30.0, **plain)
-    frame = renderer.frame(view, settled=True)
+    frame = renderer.frame(view)
     image = render(
         scene,
         renderer.display,
@@ -248,7 +255,7 @@ def _endless(minutes: float) -> dict[str, float]:
             oldest = max(oldest, time.perf_counter() - asked)
         if frames % 20 == 0:
             for _ in range(4):
-                renderer.refine(view)
+                _refine(renderer, view)
         frames += 1
         if frames <= EARLY_FRAMES:
             early = process.memory_info().rss
@@ -259,7 +266,6 @@ def _endless(minutes: float) -> dict[str, float]:
         "oldest_s": oldest,
         "early_mib": early / 2**20,
         "last_mib": last / 2**20,
-        "recordings": renderer.recordings,
     }
 
 

@@ -19,12 +19,15 @@ _DESATURATION = 0.15
 
 def pbr_neutral(linear: NDArray[np.float32]) -> NDArray[np.float32]:
     """Linear RGB ``(..., 3)`` in [0, 1] of linear RGB; negative values count as 0."""
-    color = np.maximum(linear, 0.0)
-    least = color.min(axis=-1, keepdims=True)
-    color = color - np.where(least < 2.0 * _FRESNEL, least - least**2 / (4.0 * _FRESNEL), _FRESNEL)
-    peak = color.max(axis=-1, keepdims=True)
+    color = np.maximum(linear, np.float32(0.0))
+    # Channel by channel: NumPy is slow over an axis of three.
+    least = np.minimum(np.minimum(color[..., 0], color[..., 1]), color[..., 2])
+    color -= np.where(least < 2.0 * _FRESNEL, least - least**2 / (4.0 * _FRESNEL), _FRESNEL)[..., None]
+    peak = np.maximum(np.maximum(color[..., 0], color[..., 1]), color[..., 2])
+    is_bright = peak >= _COMPRESSED_FROM
+    peak, bright = peak[is_bright, None], color[is_bright]
     room = 1.0 - _COMPRESSED_FROM
-    compressed = 1.0 - room**2 / (np.maximum(peak, _COMPRESSED_FROM) + room - _COMPRESSED_FROM)
-    white = 1.0 - 1.0 / (_DESATURATION * (np.maximum(peak, _COMPRESSED_FROM) - compressed) + 1.0)
-    bright = color * (compressed / np.maximum(peak, _COMPRESSED_FROM)) * (1.0 - white) + compressed * white
-    return np.where(peak < _COMPRESSED_FROM, color, bright).astype(np.float32)
+    compressed = 1.0 - room**2 / (peak + room - _COMPRESSED_FROM)
+    white = 1.0 - 1.0 / (_DESATURATION * (peak - compressed) + 1.0)
+    color[is_bright] = bright * (compressed / peak) * (1.0 - white) + compressed * white
+    return color

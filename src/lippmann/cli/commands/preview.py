@@ -136,7 +136,7 @@ def preview(
         if plain:
             found = _plain(loaded, camera, pixels, eye, request, progress)
         else:
-            from lippmann.rendering.eye_preview import render_eye_preview
+            from lippmann.rendering.live.eye_preview import render_eye_preview
             from lippmann.viewing.replay import default_eye
 
             at = default_eye(target) if eye is None else parse.triple(eye, "--eye")

@@ -11,7 +11,6 @@ from lippmann.color.transfer import Transfer, coding_slope
 from lippmann.rendering.denoise.local_statistics_kernels import (
     column_mean_rows,
     known_rows,
-    others_mean_rows,
     row_mean_rows,
 )
 from lippmann.runtime.row_threads import Bands
@@ -58,10 +57,3 @@ def leave_one_out_mean(values: Floats, reach: int, errors: float, bands: Bands) 
     known = np.empty_like(values)
     bands.lines(known_rows, len(values), values, mean, squared, reach, errors, known)
     return known
-
-
-def mean_of_others(values: Floats, reach: int, bands: Bands) -> Floats:
-    """Means of ``(H, W)`` over the other pixels up to ``reach`` away, cut at the edges; 0 where there is none."""
-    mean, others = mean_around(values, reach, bands), np.empty_like(values)
-    bands.lines(others_mean_rows, len(values), values, mean, reach, others)
-    return others

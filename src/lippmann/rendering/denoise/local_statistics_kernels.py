@@ -64,20 +64,6 @@ def _pixels_around(row: int, column: int, height: int, width: int, radius: int) 
 
 
 @uncounted
-def others_mean_rows(first: int, last: int, values: RealArray, mean: RealArray, radius: int, others: RealArray) -> None:
-    """Rows ``[first, last)`` of ``others``: ``mean``, that of ``values`` around each pixel, without the pixel itself.
-
-    All ``(H, W)``. Where there is no other pixel: 0.
-    """
-    height, width = values.shape
-    for row in range(first, last):
-        for column in range(width):
-            count = _pixels_around(row, column, height, width, radius)
-            of_others = mean[row, column] * count - values[row, column]
-            others[row, column] = of_others / (count - 1) if count > 1 else 0.0
-
-
-@uncounted
 def known_rows(
     first: int,
     last: int,

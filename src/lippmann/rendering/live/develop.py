@@ -1,4 +1,4 @@
-"""From light to the codes that a page shows."""
+"""From linear light to the 8-bit codes that a page shows."""
 
 from __future__ import annotations
 
@@ -7,50 +7,48 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.rendering.live.develop_kernels import code_tables, encode_rows, gather_rows, spread_rows
+from lippmann.color.transfer import quantize
 from lippmann.rendering.live.seen_pixels import PixelSet
 from lippmann.rendering.request.render_request import RenderRequest
 
 Floats = NDArray[np.float32]
 Codes = NDArray[np.uint8]
 
-_tables = cache(code_tables)
-
 
 def develop(values: Floats, pixels: PixelSet, request: RenderRequest) -> Codes:
     """Codes ``(height, width, 3)`` of the picture of pixels whose linear radiance is ``values`` ``(n, 3)``."""
     if pixels.channels == 3:
         return develop_picture(arrange(values, pixels), pixels, request)
-    codes = codes_of(values, request)
-    number = pixels.number.reshape(-1)
-    picture = np.empty((number.size, 3), np.uint8)
-    spread_rows(0, number.size, codes, number, picture)
-    return picture.reshape(*pixels.number.shape[:2], 3)
+    # Each pixel is coded once, and its three codes are copied as one number; the last stands for places past the panel.
+    codes = np.zeros((len(values) + 1, 4), np.uint8)
+    codes[:-1, :3] = codes_of(values, request)
+    picture = codes.view(np.uint32)[:, 0][pixels.number[..., 0]]
+    return np.ascontiguousarray(picture[..., None].view(np.uint8)[..., :3])
 
 
 def develop_picture(picture: Floats, pixels: PixelSet, request: RenderRequest) -> Codes:
     """Codes of a linear picture ``(height, width, 3)``, black where no pixel is seen."""
-    codes = codes_of(picture.reshape(-1, 3), request).reshape(picture.shape)
+    codes = codes_of(picture, request)
     codes[pixels.number < 0 if pixels.channels == 3 else (pixels.number < 0)[..., 0]] = 0
     return codes
 
 
 def arrange(values: Floats, pixels: PixelSet) -> Floats:
     """The picture ``(height, width, 3)`` of the values ``(n, 3)`` of pixels; 0 where none is seen."""
-    number = pixels.number
+    with_black = np.concatenate([values, np.zeros((1, 3), np.float32)])
     if pixels.channels == 1:
-        with_black = np.concatenate([values, np.zeros((1, 3), np.float32)])
-        return np.ascontiguousarray(with_black[number[..., 0]])
-    flat = number.reshape(-1, 3)
-    picture = np.empty(flat.shape, np.float32)
-    gather_rows(0, len(flat), np.ascontiguousarray(values), flat, picture)
-    return picture.reshape(number.shape)
+        return with_black[pixels.number[..., 0]]
+    return with_black[pixels.number, np.arange(3)]
 
 
 def codes_of(values: Floats, request: RenderRequest) -> Codes:
-    """Codes ``(n, 3)`` of linear radiance ``(n, 3)``."""
-    codes = np.empty(values.shape, np.uint8)
-    encode_rows(
-        0, len(values), np.ascontiguousarray(values, np.float32), request.tone_map == "pbr-neutral", *_tables(), codes
-    )
-    return codes
+    """Codes of linear radiance ``(..., 3)``; same shape. One in 100 of the darkest is off by one."""
+    table = _code_table()
+    place = np.clip(request.shown(values), 0, 1) * np.float32(len(table) - 1)
+    return table[(place + np.float32(0.5)).astype(np.int32)]
+
+
+@cache
+def _code_table() -> Codes:
+    """The sRGB codes of many evenly spaced values in [0, 1]."""
+    return np.asarray(quantize(np.linspace(0, 1, 1 << 18, dtype=np.float32), 8, "srgb"), np.uint8)

@@ -27,14 +27,13 @@ from lippmann.rendering.transport.volume_path import VolumePathIntegrator
 from lippmann.scene.matrices import inverse, rotation_of
 
 Floats = NDArray[np.float32]
-Indices = NDArray[np.int64]
 Matrix = NDArray[np.float64]
 Rows = list[list[Float64]]
 #: Integrators of physically based light.
 LiveIntegrator = PathIntegrator | VolumePathIntegrator
 
 #: Launches after which no more recordings were seen to be needed.
-WARMING_LAUNCHES = 4
+_WARMING_LAUNCHES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,67 +59,38 @@ class Lanes:
     ----------
     pixels:
         The pixels of a picture.
-    streams:
-        Streams of samples.
-    counts:
-        ``(n,)``: samples of each of them in each stream.
+    part:
+        Which of them.
+    streams, samples:
+        Streams, and samples in each.
     first:
-        ``(n,)``: number of the first of them; 0 for all if left out.
+        Number of the first sample.
     """
 
-    def __init__(self, pixels: PixelSet, streams: int, counts: Indices, first: Indices | None = None) -> None:
-        #: Numbers of the pixels that have lanes.
-        self.pixels = np.flatnonzero(counts)
-        each = counts[self.pixels]
-        self._shape = len(self.pixels), streams
-        self._is_even = bool((each == each[0]).all())
-        # Of each run of samples of a pixel in a stream: how long it is, and where it begins.
-        runs = np.repeat(each, streams)
-        self._starts = np.cumsum(runs) - runs
-        column, row, channel = (
-            np.repeat(values[self.pixels], each * streams) for values in (pixels.column, pixels.row, pixels.channel)
-        )
-        stream = np.repeat(np.tile(np.arange(streams, dtype=np.uint32), len(each)), runs)
-        begin = np.zeros(len(each), np.int64) if first is None else first[self.pixels]
-        sample = np.arange(len(stream)) + np.repeat(np.repeat(begin, streams) - self._starts, runs)
+    def __init__(self, pixels: PixelSet, part: slice, streams: int = 1, samples: int = 1, first: int = 0) -> None:
+        self.part = part
+        column, row, channel = (values[part] for values in (pixels.column, pixels.row, pixels.channel))
+        each = streams * samples
+        self._shape = len(column), streams, samples
+        stream = np.tile(np.repeat(np.arange(streams, dtype=np.uint32), samples), len(column))
+        sample = np.tile(np.arange(first, first + samples, dtype=np.uint32), len(column) * streams)
+        places = (values if each == 1 else np.repeat(values, each) for values in (column, row, channel))
         # Held here, since the device reads them in place.
-        self._host = [aligned(values) for values in (column, row, channel, stream, sample.astype(np.uint32))]
+        self._host = [aligned(values) for values in (*places, stream, sample)]
         self.arrays = [mi.UInt32(values) for values in self._host]
 
     def sums(self, values: Floats) -> Floats:
         """Sums ``(pixels, streams)`` of the values of lanes."""
-        if self._is_even:
-            return np.asarray(values.reshape(*self._shape, -1).sum(axis=2))
-        return np.add.reduceat(values, self._starts).reshape(self._shape)
+        return np.asarray(values.reshape(self._shape).sum(axis=2))
 
     def firsts(self, values: Floats) -> Floats:
         """The values ``(pixels,)`` of each pixel's first lane."""
-        return np.asarray(values[self._starts[:: self._shape[1]]])
-
-
-class PixelRun:
-    """Lanes of the first sample of each of the pixels from ``start`` to ``stop``, in one stream."""
-
-    def __init__(self, pixels: PixelSet, start: int, stop: int) -> None:
-        self.pixels = slice(start, stop)
-        count = min(stop, len(pixels.column)) - start
-        places = (values[start:stop] for values in (pixels.column, pixels.row, pixels.channel))
-        streams, samples = np.zeros((2, count), np.uint32)
-        self._host = [aligned(values) for values in (*places, streams, samples)]
-        self.arrays = [mi.UInt32(values) for values in self._host]
-
-    def sums(self, values: Floats) -> Floats:
-        """The values themselves, ``(pixels, 1)``."""
-        return values[:, None]
-
-    def firsts(self, values: Floats) -> Floats:
-        """The values themselves."""
-        return values
+        return np.asarray(values.reshape(self._shape)[:, 0, 0])
 
 
 def _two_lanes() -> Lanes:
     pair = np.zeros(2, np.uint32)
-    return Lanes(PixelSet(pair, pair, pair, np.zeros((1, 1, 1), np.int32)), 1, np.ones(2, np.int64))
+    return Lanes(PixelSet(pair, pair, pair, np.zeros((1, 1, 1), np.int32)), slice(0, 2))
 
 
 class PlacedDisplay:
@@ -155,26 +125,18 @@ class LiveTracer:
         self._rays = _Rays(display, subpixels, box_filter)
         # In a list, that the kernel may read another one's arrays.
         self._integrator = [integrator]
-        self._kernel = Frozen(self._sample, self._integrator, changes=True)
-        self._warm_up()
+        self.kernel = Frozen(self._sample, self._integrator, changes=True)
+        # The first launches change how scenes of several emitters lie on the device.
+        for _ in range(_WARMING_LAUNCHES):
+            self.trace(_two_lanes(), PlacedDisplay(np.eye(4)), seed=0)
 
     def trace_by(self, integrator: LiveIntegrator) -> None:
         """Gather light by another integrator of the same scene and depth."""
         self._integrator[0] = integrator
 
-    @property
-    def recordings(self) -> int:
-        """How often the kernel was recorded."""
-        return self._kernel.recordings
-
-    def _warm_up(self) -> None:
-        """Record the kernel: the first launches change how scenes of several emitters lie on the device."""
-        for _ in range(WARMING_LAUNCHES):
-            self.trace(_two_lanes(), PlacedDisplay(np.eye(4)), seed=0)
-
-    def trace(self, lanes: Lanes | PixelRun, placed: PlacedDisplay, *, seed: int) -> Samples:
+    def trace(self, lanes: Lanes, placed: PlacedDisplay, *, seed: int) -> Samples:
         """The samples of ``lanes``."""
-        found = self._kernel(*lanes.arrays, dr.opaque(mi.UInt32, seed), placed.rows, placed.height)
+        found = self.kernel(*lanes.arrays, dr.opaque(mi.UInt32, seed), placed.rows, placed.height)
         red, green, blue, height = (np.asarray(values) for values in found)
         sums = np.stack([lanes.sums(values).T for values in (red, green, blue)], axis=-1)
         return Samples(sums, lanes.firsts(height))
@@ -224,18 +186,13 @@ class FeatureTracer:
     def __init__(self, display: Display, surfaces: Surfaces, *, subpixels: bool, box_filter: bool) -> None:
         self._rays = _Rays(display, subpixels, box_filter)
         self._surfaces = surfaces
-        self._kernel = Frozen(self._features, surfaces, changes=True)
-        for _ in range(WARMING_LAUNCHES):
+        self.kernel = Frozen(self._features, surfaces, changes=True)
+        for _ in range(_WARMING_LAUNCHES):
             self.trace(_two_lanes(), PlacedDisplay(np.eye(4)), seed=0)
-
-    @property
-    def recordings(self) -> int:
-        """How often the kernel was recorded."""
-        return self._kernel.recordings
 
     def trace(self, lanes: Lanes, placed: PlacedDisplay, *, seed: int) -> tuple[Floats, Floats]:
         """Sums of albedo and normal ``(n, 3)`` over the samples of ``lanes``; normals in the display's frame."""
-        found = self._kernel(*lanes.arrays, dr.opaque(mi.UInt32, seed), placed.rows)
+        found = self.kernel(*lanes.arrays, dr.opaque(mi.UInt32, seed), placed.rows)
         sums = np.concatenate([lanes.sums(np.asarray(values)) for values in found], axis=1)
         return sums[:, :3], sums[:, 3:] @ placed.rotation.T
 

@@ -1,4 +1,4 @@
-"""A view at rest: light gathers, step by step, most of it where it is noisy, and its noise is taken out now and then.
+"""A view at rest: light gathers, step by step, and its noise is taken out now and then.
 
 Two streams of samples make two half-buffers, as in :mod:`lippmann.rendering.denoise.dual_buffer`. Each half judges what
 the denoiser made of the other: where that is wrong, the samples themselves are shown
@@ -15,18 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.rendering.denoise.local_statistics import mean_of_others
 from lippmann.rendering.denoise.noisy_blend import own_share
 from lippmann.rendering.denoise.oidn import denoise, load_denoiser
 from lippmann.rendering.film.batched_picture import STREAMS
-from lippmann.rendering.live.develop import arrange, codes_of, develop, develop_picture
+from lippmann.rendering.live.develop import arrange, develop, develop_picture
 from lippmann.rendering.live.live_tracer import Lanes, PlacedDisplay
 from lippmann.rendering.live.live_view import LiveFrame, LiveView
-from lippmann.rendering.live.sample_plan import even_samples, samples_by_noise
 from lippmann.rendering.live.seen_pixels import PixelSet
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime.engine_lock import exclusive
-from lippmann.runtime.row_threads import Bands
 from lippmann.scene.placement import Placement
 
 if TYPE_CHECKING:
@@ -34,18 +31,12 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float32]
 
-#: Seconds that a step of sampling takes, about.
-STEP_SECONDS = 0.06
-#: Most samples of a pixel, in the mean: its noise is below a code's step then.
-MOST_SAMPLES = 1 << 14
-#: Samples of the feature buffers.
-_FEATURE_SAMPLES = 8
-#: The noise is taken out anew once there are so many times the samples of the last time.
-_MORE = 1.7
-#: From so many samples on the halves judge each other.
-_JUDGED_FROM = 8
-#: Noise is that of the pixels so far around.
-_NOISE_REACH = 2
+#: Seconds that a step of sampling takes, about: as long as a frame may be late.
+_STEP_SECONDS = 0.06
+#: Most samples of a pixel: its noise is below a code's step then.
+_MOST_SAMPLES = 1 << 14
+#: Samples of the feature buffers, and those of a pixel from which on the halves judge each other.
+_FEATURE_SAMPLES, _JUDGED_FROM = 8, 8
 
 
 class Progressive:
@@ -67,23 +58,22 @@ class Progressive:
         self._light_up = light_up
         self._kernels, self._display, self._request = kernels, display, request
         self._placement, self._placed, self._pixels, self._exposure = placement, placed, pixels, exposure
-        count = len(pixels.column)
-        self._sums = np.zeros((STREAMS, count, 3), np.float32)
-        #: Samples of each pixel in each stream.
-        self._taken = np.zeros(count, np.int64)
-        #: Standard deviation of a sample of each pixel, between codes, as far as it is known.
-        self._noise: Floats | None = None
+        self._count = len(pixels.column)
+        self._sums = np.zeros((STREAMS, self._count, 3), np.float32)
+        #: Samples that all pixels have in each stream; how many pixels have the coming ones already, and how many these
+        #: are.
+        self._taken, self._begun, self._coming = 0, 0, 0
         self._features: tuple[Floats, Floats] | None = None
         self._denoised_at = 0
         self._task: Iterator[Floats | None] | None = None
-        #: Samples that the next step takes of each stream.
-        self._next = min(count, self._most)
+        #: Lanes of the next step in each stream.
+        self._next = min(self._count, self._most)
         self._denoises = view.eye is not None and request.box_filter
 
     @property
     def samples(self) -> int:
-        """Samples of a pixel, in the mean."""
-        return round(STREAMS * float(self._taken.mean()))
+        """Samples of a pixel."""
+        return STREAMS * self._taken
 
     @property
     def _most(self) -> int:
@@ -95,98 +85,66 @@ class Progressive:
         self._light_up()
         if self._task is not None:
             return self._denoise(seconds)
-        if self._denoises and self._features is None and self._taken.all():
-            self._trace_features(seconds)
-            return self._denoise(seconds)
-        if self.samples >= MOST_SAMPLES:
+        if self.samples >= _MOST_SAMPLES:
             return None
         self._sample(seconds)
+        if self._begun:
+            return None
         if not self._denoises:
-            is_even = self._taken.min() == self._taken.max()
-            mean = develop(self._mean(), self._pixels, self._request) if is_even else None
-            return None if mean is None else self._frame(mean, seconds, is_denoised=False)
-        if self._features is not None and self._taken.sum() >= _MORE * self._denoised_at:
-            return self._denoise(seconds)
-        return None
+            mean = np.asarray(self._sums.sum(axis=0) / self.samples, np.float32)
+            return self._frame(develop(mean, self._pixels, self._request), seconds, is_denoised=False)
+        # The noise is taken out anew each time that there are 1.7 times the samples.
+        return self._denoise(seconds) if self.samples >= 1.7 * self._denoised_at else None
 
     def _sample(self, seconds: dict[str, float]) -> None:
-        """Samples of the pixels that need them most."""
-        if self._noise is None:
-            more = even_samples(self._taken, self._next)
-        else:
-            more = samples_by_noise(self._taken, self._noise, self._next)
+        """Samples of all pixels, or of as many as the time allows; these get no second one before the others."""
         started = time.perf_counter()
-        lanes = Lanes(self._pixels, STREAMS, more, self._taken)
+        if not self._begun:
+            self._coming = max(1, self._next // self._count)
+        last = min(self._begun + max(1, self._next // self._coming), self._count)
+        lanes = Lanes(self._pixels, slice(self._begun, last), STREAMS, self._coming, self._taken)
         tracer = self._kernels.tracer(self._display, self._request)
-        found = tracer.trace(lanes, self._placed, seed=self._request.seed)
-        self._sums[:, lanes.pixels] += found.sums
-        self._taken += more
+        self._sums[:, lanes.part] += tracer.trace(lanes, self._placed, seed=self._request.seed).sums
+        count = (last - self._begun) * self._coming
+        self._begun = last % self._count
+        if not self._begun:
+            self._taken += self._coming
         spent = time.perf_counter() - started
         seconds["trace"] = seconds.get("trace", 0.0) + spent
         # As many samples as a step's time allows, twice those of the last at most: the first launch may have compiled.
-        # Pictures whose pixels all have as many samples get whole rounds.
-        count = int(more.sum())
-        least = min(len(more), self._most) if self._noise is None else 1
-        self._next = max(least, min(int(count * STEP_SECONDS / spent), 2 * count, self._most))
+        least = min(self._count, self._most, 1 << 16)  # smaller wavefronts leave threads idle
+        self._next = max(least, min(int(count * _STEP_SECONDS / spent), 2 * count, self._most))
 
     def _trace_features(self, seconds: dict[str, float]) -> None:
         started = time.perf_counter()
         tracer = self._kernels.feature_tracer(self._display, self._request)
-        count = len(self._pixels.column)
-        albedo, normal = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
+        albedo, normal = np.empty((2, self._count, 3), np.float32)
         step = self._kernels.most_lanes // _FEATURE_SAMPLES
-        for start in range(0, count, step):
-            some = np.zeros(count, np.int64)
-            some[start : start + step] = _FEATURE_SAMPLES
-            lanes = Lanes(self._pixels, 1, some)
-            albedo[lanes.pixels], normal[lanes.pixels] = tracer.trace(lanes, self._placed, seed=self._request.seed + 1)
-        for values in (albedo, normal):
-            values /= _FEATURE_SAMPLES
-        self._features = albedo, normal
+        for start in range(0, self._count, step):
+            lanes = Lanes(self._pixels, slice(start, start + step), samples=_FEATURE_SAMPLES)
+            albedo[lanes.part], normal[lanes.part] = tracer.trace(lanes, self._placed, seed=self._request.seed + 1)
+        self._features = albedo / np.float32(_FEATURE_SAMPLES), normal / np.float32(_FEATURE_SAMPLES)
         seconds["features"] = time.perf_counter() - started
-
-    def _mean(self) -> Floats:
-        return np.asarray(self._sums.sum(axis=0) / (STREAMS * self._taken[:, None]), np.float32)
 
     def _denoise(self, seconds: dict[str, float]) -> LiveFrame | None:
         """One of the steps that take the noise out; the picture after the last."""
         started = time.perf_counter()
         if self._task is None:
             load_denoiser()
-            self._denoised_at = int(self._taken.sum())
+            if self._features is None:
+                self._trace_features(seconds)
+            assert self._features is not None
+            self._denoised_at = self.samples
+            albedo, normal = (self._picture(values) for values in self._features)
+            first, second = (self._picture(sums / np.float32(self._taken)) for sums in self._sums)
             threads = self._kernels.session.engine.threads
-            noisy = self._noisy()
-            self._noise = self._measured(noisy, threads)
-            self._task = _denoised(noisy, self._guides(), self.samples, threads)
+            self._task = _denoised((first, second), (albedo, normal), self.samples, threads)
         picture = next(self._task)
         seconds["denoise"] = time.perf_counter() - started
         if picture is None:
             return None
         self._task = None
         return self._frame(self._developed(picture), seconds, is_denoised=True)
-
-    def _noisy(self) -> tuple[Floats, Floats]:
-        taken = self._taken[:, None].astype(np.float32)
-        first, second = (self._picture(sums / taken) for sums in self._sums)
-        return first, second
-
-    def _measured(self, noisy: tuple[Floats, Floats], threads: int) -> Floats:
-        """Standard deviation ``(n,)`` of a sample of each pixel, between codes, as those around it tell."""
-        shape = noisy[0].shape
-        first, second = (codes_of(half.reshape(-1, 3), self._request).astype(np.float32) for half in noisy)
-        taken = self._picture(np.repeat(self._taken[:, None], 3, axis=1).astype(np.float32))
-        variance = (np.square(first - second).reshape(shape) * taken / 2).mean(axis=-1)
-        bands = Bands(threads)
-        around = mean_of_others(np.ascontiguousarray(variance), _NOISE_REACH, bands)
-        noise = np.zeros(len(self._taken) + 1, np.float32)  # the last stands for places past the panel
-        blocks = self._pixels.blocks
-        noise[self._pixels.number if blocks is None else blocks[..., None]] = np.sqrt(np.maximum(around, 0))[..., None]
-        return noise[:-1]
-
-    def _guides(self) -> tuple[Floats, Floats]:
-        assert self._features is not None
-        albedo, normal = (self._picture(values) for values in self._features)
-        return albedo, normal
 
     def _picture(self, values: Floats) -> Floats:
         """Values ``(n, 3)`` of the pixels as the picture that the denoiser sees: of lenses, where they are blocks."""

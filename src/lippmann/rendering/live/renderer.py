@@ -102,7 +102,6 @@ class LiveRenderer:
         self._window = lru_cache(_WINDOWS)(window_pixels)
         self._shown: _Stand | None = None
         self._height: Floats = np.zeros(0, np.float32)
-        self._progressive: Progressive | None = None
         self.set_scene(scene)
 
     @property
@@ -115,11 +114,6 @@ class LiveRenderer:
         """The scene."""
         return self._scene
 
-    @property
-    def recordings(self) -> int:
-        """How often kernels were recorded for the scene and its displays: not for a view that changes."""
-        return self._kernels.recordings
-
     @exclusive()
     def set_scene(self, scene: Scene) -> None:
         """Show another scene, or the same one with another environment or background.
@@ -131,52 +125,41 @@ class LiveRenderer:
         """
         self._kernels = self._open(scene)
         self._scene = scene
-        self._forget()
+        self._shown = None
 
     @exclusive()
     def set_display(self, display: Display) -> None:
         """Show the scene on another display, or on the same one in another size."""
         self._display = display
-        self._forget()
+        self._shown = None
 
-    def frame(self, view: LiveView, *, settled: bool = False) -> LiveFrame:
+    def frame(self, view: LiveView) -> LiveFrame:
         """A picture of one sample a pixel in direct light, for a view that changes.
 
-        A render with the integrator ``direct`` and one sample a pixel shows the same to the same eye. Where a scene has
-        several emitters, the weights by which they are sampled, and an automatic exposure, stay while a view changes:
-        those of a render are found with ``settled``.
-
-        Parameters
-        ----------
-        view:
-            What is looked at.
-        settled:
-            Find the weights of emitters and the exposure anew, which takes some frames' time.
+        A render with the integrator ``direct`` and one sample a pixel shows the same to the same eye. The weights by
+        which several emitters are sampled, and an automatic exposure, stay those of the scene's first view.
 
         Raises
         ------
         UsageError, SceneError
             The view cannot be shown.
         """
-        self._progressive = None
-        return next(frame for frame in self.frame_steps(view, settled=settled) if frame is not None)
+        return next(frame for frame in self.frame_steps(view) if frame is not None)
 
-    def frame_steps(self, view: LiveView, *, settled: bool = False) -> Iterator[LiveFrame | None]:
+    def frame_steps(self, view: LiveView) -> Iterator[LiveFrame | None]:
         """The steps of :meth:`frame`: the last one brings the picture, those before None.
 
         Between them steps of other pictures may be made, of another scene or display, too.
         """
-        return self._frame_steps(self._kernels, self._display, view, settled)
+        return self._frame_steps(self._kernels, self._display, view)
 
-    def _frame_steps(
-        self, kernels: SceneKernels, display: Display, view: LiveView, settled: bool
-    ) -> Iterator[LiveFrame | None]:
-        from lippmann.rendering.live.live_tracer import PixelRun
+    def _frame_steps(self, kernels: SceneKernels, display: Display, view: LiveView) -> Iterator[LiveFrame | None]:
+        from lippmann.rendering.live.live_tracer import Lanes
 
         seconds: dict[str, float] = {}
         with exclusive():
             stand = self._stand(kernels, display, view, _moving(view.request), seconds)
-            exposure = kernels.expose(display, stand.request, stand.placement, measure=settled)
+            exposure = kernels.expose(display, stand.request, stand.placement, measure=False)
             tracer = kernels.tracer(display, stand.request)
             count, step = len(stand.pixels.column), min(STEP_LANES, kernels.most_lanes)
             values, heights = np.empty((count, 3), np.float32), np.empty(count, np.float32)
@@ -185,9 +168,9 @@ class LiveRenderer:
                 yield None
             with exclusive(), _timed(seconds, "trace"):
                 stand.light_up(exposure)
-                run = PixelRun(stand.pixels, start, start + step)
-                found = tracer.trace(run, stand.placed, seed=stand.request.seed)
-                values[run.pixels], heights[run.pixels] = found.sums[0], found.height
+                lanes = Lanes(stand.pixels, slice(start, start + step))
+                found = tracer.trace(lanes, stand.placed, seed=stand.request.seed)
+                values[lanes.part], heights[lanes.part] = found.sums[0], found.height
         self._shown, self._height = stand, heights
         with _timed(seconds, "encode"):
             codes = develop(values, stand.pixels, stand.request)
@@ -196,24 +179,12 @@ class LiveRenderer:
                 codes = np.repeat(codes, view.row_step, axis=0)[:height]
         yield LiveFrame(codes, 1, False, stand.placement, exposure, seconds)
 
-    @exclusive()
-    def refine(self, view: LiveView) -> LiveFrame | None:
-        """Gather more light for a view that rests: one short step of work.
-
-        The first call with a view starts anew; each later call adds samples, or takes out the noise of those that there
-        are. Call it again and again while the view stays.
-
-        Returns
-        -------
-        LiveFrame | None
-            The picture so far; None after a step that left the picture as it was.
-        """
-        if self._progressive is None or self._progressive.view != view:
-            self._progressive = self._begin_rest(self._kernels, self._display, view)
-        return self._progressive.step({})
-
     def refine_steps(self, view: LiveView) -> Iterator[LiveFrame | None]:
-        """The steps of :meth:`refine`, between which those of other pictures may be made; see :meth:`frame_steps`."""
+        """Short steps that gather light for a view that rests, without end.
+
+        Each adds samples, or takes out the noise of those that there are; it gives the picture so far, or None where
+        that stayed as it was. Between them steps of other pictures may be made; see :meth:`frame_steps`.
+        """
         return self._refine_steps(self._kernels, self._display, view)
 
     def _refine_steps(self, kernels: SceneKernels, display: Display, view: LiveView) -> Iterator[LiveFrame | None]:
@@ -278,10 +249,6 @@ class LiveRenderer:
         found = float(heights[min(int(v * height), height - 1), min(int(u * width), width - 1)])
         return found if np.isfinite(found) else None
 
-    def placement(self, view: LiveView) -> Placement:
-        """Where the display stands in a view, with the scene's depth range, the resolvable one, and warnings."""
-        return self._stand(self._kernels, self._display, view, _moving(view.request), {}).placement
-
     # ---- Stages ----------------------------------------------------------------------------------------------------
 
     def _open(self, scene: Scene) -> SceneKernels:
@@ -299,9 +266,6 @@ class LiveRenderer:
         from lippmann.rendering.live.scene_kernels import SceneKernels
 
         return SceneKernels(session)
-
-    def _forget(self) -> None:
-        self._shown, self._progressive = None, None
 
     def _stand(
         self,

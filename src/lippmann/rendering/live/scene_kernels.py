@@ -72,12 +72,6 @@ class SceneKernels:
         """Lanes of the largest wavefront that fits the memory."""
         return max(1 << 14, min(_MOST_LANES, self.session.memory // BYTES_PER_LANE))
 
-    @property
-    def recordings(self) -> int:
-        """How often kernels were recorded."""
-        tracers: tuple[LiveTracer | FeatureTracer, ...] = (*self._tracers.values(), *self._features.values())
-        return sum(each.recordings for each in tracers)
-
     def place(self, display: Display, request: RenderRequest) -> Placement:
         """Where a display stands by a resolved request."""
         return replace(self.session, request=request).find_place(display, self._bounds_in)

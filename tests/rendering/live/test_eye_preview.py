@@ -8,7 +8,8 @@ from PIL import Image as Pillow
 
 import lippmann
 from lippmann.display import Display, LensArray, Panel
-from lippmann.rendering.eye_preview import render_eye_preview, seen_pixels
+from lippmann.rendering.live.eye_preview import render_eye_preview
+from lippmann.rendering.live.seen_pixels import EyeMap
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import PlacementOptions
 
@@ -67,11 +68,11 @@ def test_few_samples_are_denoised_and_near_many(teapot):
 
 
 def test_every_pixel_is_traced_once_and_what_lies_past_the_panel_not_at_all():
-    seen = seen_pixels(DISPLAYS["hexagonal"], (900.0, 0.0, 300.0), (200, 125), subpixels=False)
+    seen = EyeMap(DISPLAYS["hexagonal"], (200, 125), subpixels=False).seen_by((900.0, 0.0, 300.0))
     assert len(np.unique(np.stack([seen.column, seen.row]), axis=1).T) == len(seen.column)
     assert seen.number.max() == len(seen.column) - 1
     assert (seen.number == -1).any()
-    assert (seen.number[..., 0] == seen.number[..., 2]).all()
+    assert seen.number.shape == (125, 200, 1)
 
 
 def test_a_photograph_fills_picture_and_preview_with_its_own_colours(tmp_path):
