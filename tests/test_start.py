@@ -29,7 +29,7 @@ PLAIN = HELP | {
     "pydantic_core",
 }
 PLAIN |= {"drjit", "imagecodecs", "mitsuba", "typing_extensions", "typing_inspection"}
-RENDER = PLAIN | {"cffi", "llvmlite", "pycparser", "pyoidn"}
+RENDER = PLAIN | {"cffi", "pycparser", "pyoidn"}
 BUDGETS = {
     "--help": (HELP, 25),
     "preview teapot": (PLAIN, 290),
@@ -60,8 +60,6 @@ def test_a_command_loads_no_more_than_it_may(command, tmp_path, request):
 
         trimesh.creation.box().export(tmp_path / "model.glb")
     modules = loaded(words, tmp_path)
-    if "numba" in modules:  # which has compiled kernels now, and is not needed again
-        modules = loaded(words, tmp_path)
     tops = {name.partition(".")[0] for name in modules}
     ours = [name for name in modules if name.partition(".")[0] == "lippmann"]
     # Others begin with an underline: parts of compiled modules.

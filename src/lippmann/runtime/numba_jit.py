@@ -4,8 +4,8 @@ Numba caches compiled code beside the source, or in the user's cache folder if t
 a kernel for changes. Kernels use functions of other modules, so here a cached kernel is invalid as soon as any module
 of its package (``rendering/reprojection``, ``metrics``) has changed.
 
-Numba itself is imported when a kernel is first called: it takes longer to load than some pictures to trace. Kernels
-that allocate no memory run without it once they have been compiled, see :mod:`~lippmann.runtime.kernel_code`.
+Numba itself is imported when a kernel is first called: it takes longer to load than some pictures to trace. So what
+every render needs is no kernel of Numba's, but operations on whole arrays, of NumPy or of Dr.Jit.
 """
 
 from __future__ import annotations
@@ -16,14 +16,13 @@ import os
 import sys
 import threading
 import uuid
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar, cast
 
 from lippmann.errors import UsageError
-from lippmann.runtime import kernel_code
 
 #: Numba reads settings from a file of this name in the working directory, among them the folder of compiled code that
 #: it runs. A downloaded folder must not set them.
@@ -58,42 +57,9 @@ class Deferred:
         functools.update_wrapper(self, kernel)
         self._kernel, self._options, self._kept = cast("FunctionType", kernel), options, kept
         self._dispatcher: Any = None
-        self._variants: dict[kernel_code.Variant, Callable[..., None] | None] = {}
 
     def __call__(self, *arguments: Any) -> Any:
-        if "_nrt" in self._options and kernel_code.is_usable():
-            variant = kernel_code.variant_of(arguments)
-            if variant is not None:
-                run = self._variants[variant] if variant in self._variants else self._load(variant, arguments)
-                if run is not None:
-                    return run(*arguments)
         return self.dispatcher()(*arguments)
-
-    def _load(self, variant: kernel_code.Variant, arguments: Sequence[Any]) -> Callable[..., None] | None:
-        """A function that runs the kernel for arguments of this kind without Numba; None if Numba has to."""
-        with _making:
-            if variant not in self._variants:
-                stamp = source_stamp(Path(self._kernel.__code__.co_filename).parent)
-                self._variants[variant] = kernel_code.load(
-                    self._kernel, variant, stamp, lambda: self._compile(arguments)
-                )
-        return self._variants[variant]
-
-    def _compile(self, arguments: Sequence[Any]) -> kernel_code.MachineCode | None:
-        """Code without what Python calls it by; None if it returns something or holds addresses of this process."""
-        numba = _numba()
-        bare = {**_OPTIONS, **self._options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        dispatcher = numba.njit(**bare)(self.dispatcher().py_func)
-        signature = tuple(numba.typeof(one) for one in arguments)
-        dispatcher.compile(signature)
-        made = dispatcher.overloads[signature]
-        if made.signature.return_type != numba.types.none or made.library.has_dynamic_globals:
-            return None
-        symbol = made.fndesc.llvm_func_name
-        parameters = made.library._final_module.get_function(symbol).arguments
-        return kernel_code.MachineCode(
-            symbol, tuple(str(each.type) for each in parameters), made.library._get_compiled_object()
-        )
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.dispatcher(), name)

@@ -12,6 +12,8 @@ from lippmann.display.pixel_window import PixelWindow
 from lippmann.rendering.film.feature_buffers import Guides
 from lippmann.rendering.sharing.cross_lens import lens_numbers, lens_numbers_in_full_color, share_light
 
+pytestmark = pytest.mark.usefixtures("engine")
+
 RGB_STRIPE = ((-1 / 3, 0.0), (0.0, 0.0), (1 / 3, 0.0))
 SIZE = (144, 60)
 LENTICULAR = Display("sheet", Panel(*SIZE, 0.25), LensArray("lenticular", 3.0), 6.0, aperture_distance=40.0)
@@ -62,10 +64,10 @@ def test_light_is_fetched_from_where_the_same_point_lies(name, z):
     display = DISPLAYS[name]
     light = waves(*on_plane(display, z))
     guides = plain_guides(display, z)
-    clean = share_light(gray(light * 0.5), display, guides, stop=0.0, threads=1)
+    clean = share_light(gray(light * 0.5), display, guides, stop=0.0)
     assert np.abs(inner(clean)[..., 0] - inner(light) * 0.5).max() < 0.03
     # A wrong height fetches light from elsewhere: what is above can fail.
-    wrong = share_light(gray(light * 0.5), display, replace(guides, height=-guides.height), stop=0.0, threads=1)
+    wrong = share_light(gray(light * 0.5), display, replace(guides, height=-guides.height), stop=0.0)
     assert np.abs(inner(wrong)[..., 0] - inner(light) * 0.5).max() > 0.09
 
 
@@ -74,8 +76,8 @@ def test_noise_that_lenses_do_not_share_falls(name):
     display = DISPLAYS[name]
     light = waves(*on_plane(display, -24.0))
     noise = np.random.default_rng(5).normal(0, 0.02, light.shape)
-    shared = share_light(gray(light + noise), display, plain_guides(display, -24.0, 1.0), stop=10.0, threads=2)
-    exact = share_light(gray(light), display, plain_guides(display, -24.0, 1.0), stop=10.0, threads=2)
+    shared = share_light(gray(light + noise), display, plain_guides(display, -24.0, 1.0), stop=10.0)
+    exact = share_light(gray(light), display, plain_guides(display, -24.0, 1.0), stop=10.0)
     left = inner(shared - exact)[..., 0]
     assert left.std() < 0.02 / 3.5
     assert abs(left.mean()) < 0.001
@@ -85,7 +87,7 @@ def test_an_even_light_stays_as_it_is_under_any_texture():
     albedo = np.random.default_rng(1).uniform(0, 1, (SIZE[1], SIZE[0], 3)).astype(np.float32)
     guides = replace(plain_guides(LENTICULAR, -20.0), albedo=albedo)
     pixels = 0.7 * (albedo + np.float32(0.02))
-    assert share_light(pixels, LENTICULAR, guides, stop=40.0, threads=1) == pytest.approx(pixels, abs=1e-6)
+    assert share_light(pixels, LENTICULAR, guides, stop=40.0) == pytest.approx(pixels, abs=1e-6)
 
 
 def test_light_of_other_surfaces_is_left_out():
@@ -97,25 +99,25 @@ def test_light_of_other_surfaces_is_left_out():
         values = getattr(guides, changed).copy()
         values[other] = (1.0, 0.0, 0.0) if changed == "normal" else -60.0
         apart = replace(guides, **{changed: values})
-        kept = share_light(gray(light), LENTICULAR, apart, stop=0.0, threads=1)
+        kept = share_light(gray(light), LENTICULAR, apart, stop=0.0)
         assert kept[..., 0] == pytest.approx(light, abs=2e-3)
-    assert np.abs(share_light(gray(light), LENTICULAR, guides, stop=0.0, threads=1)[..., 0] - light).mean() > 0.2
+    assert np.abs(share_light(gray(light), LENTICULAR, guides, stop=0.0)[..., 0] - light).mean() > 0.2
 
 
 def test_what_shines_another_way_from_lens_to_lens_is_not_smeared():
     light = np.ones((SIZE[1], SIZE[0]))
     light[:, 70:74] = 4.0  # one lens's pixels alone
     guides = plain_guides(LENTICULAR, -20.0)
-    kept = share_light(gray(light), LENTICULAR, guides, stop=40.0, threads=1)[..., 0]
+    kept = share_light(gray(light), LENTICULAR, guides, stop=40.0)[..., 0]
     assert kept == pytest.approx(light, rel=1e-3)
-    assert share_light(gray(light), LENTICULAR, guides, stop=0.0, threads=1)[30, 72, 0] < 3
+    assert share_light(gray(light), LENTICULAR, guides, stop=0.0)[30, 72, 0] < 3
 
 
 def test_in_the_lens_plane_every_lens_stands_for_itself():
     rng = np.random.default_rng(3)
     per_lens = rng.uniform(1, 2, SIZE[0] // 12)
     light = np.broadcast_to(np.repeat(per_lens, 12), (SIZE[1], SIZE[0]))
-    shared = share_light(gray(light), LENTICULAR, plain_guides(LENTICULAR, 0.0), stop=0.0, threads=1)
+    shared = share_light(gray(light), LENTICULAR, plain_guides(LENTICULAR, 0.0), stop=0.0)
     assert shared[..., 0] == pytest.approx(light, rel=1e-5)
 
 
@@ -125,10 +127,10 @@ def test_sub_pixels_take_from_sub_pixels_of_their_own_colour_and_lens():
     light *= [0.5, 1.0, 2.0]
     guides = plain_guides(display, -24.0)
     shared = share_light(
-        light.astype(np.float32), display, guides, stop=0.0, threads=1, lenses=lens_numbers(display, subpixels=True)
+        light.astype(np.float32), display, guides, stop=0.0, lenses=lens_numbers(display, subpixels=True)
     )
     assert (np.abs(inner(shared) - inner(light)) / [0.5, 1.0, 2.0]).max() < 0.06
-    together = share_light(light.astype(np.float32), display, guides, stop=0.0, threads=1)
+    together = share_light(light.astype(np.float32), display, guides, stop=0.0)
     wrong = (np.abs(inner(together) - inner(light)) / [0.5, 1.0, 2.0]).mean()
     assert wrong > 1.5 * (np.abs(inner(shared) - inner(light)) / [0.5, 1.0, 2.0]).mean()
 
@@ -147,7 +149,7 @@ def test_sub_pixels_in_full_colour_take_from_where_sub_pixels_lie(order):
     def shared(values, **options):
         lenses = lens_numbers_in_full_color(display)
         given = {"lenses": lenses, "columns": 3, **options}
-        clean = share_light(gray(values * 0.5), display, guides, stop=0.0, threads=2, **given)
+        clean = share_light(gray(values * 0.5), display, guides, stop=0.0, **given)
         return clean[8:-8, 72:-72, 0] / 0.5
 
     exact = light[8:-8, 72:-72]
@@ -161,15 +163,14 @@ def test_sub_pixels_in_full_colour_take_from_where_sub_pixels_lie(order):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DISPLAYS)
-def test_a_window_is_a_part_of_the_whole_and_threads_do_not_show(name):
+def test_a_window_is_a_part_of_the_whole(name):
     display = DISPLAYS[name]
     pixels = gray(waves(*on_plane(display, -15.0)))
     guides = plain_guides(display, -15.0)
-    whole = share_light(pixels, display, guides, stop=40.0, threads=1)
-    assert np.array_equal(whole, share_light(pixels, display, guides, stop=40.0, threads=3))
+    whole = share_light(pixels, display, guides, stop=40.0)
     part = np.s_[4:60, 10:140]
     window = PixelWindow(10, 4, 130, 56)
     cut = Guides(guides.albedo[part], guides.normal[part], guides.height[part])
     inside = np.s_[26:-26, 45:-45]  # what no pixel outside reaches
-    found = share_light(pixels[part], display, cut, stop=40.0, threads=2, lenses=lens_numbers(display, window))
+    found = share_light(pixels[part], display, cut, stop=40.0, lenses=lens_numbers(display, window))
     assert found[inside] == pytest.approx(whole[part][inside], abs=1e-6)

@@ -45,8 +45,8 @@ def plane(z, albedo=1.0):
     return Guides(np.full((*shape, 3), albedo, np.float32), normal, np.full(shape, z, np.float32))
 
 
-def shared(pixels, guides, threads=1):
-    return share_views(np.asarray(pixels, np.float32), quilt_rays(), guides, threads=threads)
+def shared(pixels, guides):
+    return share_views(np.asarray(pixels, np.float32), quilt_rays(), guides)
 
 
 def gray(values):
@@ -101,11 +101,6 @@ def test_other_surfaces_share_nothing(what):
             guides.height,
         )
     np.testing.assert_allclose(shared(pixels, guides), pixels, rtol=1e-5)
-
-
-def test_threads_do_not_matter():
-    pixels = np.random.default_rng(4).uniform(0, 1, (ROWS * VIEW[1], COLUMNS * VIEW[0], 3))
-    np.testing.assert_array_equal(shared(pixels, plane(7.0), 1), shared(pixels, plane(7.0), 3))
 
 
 def quilt(**options):

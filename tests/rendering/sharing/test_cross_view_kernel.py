@@ -1,12 +1,11 @@
-"""The compiled mean over the views that see a point, against one that follows its definition pixel by pixel."""
+"""The mean over the views that see a point, against one that follows its definition pixel by pixel."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-
-from lippmann.rendering.sharing.cross_view_kernel import share_view_rows
+import pytest
 
 #: Views in a row and a column of the quilt, pixels of a view, and how many views reach to either side.
 COLUMNS, ROWS, WIDTH, HEIGHT, REACH = 3, 2, 24, 7, 3
@@ -45,7 +44,11 @@ def shared_light(light, normal, height, slopes):
     return result
 
 
-def test_the_compiled_mean_is_the_slow_one():
+@pytest.mark.usefixtures("engine")
+def test_the_mean_is_the_slow_one(monkeypatch):
+    from lippmann.rendering.sharing import cross_view_kernel
+
+    monkeypatch.setattr(cross_view_kernel, "_AT_A_TIME", 100)  # several parts
     random = np.random.default_rng(1)
     shape = (ROWS * HEIGHT, COLUMNS * WIDTH)
     light = random.lognormal(0, 0.5, (*shape, 3)).astype(np.float32)
@@ -53,9 +56,7 @@ def test_the_compiled_mean_is_the_slow_one():
     normal = random.normal([0, 0, 1], 0.15, (*shape, 3))
     height, normal = height.astype(np.float32), normal.astype(np.float32)
     slopes = np.linspace(-0.2, 0.2, ROWS * COLUMNS)
-    found = np.full_like(light, np.nan)
-    for first, last in ((0, 5), (5, len(light))):
-        share_view_rows(first, last, light, normal, height, slopes, COLUMNS, CONVERGENCE, PIXELS_PER_MM, REACH, found)
+    found = cross_view_kernel.share(light, normal, height, slopes, COLUMNS, CONVERGENCE, PIXELS_PER_MM, REACH)
     expected = shared_light(*(views_of(part) for part in (light, normal, height)), slopes)
     np.testing.assert_allclose(views_of(found), expected, rtol=1e-5)
     # Neither all views agree nor none.

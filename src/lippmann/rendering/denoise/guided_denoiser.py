@@ -111,7 +111,7 @@ class GuidedDenoiser:
         self.used = self._effort()
         guides = self.guides()
         if self._shares and isinstance(self._source, QuiltRays):
-            pixels = share_views(pixels, self._source, guides, threads=self._threads)
+            pixels = share_views(pixels, self._source, guides)
         # The network overshoots below black beside bright edges.
         cleaned = np.maximum(self._cleaned(pixels, guides, turned), np.float32(0))
         self._progress(Progress("denoise", 1, 1))
@@ -133,7 +133,6 @@ class GuidedDenoiser:
             source.display,
             self.guides(),
             stop=SHARING_STOP[self.used],
-            threads=self._threads,
             lenses=self._lenses,
             columns=3 if isinstance(source, SubpixelRays) else 1,
         )

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
 from lippmann.rendering.denoise.local_statistics import Halves, leave_one_out_mean, mean_around, measured
-from lippmann.rendering.denoise.local_statistics_kernels import judged_rows
 from lippmann.runtime.row_threads import Bands
 
 Floats = NDArray[np.float32]
@@ -50,10 +49,18 @@ def own_share(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int)
         CPU threads; the result does not depend on them.
     """
     bands = Bands(threads)
-    noise, error = measured(judged_rows, noisy, clean, transfer=transfer, bands=bands)
+    noise, error = measured(_noise_and_error, noisy, clean, transfer=transfer, bands=bands)
     share = np.ones_like(noise)
     for reach in (NEAR, FAR):
         of_noise = np.maximum(mean_around(noise, reach, bands), 0)
         known = leave_one_out_mean(error, reach, _DEVIATIONS, bands)
         share *= known / (known + of_noise + np.float32(_NOTHING))
     return np.sqrt(share)[..., None]
+
+
+def _noise_and_error(a: Floats, b: Floats, clean_a: Floats, clean_b: Floats, slope: Floats) -> tuple[Floats, Floats]:
+    """Squared errors, between codes, of a noisy half and of a clean one, ``(H, W)``; right on the average."""
+    weight = np.square(slope) / 6
+    scatter = np.square(a - b)
+    error = np.square(clean_a - b) + np.square(clean_b - a) - scatter
+    return np.einsum("hwc,hwc->hw", weight, scatter), np.einsum("hwc,hwc->hw", weight, error)

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
 from lippmann.rendering.denoise.local_statistics import Halves, leave_one_out_mean, mean_around, measured
-from lippmann.rendering.denoise.local_statistics_kernels import compared_rows
 from lippmann.runtime.row_threads import Bands
 
 Floats = NDArray[np.float32]
@@ -45,6 +44,17 @@ def own_light(noisy: Halves, clean: Halves, shared: Halves, transfer: Transfer, 
         CPU threads; the result does not depend on them.
     """
     bands = Bands(threads)
-    gain, apart = measured(compared_rows, noisy, clean, shared, transfer=transfer, bands=bands)
+    gain, apart = measured(_gain_and_distance, noisy, clean, shared, transfer=transfer, bands=bands)
     known = leave_one_out_mean(gain, REACH, _DEVIATIONS, bands)
     return np.minimum(known / (mean_around(apart, REACH, bands) + np.float32(_NOTHING)), 1)[..., None]
+
+
+def _gain_and_distance(
+    a: Floats, b: Floats, clean_a: Floats, clean_b: Floats, shared_a: Floats, shared_b: Floats, slope: Floats
+) -> tuple[Floats, Floats]:
+    """The terms of both sums, between codes, ``(H, W)``: the upper one's is right on the average."""
+    weight = np.square(slope)
+    step_a, step_b = shared_a - clean_a, shared_b - clean_b
+    gain = (shared_a - b) * step_a + (shared_b - a) * step_b
+    apart = np.square(step_a) + np.square(step_b)
+    return np.einsum("hwc,hwc->hw", weight, gain), np.einsum("hwc,hwc->hw", weight, apart)

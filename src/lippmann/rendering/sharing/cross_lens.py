@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.rendering.sharing.cross_lens_kernel import share_rows
-from lippmann.runtime.row_threads import Bands
+from lippmann.rendering.sharing.cross_lens_kernel import share
 
 if TYPE_CHECKING:
     from lippmann.rendering.film.feature_buffers import Guides
@@ -40,7 +39,6 @@ def share_light(
     guides: Guides,
     *,
     stop: float,
-    threads: int,
     lenses: NDArray[np.int32] | None = None,
     columns: int = 1,
 ) -> Floats:
@@ -55,8 +53,6 @@ def share_light(
         Albedo, normal and height of the same pixels.
     stop:
         Weight of a squared relative difference of light: the less noise is left, the larger it may be.
-    threads:
-        CPU threads; the result does not depend on them.
     lenses:
         From :func:`lens_numbers`: of a window, or of sub-pixels that show one colour each; those of sub-pixels in full
         colour from :func:`lens_numbers_in_full_color`. None for whole pixels of the whole panel.
@@ -67,6 +63,7 @@ def share_light(
     -------
     float32 of the same shape.
     """
+    assert guides.height is not None
     albedo = guides.reflected()
     light = np.ascontiguousarray(pixels / albedo, dtype=np.float32)
     shared = np.empty_like(light)
@@ -76,15 +73,9 @@ def share_light(
     if lenses is None:
         lenses = lens_numbers(display)
     groups = [slice(0, 3)] if len(lenses) == 1 else [slice(c, c + 1) for c in range(3)]
-    bands = Bands(threads)
     for lens, group in zip(lenses, groups, strict=True):
-        part = np.ascontiguousarray(light[..., group])
-        mean = np.empty_like(part)
         surface = (guides.normal, guides.height, lens, centers)
-        bands.lines(
-            share_rows, len(light), part, *surface, float(display.gap), *reach, is_lenticular, float(stop), mean
-        )
-        shared[..., group] = mean
+        shared[..., group] = share(light[..., group], *surface, display.gap, reach, is_lenticular, stop)
     return np.asarray(shared * albedo, dtype=np.float32)
 
 

@@ -1,13 +1,18 @@
-"""Light of one surface point, averaged over the micro-images that show it: the compiled part."""
+"""Light of one surface point, averaged over the micro-images that show it: the part on the device."""
 
 from __future__ import annotations
 
-import math
+from itertools import product
+from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.runtime.numba_jit import uncounted
+from lippmann.device.kernel_ops import divide
+from lippmann.device.syntax import syntax
+from lippmann.device.types import Array, Float, UInt32
 
 #: Sums of squared differences from which on nothing is shared: weights are ``(1 - sum / 10)^8``, which is nearly
 #: ``exp(-0.8 sum)`` and takes a fraction of its time.
@@ -22,97 +27,123 @@ _ACROSS, _ALONG = 1.0, 0.3
 _FLAT = 1e-3
 #: What keeps relative differences of light finite in the dark.
 _DARK = 1e-3
+#: Pixels at a time: more take memory, fewer time for each start of the kernel.
+_PIXELS = 2**20
 
 
-@uncounted
-def share_rows(
-    first: int,
-    last: int,
+def share(
     light: NDArray[np.float32],
     normal: NDArray[np.float32],
     height: NDArray[np.float32],
     lens: NDArray[np.int32],
-    centers: NDArray[np.float32],
+    centers: NDArray[np.float64],
     gap: float,
-    reach_i: int,
-    reach_j: int,
+    reach: tuple[int, int],
     cylindrical: bool,
     stop: float,
-    shared: NDArray[np.float32],
-) -> None:
-    """Rows ``[first, last)`` of ``shared``: the weighted mean of ``light`` over all places that show the same point.
+) -> NDArray[np.float32]:
+    """The weighted mean of ``light`` over all places that show the same point.
 
-    ``light`` and ``shared`` are ``(H, W, C)``, ``normal`` ``(H, W, 3)``, ``height`` ``(H, W)`` z in millimetres, and
-    ``lens`` ``(H, W)`` each pixel's lens as its number in ``centers``, ``(rows, columns, 2)`` in pixels to the right
-    and downwards. A point that pixel q shows through lens C lies at ``q + (C' - C) (1 + g / z)`` under lens C'. Where
-    there is no surface (a normal of 0) light stays as it is.
+    ``light`` and the result are ``(H, W, C)``, C 1 or 3, ``normal`` ``(H, W, 3)``, ``height`` ``(H, W)`` z in
+    millimetres, and ``lens`` ``(H, W)`` each pixel's lens as its number in ``centers``, ``(rows, columns, 2)`` in
+    pixels to the right and downwards; ``reach`` is in lenses to either side and up and down. A point that pixel q shows
+    through lens C lies at ``q + (C' - C) (1 + g / z)`` under lens C'. Where there is no surface (a normal of 0) light
+    stays as it is.
     """
-    rows, columns = height.shape
-    channels = light.shape[2]
-    lens_rows, lens_columns = centers.shape[0], centers.shape[1]
-    down = _ALONG if cylindrical else _ACROSS
-    for row in range(first, last):
-        for column in range(columns):
-            own = lens[row, column]
-            own_j, own_i = own // lens_columns, own % lens_columns
-            facing = 0.0
-            for c in range(3):
-                facing += abs(normal[row, column, c])
-            if facing == 0.0:
-                for c in range(channels):
-                    shared[row, column, c] = light[row, column, c]
-                continue
-            z = float(height[row, column])
-            seen_by = abs(z) / gap + 2.0  # lenses to either side, at most
-            is_flat = abs(z) < _FLAT * gap
-            shift = 1.0 if is_flat else 1.0 + gap / z
-            per_height = 1.0 / (abs(z) * _OF_HEIGHT + gap * _OF_GAP)
-            brightness = _DARK
-            for c in range(channels):
-                brightness += light[row, column, c] * light[row, column, c]
-                shared[row, column, c] = 0.0
-            per_light = stop / brightness
-            total = 0.0
-            for dj in range(-reach_j, reach_j + 1):
-                j = own_j + dj
-                if j < 0 or j >= lens_rows or abs(dj) > seen_by:
-                    continue
-                for di in range(-reach_i, reach_i + 1):
-                    i = own_i + di
-                    if i < 0 or i >= lens_columns or abs(di) > seen_by:
-                        continue
-                    is_own = di == 0 and dj == 0
-                    if is_flat and not is_own:
-                        continue
-                    u = column + 0.5 + (centers[j, i, 0] - centers[own_j, own_i, 0]) * shift
-                    v = row + 0.5 + (centers[j, i, 1] - centers[own_j, own_i, 1]) * shift
-                    if not (-1.0 <= u < columns + 1.0 and -1.0 <= v < rows + 1.0):
-                        continue
-                    x, y = math.floor(u), math.floor(v)
-                    for ry in range(max(0, y - 1), min(rows, y + 2)):
-                        dv = ry + 0.5 - v
-                        for rx in range(max(0, x - 1), min(columns, x + 2)):
-                            if lens[ry, rx] != j * lens_columns + i:
-                                continue
-                            du = rx + 0.5 - u
-                            dz = (height[ry, rx] - z) * per_height
-                            fade = _ACROSS * du * du + down * dv * dv + dz * dz
-                            if fade >= _FADED:
-                                continue
-                            for c in range(3):
-                                dn = normal[ry, rx, c] - normal[row, column, c]
-                                fade += _NORMAL * dn * dn
-                            for c in range(channels):
-                                dl = light[ry, rx, c] - light[row, column, c]
-                                fade += dl * dl * per_light
-                            if fade >= _FADED:
-                                continue
-                            near = 1.0 - fade / _FADED
-                            near *= near
-                            near *= near
-                            weight = near * near
-                            total += weight
-                            for c in range(channels):
-                                shared[row, column, c] += weight * light[ry, rx, c]
-            for c in range(channels):
-                shared[row, column, c] /= total
+    pixels, channels = height.size, light.shape[2]
+    picture = _Picture(light, normal, height, lens, centers, gap, reach, cylindrical, stop)
+    shared = np.empty((pixels, channels), dtype=np.float32)
+    for first in range(0, pixels, _PIXELS):
+        last = min(first + _PIXELS, pixels)
+        pixel = dr.arange(mi.UInt32, last - first) + dr.opaque(mi.UInt32, first)
+        shared[first:last] = np.array(picture.mean_light(pixel)).T
+    return shared.reshape(light.shape)
+
+
+class _Picture:
+    """What pixels show, and the lenses that they lie under, on the device; numbers are opaque, for one kernel."""
+
+    def __init__(
+        self,
+        light: NDArray[np.float32],
+        normal: NDArray[np.float32],
+        height: NDArray[np.float32],
+        lens: NDArray[np.int32],
+        centers: NDArray[np.float64],
+        gap: float,
+        reach: tuple[int, int],
+        cylindrical: bool,
+        stop: float,
+    ) -> None:
+        def read(values: NDArray[Any]) -> Float:
+            return mi.Float(np.ascontiguousarray(values, dtype=np.float32).ravel())
+
+        def opaque(kind: type[Array], *values: float) -> tuple[Array, ...]:
+            return tuple(dr.opaque(kind, value) for value in values)
+
+        self._light_type = mi.Color3f if light.shape[2] == 3 else mi.Color1f
+        self._light, self._normal, self._height, self._centers = (
+            read(values) for values in (light, normal, height, centers)
+        )
+        self._lens = mi.Int32(np.ascontiguousarray(lens, dtype=np.int32).ravel())
+        self._size = opaque(mi.Int32, *height.shape)
+        self._lenses = opaque(mi.Int32, *centers.shape[:2])
+        self._reach = opaque(mi.Int32, *reach)
+        self._gap, self._down, self._stop = opaque(mi.Float, gap, _ALONG if cylindrical else _ACROSS, stop)
+
+    @syntax
+    def mean_light(self, pixel: UInt32) -> Array:
+        """The mean of some pixels, by their numbers in the picture."""
+        rows, columns = self._size
+        lens_rows, lens_columns = self._lenses
+        reach_i, reach_j = self._reach
+        row, column = divide(mi.Int32(pixel), columns)
+        own = dr.gather(mi.Int32, self._lens, pixel)
+        own_center = dr.gather(mi.Point2f, self._centers, own)
+        own_j, own_i = divide(own, lens_columns)
+        normal = dr.gather(mi.Vector3f, self._normal, pixel)
+        light = dr.gather(self._light_type, self._light, pixel)
+        z = dr.gather(mi.Float, self._height, pixel)
+        is_surface = (normal != 0).x | (normal != 0).y | (normal != 0).z
+        is_flat = dr.abs(z) < _FLAT * self._gap
+        shift = dr.select(is_flat, 1, 1 + self._gap / z)
+        per_height = 1 / (dr.abs(z) * _OF_HEIGHT + self._gap * _OF_GAP)
+        per_light = self._stop / (_DARK + dr.squared_norm(light))
+        # Lenses to either side that see the point, at most.
+        seen_by = dr.select(is_flat, 0, mi.Int32(dr.minimum(dr.abs(z) / self._gap + 2, 1e6)))
+        reach_i, reach_j = dr.minimum(reach_i, seen_by), dr.minimum(reach_j, seen_by)
+
+        total, color = mi.Float(0), self._light_type(0)
+        di, dj = -reach_i, -reach_j
+        while is_surface & (dj <= reach_j):
+            i, j = own_i + di, own_j + dj
+            other = j * lens_columns + i
+            is_lens = (i >= 0) & (i < lens_columns) & (j >= 0) & (j < lens_rows)
+            center = dr.gather(mi.Point2f, self._centers, other, is_lens)
+            u = column + 0.5 + (center.x - own_center.x) * shift
+            v = row + 0.5 + (center.y - own_center.y) * shift
+            if is_lens & (u >= -1) & (u < columns + 1) & (v >= -1) & (v < rows + 1):
+                x, y = mi.Int32(dr.floor(u)), mi.Int32(dr.floor(v))
+                for step_y, step_x in product((-1, 0, 1), repeat=2):
+                    rx, ry = x + step_x, y + step_y
+                    there = ry * columns + rx
+                    inside = (rx >= 0) & (rx < columns) & (ry >= 0) & (ry < rows)
+                    inside &= dr.gather(mi.Int32, self._lens, there, inside) == other
+                    du, dv = rx + 0.5 - u, ry + 0.5 - v
+                    dz = (dr.gather(mi.Float, self._height, there, inside) - z) * per_height
+                    fade = _ACROSS * du * du + self._down * dv * dv + dz * dz
+                    if inside & (fade < _FADED):
+                        fade += _NORMAL * dr.squared_norm(dr.gather(mi.Vector3f, self._normal, there) - normal)
+                        here = dr.gather(self._light_type, self._light, there)
+                        fade += dr.squared_norm(here - light) * per_light
+                        near = dr.maximum(1 - fade / _FADED, 0)
+                        near *= near
+                        near *= near
+                        weight = near * near
+                        total += weight
+                        color += weight * here
+            di += 1
+            is_end = di > reach_i
+            di = dr.select(is_end, -reach_i, di)
+            dj += dr.select(is_end, 1, 0)
+        return dr.select(is_surface, color / total, light)

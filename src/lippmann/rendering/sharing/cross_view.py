@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display.view_cone import cone_tangent
-from lippmann.rendering.sharing.cross_view_kernel import share_view_rows
-from lippmann.runtime.row_threads import Bands
+from lippmann.rendering.sharing.cross_view_kernel import share
 
 if TYPE_CHECKING:
     from lippmann.rendering.film.feature_buffers import Guides
@@ -33,7 +32,7 @@ Floats = NDArray[np.float32]
 REACH = 0.07
 
 
-def share_views(pixels: Floats, source: QuiltRays, guides: Guides, *, threads: int) -> Floats:
+def share_views(pixels: Floats, source: QuiltRays, guides: Guides) -> Floats:
     """The noisy pixels of a quilt with less noise, ``(H, W, 3)`` float32.
 
     Parameters
@@ -42,28 +41,21 @@ def share_views(pixels: Floats, source: QuiltRays, guides: Guides, *, threads: i
         ``(H, W, 3)`` linear RGB >= 0, one for each of ``source``.
     guides:
         Albedo, normal and height of the same pixels.
-    threads:
-        CPU threads; the result does not depend on them.
     """
     assert guides.height is not None
     slopes = ((2 * np.arange(source.views) + 1) / source.views - 1) * cone_tangent(source.display)
     albedo = guides.reflected()
-    light = np.ascontiguousarray(pixels / albedo, dtype=np.float32)
-    shared = np.empty_like(light)
+    light = pixels / albedo
     step = 2 * cone_tangent(source.display) / source.views
     display_width, _ = source.display.size_mm
-    bands = Bands(threads)
-    bands.lines(
-        share_view_rows,
-        len(light),
+    shared = share(
         light,
-        np.ascontiguousarray(guides.normal, dtype=np.float32),
-        np.ascontiguousarray(guides.height, dtype=np.float32),
+        guides.normal,
+        guides.height,
         slopes,
         source.columns,
         1 / source.display.viewing_distance,
         source.view_size[0] / display_width,
         int(REACH / step),
-        shared,
     )
     return np.asarray(shared * albedo, dtype=np.float32)
