@@ -9,7 +9,7 @@ ROUNDS ?= 20
 OPEN := $(if $(filter Darwin,$(shell uname -s)),open,xdg-open)
 
 .DEFAULT_GOAL := help
-.PHONY: addon audit check docs help setup setup-dev demo test test-long test-oldest search lint clean
+.PHONY: addon audit check dist docs help setup setup-dev demo test test-long test-oldest search lint clean
 
 help:
 	@echo 'make demo    set up and render a teapot for a lenticular display into $(PICTURE)'
@@ -21,6 +21,7 @@ help:
 	@echo 'make test-oldest  run the tests of picture files with the oldest libraries that are allowed'
 	@echo 'make lint    set up, check style and types'
 	@echo 'make addon   pack the add-on for Blender into dist/'
+	@echo 'make dist    set up, build the wheel and the source archive into dist/'
 	@echo 'make docs    set up, build the documentation into $(SITE)'
 	@echo 'make audit   set up, look installed packages up in the list of known vulnerabilities'
 	@echo 'make clean   remove what set-up and tests made; pictures in out/ stay'
@@ -45,6 +46,9 @@ docs: setup-dev
 
 addon: setup
 	.venv/bin/python scripts/pack_addon.py
+
+dist: setup-dev
+	.venv/bin/python -m build --no-isolation --outdir dist
 
 audit: setup-dev
 	.venv/bin/python scripts/audit.py
