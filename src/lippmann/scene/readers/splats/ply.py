@@ -193,6 +193,7 @@ def _filtered(log_scales: FloatArray, opacities: FloatArray, widths: FloatArray)
     return (0.5 * np.log(wide)).astype(np.float32), (opacities * shares).astype(np.float32)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of damaged numbers, which are left out
 def _coefficients_of_colors(rows: Rows, element: Element) -> FloatArray:
     """Coefficients of degree 0 of sRGB colours."""
     brightest = {each.name: each.brightest for each in element.properties}
