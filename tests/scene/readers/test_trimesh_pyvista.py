@@ -44,11 +44,15 @@ def test_instances_share_their_mesh():
 def test_colours_of_vertices_and_faces():
     mesh = box()
     mesh.visual.vertex_colors = np.tile([255, 0, 188, 51], (8, 1)).astype(np.uint8)
-    (found,) = load_scene(mesh).description.meshes
+    scene = load_scene(mesh).description
+    (found,) = scene.meshes
     assert found.colors[0] == pytest.approx([1, 0, float(decode_srgb(np.array(188 / 255))), 0.2], abs=1e-6)
+    assert scene.materials[found.material].alpha_mode == "blend"
     mesh = box()
     mesh.visual.face_colors = np.array([[255, 0, 0, 255]] + [[0, 0, 255, 255]] * 11, np.uint8)
-    (found,) = load_scene(mesh).description.meshes
+    scene = load_scene(mesh).description
+    (found,) = scene.meshes
+    assert scene.materials[found.material].alpha_mode == "opaque"
     assert len(found.positions) == 36
     assert (found.colors[found.faces][0] == (1, 0, 0, 1)).all()
     assert (found.colors[found.faces][1:] == (0, 0, 1, 1)).all()
@@ -142,6 +146,7 @@ class PolyData:
     """As much of a PyVista surface as is asked for."""
 
     verts = ()
+    n_verts = n_lines = 0
     active_texture_coordinates = None
 
     def __init__(self, scalars=None, cells=()):

@@ -15,10 +15,10 @@ from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import texels_of
 from lippmann.scene.readers.volumes.description import describe_volume
 from lippmann.scene.readers.vtk.data_set import (
-    COLORED,
     GREY,
     image_of,
     linear_colors,
+    material_of,
     mesh_of,
     surface_of,
     unshown_arrays,
@@ -106,11 +106,11 @@ def _from_trimesh_mesh(
             uvs = ((np.asarray(visual.uv)[:, :2] * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32),)  # v runs upwards
         surface = _from_trimesh_material(visual.material, images)
     elif kind == "vertex":
-        colors, surface = linear_colors(visual.vertex_colors), COLORED
+        colors, surface = linear_colors(visual.vertex_colors), material_of(visual.vertex_colors)
     elif kind == "face":
         corners = faces.ravel()
         positions, normals = positions[corners], None if normals is None else normals[corners]
-        colors, surface = np.repeat(linear_colors(visual.face_colors), 3, axis=0), COLORED
+        colors, surface = np.repeat(linear_colors(visual.face_colors), 3, axis=0), material_of(visual.face_colors)
         faces = np.arange(len(corners)).reshape(-1, 3)
     mesh = Mesh(
         name=name,
@@ -215,12 +215,11 @@ def from_pyvista(source: pyvista.DataSet | pyvista.MultiBlock) -> SceneDescripti
     if image is not None:
         return describe_volume("pyvista", *image, notes=[f"the scalars '{source.active_scalars_name}'"])
     surface = surface_of(source)
-    material = GREY if surface.colors is None else COLORED
     mesh = mesh_of(surface, "pyvista", 0)
     notes = [_UP_NOTE, *surface.notes]
     if surface.colors is None and (names := unshown_arrays(source)):
         notes.append(f"none of its arrays is active in all of it, so that none is shown of {names}")
-    return SceneDescription("pyvista", [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
+    return SceneDescription("pyvista", [mesh], [material_of(surface.colors)], [Instance(0, np.eye(4))], notes=notes)
 
 
 def adapter_for(source: object) -> Callable[[object], SceneDescription] | None:

@@ -183,6 +183,41 @@ def test_files(tmp_path):
     assert volume.grid.ravel().tolist() == [0, 1, 2, 3, 4, 5]
 
 
+def test_colours_of_a_file_are_its_own(tmp_path):
+    """Bytes of four channels with their opacity; a table of colours that a file of the older kind brings along."""
+    sheet = pyvista.Plane(i_resolution=1, j_resolution=1)
+    sheet["rgba"] = np.array([[255, 0, 0, 255], [255, 0, 0, 51]] * 2, np.uint8)
+    sheet.set_active_scalars("rgba")
+    sheet.save(tmp_path / "a.vtp")
+    scene = load_scene(tmp_path / "a.vtp").description
+    assert scene.materials[0].alpha_mode == "blend"
+    assert sorted(scene.meshes[0].colors[:, 3].tolist()) == pytest.approx([0.2, 0.2, 1, 1])
+    head = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 1 0 0 0 1 0\n"
+    table = "SCALARS heat float 1\nLOOKUP_TABLE own\n0 5 10\nLOOKUP_TABLE own 3\n1 0 0 1\n0 1 0 1\n0 0 1 1\n"
+    (tmp_path / "b.vtk").write_text(head + "POLYGONS 1 4\n3 0 1 2\nPOINT_DATA 3\n" + table)
+    scene = load_scene(tmp_path / "b.vtk").description
+    assert scene.meshes[0].colors[:, :3].tolist() == np.eye(3).tolist()
+    assert "the scalars 'heat' from 0 to 10 are coloured by their own 3 colours" in scene.notes
+
+
+def test_lines_and_points_beside_a_surface_are_named_and_take_none_of_its_colours(plotter):
+    """VTK counts cells from points over lines to polygons: the scalars of the last two are those of the triangles."""
+    corners = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0), (2, 2, 0)], np.float32)
+    mixed = pyvista.PolyData(corners, faces=[3, 0, 1, 2, 3, 1, 3, 2], lines=[2, 3, 4], verts=[1, 4])
+    mixed.cell_data["heat"] = np.array([9.0, 8.0, 1.0, 2.0])
+    mixed.set_active_scalars("heat", preference="cell")
+    scene = load_scene(mixed)
+    (mesh,) = scene.description.meshes
+    alone = pyvista.PolyData(corners[:4], faces=[3, 0, 1, 2, 3, 1, 3, 2])
+    alone.cell_data["heat"] = np.array([1.0, 2.0])
+    alone.set_active_scalars("heat", preference="cell")
+    np.testing.assert_array_equal(mesh.colors, load_scene(alone).description.meshes[0].colors)
+    told = "beside the surface, points (1) and lines (1) are not shown"
+    assert told in scene.notes
+    plotter.add_mesh(mixed, name="both")
+    assert any(note.endswith(told) for note in load_scene(plotter).notes)
+
+
 def test_an_array_is_chosen_by_its_name(tmp_path):
     sphere = pyvista.Sphere()
     sphere["height"], sphere.cell_data["number"] = sphere.points[:, 2], np.arange(float(sphere.n_cells))

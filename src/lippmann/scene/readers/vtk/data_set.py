@@ -6,7 +6,7 @@ PyVista is not imported here: whoever has an object of it has loaded it.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +28,14 @@ _NO_NUMBER = (160, 160, 160, 255)
 
 GREY = Material("grey", base_color=(0.7, 0.7, 0.7), roughness=0.6, double_sided=True)
 COLORED = Material("vertex colours", roughness=0.6, double_sided=True)
+_TRANSLUCENT = replace(COLORED, alpha_mode="blend")
+
+
+def material_of(colors: ArrayLike | None) -> Material:
+    """The material of a surface with colours ``(n, 3 or 4)`` of bytes, or without."""
+    if colors is None:
+        return GREY
+    return _TRANSLUCENT if (np.asarray(colors)[:, 3:] < 255).any() else COLORED
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +57,8 @@ class Surface:
 def surface_of(source: pyvista.DataSet | pyvista.MultiBlock) -> Surface:
     """The outer surface of a data set, cut into triangles.
 
-    Bytes with three or four channels are colours; other scalars are coloured by :data:`COLOR_MAP` over their range,
-    vectors by their length.
+    Bytes with three or four channels are colours; other scalars are coloured over their range by a table of their own,
+    as files of VTK's older kind may have it, or by :data:`COLOR_MAP`, vectors by their length.
 
     Raises
     ------
@@ -62,16 +70,16 @@ def surface_of(source: pyvista.DataSet | pyvista.MultiBlock) -> Surface:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of defaults to come, whose new names older versions do not know
         surface = source if hasattr(source, "verts") else source.extract_surface()
+        surface, notes = _polygons(surface)
         surface, faces, owners = _triangles(surface)
     positions = np.asarray(surface.points, np.float64)
     if len(faces) == 0:
         raise SceneError("the PyVista data set has no surface", rule="there must be at least one face")
     normals, uvs = surface.point_data.active_normals, surface.active_texture_coordinates
-    notes: list[str] = []
     colors = None
     scalars = surface.active_scalars
     if scalars is not None:
-        colors = _colors(np.asarray(scalars), str(surface.active_scalars_name), notes)
+        colors = _colors(np.asarray(scalars), str(surface.active_scalars_name), _own_table(scalars), notes)
     if colors is not None and len(colors) != len(positions):  # one colour per face
         corners = faces.ravel()
         colors, positions = np.repeat(colors[owners], 3, axis=0), positions[corners]
@@ -86,6 +94,30 @@ def surface_of(source: pyvista.DataSet | pyvista.MultiBlock) -> Surface:
         colors,
         notes,
     )
+
+
+def _polygons(surface: pyvista.PolyData) -> tuple[pyvista.PolyData, list[str]]:
+    """A surface without its points and lines, which VTK counts before polygons, and a note on them.
+
+    VTK's own filter that makes triangles leaves the scalars of such cells undefined.
+    """
+    first = surface.n_verts + surface.n_lines
+    if not 0 < first < surface.n_cells:
+        return surface, []
+    left_out = [
+        f"{what} ({count})" for what, count in (("points", surface.n_verts), ("lines", surface.n_lines)) if count
+    ]
+    polygons = surface.extract_cells(np.arange(first, surface.n_cells)).extract_surface()
+    return polygons, [f"beside the surface, {' and '.join(left_out)} are not shown"]
+
+
+def _own_table(scalars: NDArray[np.generic]) -> NDArray[np.uint8] | None:
+    """The colours ``(n, 4)`` that an array of VTK's brings with it; None without."""
+    table = getattr(getattr(scalars, "VTKObject", None), "GetLookupTable", lambda: None)()
+    if not hasattr(table, "GetTableValue") or not table.GetNumberOfTableValues():
+        return None
+    values = [table.GetTableValue(number) for number in range(table.GetNumberOfTableValues())]
+    return np.rint(255.0 * np.array(values)).astype(np.uint8)
 
 
 def _triangles(surface: pyvista.PolyData) -> tuple[pyvista.PolyData, NDArray[np.int64], NDArray[np.int64]]:
@@ -136,7 +168,9 @@ def linear_colors(colors: ArrayLike) -> NDArray[np.float32]:
     return np.concatenate([decode_srgb(fraction[:, :3]), fraction[:, 3:]], axis=1).astype(np.float32)
 
 
-def _colors(scalars: NDArray[np.generic], name: str, notes: list[str]) -> NDArray[np.uint8] | None:
+def _colors(
+    scalars: NDArray[np.generic], name: str, table: NDArray[np.uint8] | None, notes: list[str]
+) -> NDArray[np.uint8] | None:
     """sRGB bytes ``(n, 3 or 4)`` of active scalars."""
     if scalars.dtype == np.uint8 and scalars.ndim == 2 and scalars.shape[1] in (3, 4):
         return np.asarray(scalars, np.uint8)
@@ -152,8 +186,9 @@ def _colors(scalars: NDArray[np.generic], name: str, notes: list[str]) -> NDArra
         notes.append(f"the scalars '{what}' hold no finite number, and are not shown")
         return None
     low, high = float(finite.min()), float(finite.max())
-    notes.append(f"the scalars '{what}' from {low:.5g} to {high:.5g} are coloured by {COLOR_MAP}")
-    return color_table(values, low, high, color_map(COLOR_MAP))
+    by = COLOR_MAP if table is None else f"their own {len(table)} colours"
+    notes.append(f"the scalars '{what}' from {low:.5g} to {high:.5g} are coloured by {by}")
+    return color_table(values, low, high, color_map(COLOR_MAP) if table is None else table)
 
 
 def color_map(name: str) -> NDArray[np.uint8]:

@@ -15,7 +15,7 @@ from lippmann.runtime.input_memory import check_input, input_memory_left
 from lippmann.runtime.optional_import import check_installed
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.volumes.description import describe_volume
-from lippmann.scene.readers.vtk.data_set import COLORED, GREY, Surface, mesh_of
+from lippmann.scene.readers.vtk.data_set import Surface, material_of, mesh_of
 from lippmann.scene.values.description import Instance, SceneDescription
 
 _MOST_SECONDS = 300.0
@@ -78,6 +78,5 @@ def _surface(name: str, arrays: dict[str, NDArray[np.generic]], notes: list[str]
     if normals is not None and not (np.isfinite(normals).all() and normals.shape == positions.shape):
         normals = None
     surface = Surface(positions, faces, normals, None, arrays.get("colors"))  # type: ignore[arg-type]  # as written
-    material = GREY if surface.colors is None else COLORED
     mesh = mesh_of(surface, name, 0)
-    return SceneDescription(name, [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
+    return SceneDescription(name, [mesh], [material_of(surface.colors)], [Instance(0, np.eye(4))], notes=notes)

@@ -81,6 +81,7 @@ def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
             except SceneError:
                 notes.append(f"'{block.name[:40]}' has no surface, and is not shown")
                 continue
+            notes += [f"'{block.name[:40]}': {note}" for note in surface.notes]
             if actor.prop.GetInterpolation() == _FLAT:
                 surface = replace(surface, normals=None)
             meshes.append(mesh_of(surface, block.name, len(materials)))
