@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -113,7 +113,8 @@ def _polygons(surface: pyvista.PolyData) -> tuple[pyvista.PolyData, list[str]]:
 
 def _own_table(scalars: NDArray[np.generic]) -> NDArray[np.uint8] | None:
     """The colours ``(n, 4)`` that an array of VTK's brings with it; None without."""
-    table = getattr(getattr(scalars, "VTKObject", None), "GetLookupTable", lambda: None)()
+    array: Any = getattr(scalars, "VTKObject", None)
+    table = None if array is None else array.GetLookupTable()
     if not hasattr(table, "GetTableValue") or not table.GetNumberOfTableValues():
         return None
     values = [table.GetTableValue(number) for number in range(table.GetNumberOfTableValues())]
