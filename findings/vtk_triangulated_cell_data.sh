@@ -8,7 +8,7 @@
 #   five values: three that nobody wrote, then those of the triangles. PyVista warns that the mesh is not valid.
 # Who is hurt: whoever colours triangles by cell data of a file with lines beside its faces (outlines, CAD edges,
 #   contours): colours belong to other cells, or to none.
-# Seen: "3 cells, 5 values: [6.89898287e-310 6.89898287e-310 6.89898315e-310 1.0 2.0]"
+# Seen: "3 cells, 5 values: [0.0, 0.0, 0.0, 1.0, 2.0]"; in a longer program "[6.9e-310, 6.9e-310, 6.9e-310, 1.0, 2.0]".
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

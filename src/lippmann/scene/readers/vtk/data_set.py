@@ -115,7 +115,7 @@ def _own_table(scalars: NDArray[np.generic]) -> NDArray[np.uint8] | None:
     """The colours ``(n, 4)`` that an array of VTK's brings with it; None without."""
     array: Any = getattr(scalars, "VTKObject", None)
     table = None if array is None else array.GetLookupTable()
-    if not hasattr(table, "GetTableValue") or not table.GetNumberOfTableValues():
+    if table is None or not hasattr(table, "GetTableValue") or not table.GetNumberOfTableValues():
         return None
     values = [table.GetTableValue(number) for number in range(table.GetNumberOfTableValues())]
     return np.rint(255.0 * np.array(values)).astype(np.uint8)
