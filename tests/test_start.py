@@ -20,21 +20,13 @@ main()
 #: Packages beside Python's own that each command may load, and the most modules of this program. Raised by hand alone:
 #: first see whether a module is needed before the command uses it.
 HELP = {"annotated_doc", "lippmann", "shellingham", "typer"}
-PLAIN = HELP | {
-    "annotated_types",
-    "cython_runtime",
-    "numpy",
-    "psutil",
-    "pydantic",
-    "pydantic_core",
-}
-PLAIN |= {"drjit", "imagecodecs", "mitsuba", "typing_extensions", "typing_inspection"}
+PLAIN = HELP | {"cython_runtime", "drjit", "imagecodecs", "mitsuba", "numpy", "psutil"}
 RENDER = PLAIN | {"cffi", "pycparser", "pyoidn"}
 BUDGETS = {
-    "--help": (HELP, 25),
-    "preview teapot": (PLAIN, 290),
-    "render teapot": (RENDER, 365),
-    "render model.glb": (RENDER, 380),
+    "--help": (HELP, 23),
+    "preview teapot": (PLAIN, 295),
+    "render teapot": (RENDER, 335),
+    "render model.glb": (RENDER, 350),
 }
 
 

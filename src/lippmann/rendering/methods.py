@@ -29,7 +29,6 @@ from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.job import Job, Traced
 from lippmann.rendering.light_statements import is_among_mirrors
 from lippmann.rendering.reprojection.common.point_image import STATUS_LAYER, TRACED
-from lippmann.rendering.reprojection.renderer import trace_reused as trace_reprojected
 from lippmann.rendering.request.choices import Method
 from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator
@@ -248,6 +247,9 @@ def _reused(job: Job) -> Traced:
     request = job.request
     assert request.method in ("lens-view", "interpolated")
     assert isinstance(job.source, DisplayRays)
+    # Many modules, which no other method uses.
+    from lippmann.rendering.reprojection.renderer import trace_reused as trace_reprojected
+
     frame = trace_reprojected(
         cast("ReusableIntegrator", job.integrator),
         job.source,

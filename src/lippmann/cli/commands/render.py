@@ -283,12 +283,13 @@ def _with_seconds(image: IntegralImage, **seconds: float) -> IntegralImage:
 def is_tiled(output: Path, bits: int | None, display: Display, request: RenderRequest, *, resume: bool) -> bool:
     """Whether a picture has to be rendered in tiles: where that is asked for, or is the only way."""
     from lippmann.image.write import format_for
-    from lippmann.tiles.tiled_render import fits_whole
 
     name, _ = format_for(output, bits)
-    if resume or name == "zarr":
-        return True
-    return name == "tiff" and not fits_whole(display, request)
+    if resume or name != "tiff":
+        return resume or name == "zarr"
+    from lippmann.tiles.tiled_render import fits_whole
+
+    return not fits_whole(display, request)
 
 
 @contextmanager

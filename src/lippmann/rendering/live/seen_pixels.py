@@ -7,19 +7,23 @@ line through the lens's centre, see :meth:`lippmann.display.Display.panel_point_
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import NUMPY, Display
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.rendering.live.seen_pixels_kernel import number_pixels
 
 Vector = tuple[float, float, float]
 Indices = NDArray[np.uint32]
 
 #: Lenses wider than this many pixels of the picture are seen as blocks, each of one colour.
 _BLOCK_WIDTH = 1.5
+#: Tolerance in pixels for points on a boundary between pixels: that of :mod:`lippmann.viewing.replay`.
+_ON_BOUNDARY = 1e-6
+#: Beyond this many pixels the exact place does not matter.
+_FAR = 1e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,29 +77,56 @@ class EyeMap:
         self._center_x, self._center_y = display.lattice.center(i, j, x, y, NUMPY)
         self._lens = (np.rint(j - j.min()).astype(np.int64), np.rint(i - i.min()).astype(np.int64))
         channels = 3 if subpixels else 1
-        #: For each (sub-)pixel of the panel the number that it had last.
-        self._last = np.zeros(panel.width * panel.height * channels, np.int32)
+        #: The first place of the picture that shows each (sub-)pixel of the panel; the last stands for what is past it.
+        self._first = np.empty(panel.width * panel.height * channels + 1, np.int32)
         offsets = np.array(panel.subpixel_offsets if subpixels else [(0.0, 0.0)], np.float64)
         cells = panel.subpixel_cells if subpixels else None
         self._cells = np.array(offsets[None, None] if cells is None else cells, np.float64)
 
     def seen_by(self, eye: Vector) -> PixelSet:
         """The pixels seen by an eye at ``eye`` (mm in the display's frame, z > 0)."""
-        display, (width, height) = self.display, self.size
-        panel = display.panel
-        number = np.empty((height, width, 3 if self.subpixels else 1), np.int32)
-        keys = np.empty(number.size + 2, np.int64)
-        found = number_pixels(
-            self._center_x,
-            self._center_y,
-            (float(eye[0]), float(eye[1]), display.gap / float(eye[2])),
-            (panel.width, panel.height, panel.pixel_pitch),
-            self._cells,
-            self._last,
-            keys,
-            number,
-        )
-        return _pixel_set(keys[: max(found, 2)], number, panel.width, self._blocks(number))
+        panel = self.display.panel
+        scale = self.display.gap / float(eye[2])
+        u = (self._center_x + (self._center_x - eye[0]) * scale) / panel.pixel_pitch + 0.5 * panel.width
+        v = 0.5 * panel.height - (self._center_y + (self._center_y - eye[1]) * scale) / panel.pixel_pitch
+        u, v = (np.clip(part, -_FAR, _FAR)[..., None] for part in (u, v))
+        if len(self._cells) * len(self._cells[0]) > 1:
+            column, row = self._nearest(u, v)
+        else:
+            right, down = np.moveaxis(self._cells[0, 0], -1, 0)
+            column = np.floor(u - right + _ON_BOUNDARY).astype(np.int64)
+            row = np.floor(v - down + _ON_BOUNDARY).astype(np.int64)
+        channels = self._cells.shape[2]
+        is_seen = (column >= 0) & (column < panel.width) & (row >= 0) & (row < panel.height)
+        keys = np.where(is_seen, (row * panel.width + column) * channels + np.arange(channels), -1).ravel()
+        place = np.arange(len(keys), dtype=np.int32)
+        # Of several places that show one pixel the first is written last.
+        self._first[keys[::-1]] = place[::-1]
+        first = self._first[keys]
+        is_first = (first == place) & is_seen.ravel()
+        number = (np.cumsum(is_first, dtype=np.int32) - 1)[first].reshape(is_seen.shape)
+        number[~is_seen] = -1
+        found = keys[is_first]
+        if len(found) < 2:
+            found = np.append(found, np.zeros(2 - len(found), np.int64))
+        return _pixel_set(found, number, panel.width, self._blocks(number))
+
+    def _nearest(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Columns and rows of the pixels whose sub-pixels have the nearest centres; -1 where none is on the panel."""
+        panel, cells = self.display.panel, self._cells
+        middle_column, middle_row = (np.floor(part + _ON_BOUNDARY).astype(np.int64) for part in (u, v))
+        shape = (*u.shape[:2], cells.shape[2])
+        best = np.full(shape, np.inf)
+        best_column, best_row = np.full((2, *shape), -1, np.int64)
+        for down, right in product(range(-2, 3), repeat=2):
+            column, row = middle_column + right, middle_row + down
+            on_panel = (column >= 0) & (column < panel.width) & (row >= 0) & (row < panel.height)
+            offset = cells[row % cells.shape[0], column % cells.shape[1]][:, :, 0]
+            distance = np.square(column + 0.5 + offset[..., 0] - u) + np.square(row + 0.5 + offset[..., 1] - v)
+            is_nearer = on_panel & (distance < best)
+            best = np.where(is_nearer, distance, best)
+            best_column, best_row = np.where(is_nearer, column, best_column), np.where(is_nearer, row, best_row)
+        return best_column, best_row
 
     def _blocks(self, number: NDArray[np.int32]) -> NDArray[np.int32] | None:
         display = self.display
