@@ -23,13 +23,13 @@ from equal_error import (
     Judge,
     Picture,
     Stage,
+    guided_denoiser,
     light_up,
     once,
     prepare,
     reference_pair,
     trace_paths,
 )
-from equal_time import guided_denoiser
 from harness import kept, save
 
 SCENES = ("primitives", "small-balls", "gears")

@@ -162,7 +162,6 @@ def _denoised(
     batches: Any,
 ) -> None:
     """One picture's noise taken out; and pooled light, as the program makes it: by halves, shared, beside samples."""
-    from equal_time import guided_denoiser
     from lippmann.rendering.denoise.dual_buffer import Denoised
 
     samples, effort = how
@@ -186,6 +185,23 @@ def _denoised(
         parts = {"trace": traced[way], "guides": looked, "clean": seconds}
         found = {"spp": samples, "effort": effort, "seconds": sum(parts.values()), "parts": parts}
         curves[way].append({**found, **judge(result)})
+
+
+def guided_denoiser(stage: Stage, effort: str) -> Any:
+    """The denoiser of a pooled picture."""
+    from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
+
+    return GuidedDenoiser(
+        stage.built,
+        stage.source,
+        stage.display_from_world,
+        seed=3,
+        box_filter=True,
+        memory=4 << 30,
+        threads=CORES,
+        effort=lambda: effort,
+        shares=True,
+    )
 
 
 def timed(call: Callable[[], T]) -> tuple[float, T]:

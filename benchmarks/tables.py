@@ -15,7 +15,6 @@ import conformance_tables
 import defaults_tables
 import drafts_tables
 import equal_error_tables
-import equal_time_tables
 import estimate_coverage_tables
 import first_picture_tables
 import goals_tables
@@ -402,7 +401,6 @@ SECTIONS = {
     "caustics": caustics_tables.describe,
     "photon_share": photon_share_tables.describe,
     "light_vertices": light_vertices_tables.describe,
-    "equal_time": equal_time_tables.describe,
     "equal_error": equal_error_tables.describe,
     "goals": goals_tables.describe,
     "drafts": drafts_tables.describe,

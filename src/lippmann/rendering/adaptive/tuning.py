@@ -39,7 +39,7 @@ class AdaptiveTuning:
     clean, aim:
         Estimated PSNR in dB from which on a default picture gets no more samples, and that for which they are reckoned.
         The estimate is of light before tone mapping, which brings out the noise of highlights by up to 1.5 dB
-        (``equal_time.py``).
+        (``docs/research/equal-time.md``).
     clean_worst:
         Estimated PSNR in dB from which on the worst micro-image needs no more samples, and for which they are reckoned.
     """

@@ -44,7 +44,7 @@ class SampleBudget:
         Samples that a pooled picture is made of: half a second of two cores (``defaults.py``).
     fewest, most:
         Samples per pixel (or sub-pixel) of a pooled picture. With fewer than 4 the worst micro-images suffer; more than
-        16 are for who asks for them (``equal_time.py``).
+        16 are for who asks for them (``docs/research/equal-time.md``).
     fewest_of_many, many:
         Samples per sub-pixel of pictures of more than ``many`` values.
     reserve:
