@@ -158,6 +158,25 @@ def test_of_models_the_first_is_shown(read):
     assert "2 models: the first is shown" in read(model.format(1) + model.format(2) + "END\n").notes
 
 
+@pytest.mark.parametrize("copies", [1, 2])
+def test_assemblies_are_named_and_the_files_own_atoms_shown(read, copies):
+    """REMARK 350: the second operator turns by half and shifts; one of identity alone says nothing."""
+    rows = [("1.0 0.0 0.0 0.0", "0.0 1.0 0.0 0.0"), ("-1.0 0.0 0.0 9.0", "0.0 -1.0 0.0 0.0")][:copies]
+    head = "REMARK 350 BIOMOLECULE: 1\nREMARK 350 APPLY THE FOLLOWING TO CHAINS: A\n"
+    for number, (first, second) in enumerate(rows, 1):
+        for axis, row in enumerate((first, second, "0.0 0.0 1.0 0.0"), 1):
+            head += f"REMARK 350   BIOMT{axis}   {number} " + "".join(f"{float(x):10.6f}" for x in row.split()) + "\n"
+    scene = read(head + WATER)
+    told = "the file's own atoms are shown: its assembly '1' has 2 copies of them"
+    assert (told in scene.notes) == (copies == 2)
+    assert len(places(scene, "balls of element 8")) == 1
+
+
+def test_the_symmetry_of_a_crystal_is_named(read):
+    scene = read(SALT.replace("'P 1'", "'P -1'"), "salt.cif")
+    assert "the file's own atoms are shown: the symmetry of its crystal has 2 copies of them" in scene.notes
+
+
 def test_left_justified_names_of_proteins_are_no_metals(read):
     """``CA`` in column 13 is a calcium by the format; the second is an ion."""
     lines = """\

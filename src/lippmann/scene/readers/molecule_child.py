@@ -73,6 +73,10 @@ def _of_structure(structure: gemmi.Structure, notes: list[str]) -> tuple[NDArray
         return _arrays([], [])
     if len(structure) > 1:
         notes.append(f"{len(structure)} models: the first is shown")
+    for assembly in structure.assemblies[:1]:
+        copies = max((len(each.operators) for each in assembly.generators), default=1)
+        if any(not placed.transform.is_identity() for each in assembly.generators for placed in each.operators):
+            notes.append(f"the file's own atoms are shown: its assembly '{assembly.name}' has {copies} copies of them")
     elements, places = [], []
     for chain in structure[0]:
         for residue in chain.first_conformer():  # the first of those that share a place of the sequence
@@ -100,6 +104,9 @@ def _element(atom: gemmi.Atom, residue: str) -> gemmi.Element:
 
 def _of_crystal(crystal: gemmi.SmallStructure, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     sites = list(crystal.sites)[: MOST_ATOMS + 1]
+    symmetry = len(crystal.symops) or (len(crystal.spacegroup.operations()) if crystal.spacegroup else 1)
+    if symmetry > 1:
+        notes.append(f"the file's own atoms are shown: the symmetry of its crystal has {symmetry} copies of them")
     shown = [sites[row] for row in _first_of_disorder([site.disorder_group for site in sites], notes)]
     return _arrays([site.element for site in shown], [crystal.cell.orthogonalize(site.fract) for site in shown])
 
