@@ -10,9 +10,10 @@ from pathlib import Path
 import imagecodecs
 import numpy as np
 import pytest
-from PIL import Image, ImageCms
+from PIL import Image, ImageCms, features
 
 from lippmann.codecs import photograph, png
+from lippmann.codecs.avif_colors import code_points
 from lippmann.codecs.icc import rgb_profile
 from lippmann.codecs.photograph import open_photograph
 from lippmann.codecs.png import encode_png
@@ -104,6 +105,40 @@ def test_colours_beyond_a_display_are_named():
     plain = encode_png(np.zeros((2, 2, 3), np.uint8), text={}, srgb=False)
     with pytest.raises(PictureError, match="a: its colours are HLG"):
         codes_of(with_chunks(plain, (b"cICP", bytes([9, 18, 0, 1]))))
+
+
+def avif(primaries, transfer, **options):
+    """A picture of (90, 128, 150) whose box of colours says so; Pillow writes 1, 13."""
+    data = bytearray(
+        encoded(Image.new("RGB", (16, 16), (90, 128, 150)), "AVIF", quality=100, subsampling="4:4:4", **options)
+    )
+    place = data.find(b"nclx") + 4
+    assert struct.unpack(">HH", data[place : place + 4]) == (1, 13)
+    data[place : place + 4] = struct.pack(">HH", primaries, transfer)
+    return bytes(data)
+
+
+@pytest.mark.skipif(not features.check("avif"), reason="this Pillow has no AVIF")
+@pytest.mark.parametrize(
+    ("points", "expected"), [((1, 13), (90, 128, 150)), ((2, 2), (90, 128, 150)), ((12, 13), OF_P3)]
+)
+def test_colours_of_an_avif_are_those_of_its_code_points(points, expected):
+    assert codes_of(avif(*points))[8, 8] == pytest.approx(expected, abs=2)
+
+
+@pytest.mark.skipif(not features.check("avif"), reason="this Pillow has no AVIF")
+def test_code_points_of_an_avif_beyond_a_display_are_named():
+    with pytest.raises(PictureError, match="a: its colours are PQ"):
+        codes_of(avif(9, 16))
+    data = avif(9, 16)
+    for cut in range(0, data.find(b"mdat"), 7):  # damaged boxes end in a picture or an error of Pillow's
+        code_points(io.BytesIO(data[:cut]))
+
+
+def test_codes_of_a_narrow_range_are_named():
+    plain = encode_png(np.zeros((2, 2, 3), np.uint8), text={}, srgb=False)
+    with pytest.raises(PictureError, match="a: its codes have a narrow range"):
+        codes_of(with_chunks(plain, (b"cICP", bytes([1, 13, 0, 0]))))
 
 
 def test_a_camera_that_says_adobe_rgb():

@@ -14,11 +14,13 @@ import numpy as np
 
 from lippmann.codecs import orientation as orientations
 from lippmann.codecs import png, tiff
+from lippmann.codecs.avif_colors import code_points
 from lippmann.codecs.claims import check_claim
-from lippmann.codecs.icc import adobe_profile, convert_cmyk, convert_codes, is_gray
+from lippmann.codecs.icc import adobe_profile, convert_cmyk, convert_codes, is_gray, profile_of_cicp
 from lippmann.codecs.picture_notes import aspect_note, pictures_note
 from lippmann.codecs.pillow_formats import BYTES_PER_PIXEL, FORMATS, codes_of, open_picture
 from lippmann.codecs.types import Pixels
+from lippmann.errors import PictureError
 from lippmann.runtime.input_memory import check_input
 
 if TYPE_CHECKING:
@@ -101,7 +103,7 @@ def open_photograph(file: BinaryIO, path: Path, formats: tuple[str, ...] = (*FOR
         with open_picture(file, formats) as picture:
             turn = orientations.of_picture(picture)
             size = picture.size[::-1] if orientations.lies(turn) else picture.size
-            icc = picture.info.get("icc_profile") or _exif_profile(picture)
+            icc = picture.info.get("icc_profile") or _other_profile(picture, file, path)
             notes = aspect_note(*_density(picture)) + pictures_note(getattr(picture, "n_frames", 1))
             if picture.mode == "CMYK":
                 yield _photograph(
@@ -131,6 +133,17 @@ def _density(picture: Image.Image) -> tuple[float, float]:
     """Pixels per length across and down, of whatever unit; 0 where nothing is said."""
     across, down = picture.info.get("jfif_density") or picture.info.get("dpi") or (0, 0)
     return float(across), float(down)
+
+
+def _other_profile(picture: Image.Image, file: BinaryIO, path: Path) -> bytes:
+    """The profile of a picture without an ICC profile: of AVIF by its code points, of others by EXIF."""
+    if picture.format != "AVIF":
+        return _exif_profile(picture)
+    told = code_points(file)
+    try:
+        return b"" if told is None else profile_of_cicp(*told)
+    except PictureError as error:
+        raise PictureError(error.what, where=str(path), rule=error.rule, fix=error.fix) from None
 
 
 def _exif_profile(picture: Image.Image) -> bytes:

@@ -230,6 +230,11 @@ def _profile(found: Mapping[bytes, bytes], path: Path) -> bytes:
     """ICC profile of the codes by the chunk that comes first (PNG, third edition, 4.3); empty: sRGB."""
     code_points = found.get(b"cICP", b"")
     if len(code_points) == 4:
+        if not code_points[3]:
+            rule = "codes over their full range are read"
+            raise PictureError(
+                "its codes have a narrow range (cICP)", where=str(path), rule=rule, fix="convert it to sRGB"
+            )
         try:
             return profile_of_cicp(code_points[0], code_points[1])
         except PictureError as error:

@@ -459,6 +459,8 @@ def override_light(
     """The description with its environment and background replaced, where others are given."""
     if environment is not None:
         description = replace(description, environment=environment)
+        if isinstance(description, SceneDescription):
+            description = replace(description, notes=(*description.notes, *environment.notes))
     if background is not None:
         description = replace(description, background=background)
     return description

@@ -144,6 +144,54 @@ def test_depth_within_a_portrait(form):
     assert found == pytest.approx(np.array([[1, 1 / depth, 0.25]]), abs=0.01)
 
 
+@pytest.mark.parametrize("quote", ["'", '"', ""])
+@pytest.mark.parametrize("prefix", ["GDepth", "d"])
+def test_depth_in_any_form_of_xmp(quote, prefix):
+    """Attributes in either quotes, or elements; any prefix of the namespace."""
+    space = f'xmlns:{prefix}="http://ns.google.com/photos/1.0/depthmap/"'
+    depth = base64.b64encode(encoded(np.array([[0, 51, 255]], np.uint8))).decode()
+    values = {"Format": "RangeInverse", "Near": "1", "Far": "4", "Data": depth}
+    if quote:
+        text = (
+            f"<x {space} " + " ".join(f"{prefix}:{key}={quote}{value}{quote}" for key, value in values.items()) + "/>"
+        )
+    else:
+        text = f"<x {space}>" + "".join(f"<{prefix}:{k}>\n {v}\n</{prefix}:{k}>" for k, v in values.items()) + "</x>"
+    segment = b"http://ns.adobe.com/xap/1.0/\0" + text.encode()
+    picture = encoded(np.full((4, 6, 3), 90, np.uint8), "JPEG")
+    data = picture[:2] + b"\xff\xe1" + (len(segment) + 2).to_bytes(2, "big") + segment + picture[2:]
+    found = embedded_depth(data, "p.jpg").inverse
+    assert found[0] == pytest.approx([1, 1 - 0.2 * 0.75, 0.25], abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    "names", [["Z"], ["ViewLayer.Depth.Z"], ["Depth.V"], ["cam.Z"], ["linearDepth"], ["WorldDepth.R"], ["V"], ["R"]]
+)
+def test_channels_of_depth_by_their_layers(tmp_path, names):
+    """Beside a picture in colours and a pass of normals, as renderers write them; a lone value is depth, too."""
+    depth = np.array([[1.0, 2.0], [4.0, 8.0]], np.float32)
+    other = [] if len(names[0]) == 1 and names != ["Z"] else ["R", "G", "B", "Normal.X", "Normal.Y", "Normal.Z"]
+    channels = {name: np.full((2, 2), 7 + number, np.float32) for number, name in enumerate(other)}
+    write_exr(tmp_path / "d.exr", {**channels, names[0]: depth}, text={})
+    assert read_depth_map(tmp_path / "d.exr").inverse == pytest.approx(1 / depth)
+
+
+def test_pictures_in_colours_are_no_depth(tmp_path):
+    """As programs that estimate depth colour their maps; JPEG's greys and equal channels are grey."""
+    ramp = np.tile(np.arange(0, 256, 4, dtype=np.uint8), (8, 1))
+    Pillow.fromarray(np.stack([ramp, 255 - ramp, ramp // 2], axis=2)).save(tmp_path / "d.png")
+    tifffile.imwrite(tmp_path / "d.tif", np.stack([ramp, 255 - ramp, ramp // 2], axis=2), photometric="rgb")
+    colors = {name: np.full((2, 2), 1 + number, np.float32) for number, name in enumerate("RGB")}
+    write_exr(tmp_path / "d.exr", colors, text={})
+    for name in ("d.png", "d.tif", "d.exr"):
+        with pytest.raises(SceneError, match=f"^{name}: is a picture in colours; depth is grey"):
+            read_depth_map(tmp_path / name)
+    Pillow.fromarray(np.stack([ramp] * 3, axis=2)).save(tmp_path / "d.jpg", quality=60)
+    assert read_depth_map(tmp_path / "d.jpg").inverse.shape == (8, 64)
+    write_exr(tmp_path / "d.exr", dict.fromkeys("RGB", np.full((2, 2), 2, np.float32)), text={})
+    assert read_depth_map(tmp_path / "d.exr").inverse[0, 0] == 0.5
+
+
 def test_portraits_that_mean_nothing_are_refused():
     with pytest.raises(SceneError, match=r"^p\.jpg: has depth from 5 to 4; near is above 0"):
         embedded_depth(portrait([[0, 255]], near=5), "p.jpg")

@@ -7,6 +7,7 @@ import pytest
 
 from lippmann.errors import SceneError
 from lippmann.scene.readers.environment_map import read_environment
+from lippmann.scene.readers.load import load_scene
 
 
 @pytest.fixture
@@ -25,6 +26,14 @@ def test_exr(tmp_path, pixels):
     assert (found.pixels == pixels).all()
     assert found.pixels.dtype == np.float32
     assert found.name == "sky.exr"
+
+
+def test_what_of_a_header_is_not_used_is_noted(tmp_path, pixels):
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with OpenEXR.File({**header, "whiteLuminance": 100.0}, {"RGB": pixels}) as file:
+        file.write(str(tmp_path / "sky.exr"))
+    scene = load_scene("teapot", environment=tmp_path / "sky.exr")
+    assert "sky.exr: its attribute whiteLuminance is not used" in scene.notes
 
 
 def test_half_precision_and_alpha(tmp_path, pixels):

@@ -24,8 +24,10 @@ from lippmann.errors import MemoryLimitError, PictureError, SceneError
 from lippmann.runtime.input_memory import check_input
 from lippmann.scene.parsing.files import read_bytes
 
-#: Channels of OpenEXR that hold depth, the first that there is.
-_CHANNELS = ("Z", "depth.Z", "depth", "Depth", "V", "Y", "R")
+#: Names of channels of OpenEXR that hold depth, by their own name or that of their layer, before those of any value.
+_CHANNELS = (r"Z", r".*depth(\.[ZVYRX])?", r".*\.Z", r"[VYR]")
+#: Mean difference of the channels of a grey picture, in codes of 8 bits, which JPEG's greys stay below.
+_MOST_TINT = 8.0
 
 _XMP = b"http://ns.adobe.com/xap/1.0/\0"
 _XMP_EXTENSION = b"http://ns.adobe.com/xmp/extension/\0"
@@ -34,7 +36,9 @@ _EXTENSION_HEAD = 40
 #: Widths in pixels of the means that take the stairs out of whole numbers: plateaus of up to about the first are slopes
 #: after that, the others make what is narrower even.
 _SMOOTHING = (65, 33, 17, 9, 5, 3)
-_GDEPTH = re.compile(rb'GDepth:(Format|Near|Far|Data)="([^"]*)"')
+#: The prefix that XMP has for the namespace of GDepth, and a property of it: an attribute, or an element.
+_GDEPTH = re.compile(rb"""xmlns:([\w.-]+)\s*=\s*["']http://ns\.google\.com/photos/1\.0/depthmap/["']""")
+_PROPERTY = rb"""\b%s:(Format|Near|Far|Data)(?:\s*=\s*(["'])(.*?)\2|\s*>([^<]*)<)"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,11 +112,21 @@ def _exr(path: Path) -> NDArray[np.float32]:
     header = read_exr_header(path)
     check_input(4 * header.height * header.width * len(header.channels), "the depth map", where=path.name)
     channels = read_exr(path, header)
-    name = next((name for name in _CHANNELS if name in channels), None)
+    scalars = [name for name in sorted(channels) if not (name.endswith(".Z") and f"{name[:-1]}X" in channels)]
+    matches = (name for form in _CHANNELS for name in scalars if re.fullmatch(form, name, re.IGNORECASE))
+    name = next(matches, None)
     if name is None:
-        held = ", ".join(sorted(channels))
-        raise SceneError(f"has the channels {held}", where=path.name, rule=f"depth is one of {', '.join(_CHANNELS)}")
-    return np.asarray(channels[name], np.float32)
+        held, rule = ", ".join(sorted(channels)), "depth is Z, V, Y, R or that of a layer, such as depth.Z"
+        raise SceneError(f"has the channels {held}", where=path.name, rule=rule)
+    depth = np.asarray(channels[name], np.float32)
+    others = [f"{name[:-1]}{letter}" for letter in "GB"] if name[-1] == "R" else []
+    if any(other in channels and not np.array_equal(channels[other], depth, equal_nan=True) for other in others):
+        raise _colored(path.name)
+    return depth
+
+
+def _colored(where: str) -> SceneError:
+    return SceneError("is a picture in colours", where=where, rule="depth is grey", fix="save it without a colour map")
 
 
 def _one_channel(values: NDArray[np.generic], where: str) -> NDArray[np.float32]:
@@ -140,14 +154,18 @@ def _gray(data: bytes, where: str, turn: int | None = None) -> tuple[NDArray[np.
     try:
         # Pillow does not read floats of 16 bits in a TIFF, nor greys whose 0 is white.
         if data.startswith(tiff.SIGNATURES):
-            return _luminance(tiff.TiffPicture(io.BytesIO(data), Path(where)).read())
+            return _luminance(tiff.TiffPicture(io.BytesIO(data), Path(where)).read(), where)
         with open_picture(io.BytesIO(data)) as picture:
             turn = of_picture(picture) if turn is None else turn
             if picture.mode == "F":
                 return upright(np.asarray(picture, np.float32), turn), False
             if picture.mode.startswith("I"):
                 return upright(np.asarray(picture).astype(np.int64), turn), True
+            if len(picture.getbands()) > 2 or picture.mode == "P":
+                _check_grey(np.asarray(picture.convert("RGB")), where)
             return upright(np.asarray(picture.convert("L")), turn), False
+    except SceneError:
+        raise
     except MemoryLimitError as error:
         raise MemoryLimitError(error.what, where=where, rule=error.rule, fix=error.fix) from None
     except UnidentifiedImageError:
@@ -156,9 +174,15 @@ def _gray(data: bytes, where: str, turn: int | None = None) -> tuple[NDArray[np.
         raise SceneError(f"cannot be decoded ({error})", where=where) from error
 
 
-def _luminance(values: NDArray[np.generic]) -> tuple[NDArray[np.generic], bool]:
+def _check_grey(codes: NDArray[np.uint8], where: str) -> None:
+    if np.ptp(codes, axis=2).mean() > _MOST_TINT:
+        raise _colored(where)
+
+
+def _luminance(values: NDArray[np.generic], where: str) -> tuple[NDArray[np.generic], bool]:
     """Grey of ``(h, w, 1 to 4)`` values, by the weights of Rec. 601, and whether they are whole numbers of 16 bits."""
     if values.shape[2] >= 3 and values.dtype == np.uint8:
+        _check_grey(np.asarray(values[..., :3], np.uint8), where)
         return np.rint(values[..., :3] @ np.array([0.299, 0.587, 0.114])).astype(np.uint8), False
     return values[..., 0], values.dtype.kind in "iu" and values.dtype.itemsize > 1
 
@@ -176,7 +200,11 @@ def embedded_depth(data: bytes, where: str, turn: int = 1) -> DepthMap | None:
     SceneError
         Its values mean nothing, or its picture is damaged.
     """
-    found = dict(reversed(_GDEPTH.findall(_xmp(data))))
+    found: dict[bytes, bytes] = {}
+    xmp = _xmp(data)
+    for prefix in dict.fromkeys((b"GDepth", *_GDEPTH.findall(xmp))):
+        for name, _, attribute, element in re.findall(_PROPERTY % re.escape(prefix), xmp, re.DOTALL):
+            found.setdefault(name, attribute or element.strip())
     if b"Data" not in found:
         return None
     try:

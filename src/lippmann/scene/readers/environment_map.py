@@ -28,17 +28,19 @@ def read_environment(path: Path) -> Environment:
     """
     data = read_bytes(path)
     where = path.name
+    notes: tuple[str, ...] = ()
     if data.startswith(SIGNATURE):
-        pixels = _read_exr(path, where)
+        pixels, of_header = _read_exr(path, where)
+        notes = tuple(f"{where}: {note}" for note in of_header)
     elif data.startswith(radiance.MAGICS):
         pixels = _read_hdr(data, where)
     else:
         raise SceneError("is no environment picture", where=where, rule="OpenEXR (.exr) and Radiance (.hdr) are read")
     _check(pixels, where)
-    return Environment(pixels, name=path.name)
+    return Environment(pixels, name=path.name, notes=notes)
 
 
-def _read_exr(path: Path, where: str) -> NDArray[np.float32]:
+def _read_exr(path: Path, where: str) -> tuple[NDArray[np.float32], tuple[str, ...]]:
     try:
         header = read_exr_header(path)
         names = next((names for names in _COLORS if set(names) <= header.channels.keys()), None)
@@ -48,7 +50,7 @@ def _read_exr(path: Path, where: str) -> NDArray[np.float32]:
         _check_size(header.height, header.width, where)
         channels = read_exr(path, header)
         pixels = np.stack([np.asarray(channels[name], np.float32) for name in names], axis=-1)
-        return pixels if names == ("Y", "Y", "Y") else header.rec709(pixels)
+        return pixels if names == ("Y", "Y", "Y") else header.rec709(pixels), header.notes
     except PictureError as error:
         raise _undecodable(error.what, where) from None
 

@@ -195,13 +195,14 @@ class Environment:
 
     Row 0 lies at +y (up), the middle column at -z, ahead of a viewer who looks that way; columns run to the right (+x).
     ``follows_viewer`` says that this holds for whoever looks at the scene, wherever the display or camera stands;
-    ``world_from_environment`` is then set for each picture.
+    ``world_from_environment`` is then set for each picture. ``notes`` say what of its file is not used.
     """
 
     pixels: FloatArray
     world_from_environment: Matrix = field(default_factory=lambda: np.eye(4))
     name: str = ""
     follows_viewer: bool = False
+    notes: Sequence[str] = ()
 
 
 @dataclass(frozen=True, eq=False)

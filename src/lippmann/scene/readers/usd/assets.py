@@ -99,16 +99,21 @@ class Assets:
         if asset["name"].lower().endswith(_LIGHT_SUFFIXES):
             path = self._path(asset)
             if path is not None:
-                return read_environment(path).pixels
+                return self._sky(path)
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / Path(asset["name"]).name
                 path.write_bytes(self._bytes(asset))
-                return read_environment(path).pixels
+                return self._sky(path)
         image = self.image(asset)
         if image is None:
             return np.ones((2, 4, 3), np.float32)
         values = unit(image)[..., :3]
         return np.asarray(decode_srgb(np.broadcast_to(values, (*values.shape[:2], 3))), np.float32)
+
+    def _sky(self, path: Path) -> NDArray[np.float32]:
+        sky = read_environment(path)
+        self.notes.update(dict.fromkeys(sky.notes))
+        return sky.pixels
 
     def _path(self, asset: Record) -> Path | None:
         """The file; None of one within a package."""
