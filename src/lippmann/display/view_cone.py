@@ -6,6 +6,24 @@ import math
 
 from lippmann.display.display import Display
 
+#: Degrees to which programs that render quilts narrow the cone of newer panels, so that neighbouring views fuse: in 50
+#: degrees the same views lie farther apart (``STANDARD_VIEW_CONE`` of quiltwright, 2026). The maker's own packages name
+#: no such limit.
+FUSED_CONE = 35.0
+
+
+def view_cone(display: Display) -> float:
+    """Degrees over which an eye that moves level sees a display's own views."""
+    return 2.0 * math.degrees(math.atan(zone_slopes(display)[0]))
+
+
+def depth_gain_of_fused_cone(display: Display) -> float:
+    """Resolved depth in :data:`FUSED_CONE` over that in the display's own cone, of the same panel and lenses.
+
+    The depth in which a point spreads over at most one lens grows with the gap, and that as the cone's tangent falls.
+    """
+    return zone_slopes(display)[0] / math.tan(math.radians(FUSED_CONE) / 2.0)
+
 
 def cone_tangent(display: Display) -> float:
     """Tangent of half the angle over which an eye sees a lenticular display's own views as it moves level, sideways.

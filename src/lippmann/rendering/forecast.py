@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.types import Point2f, Ray3f, UInt32
 from lippmann.display import Display
+from lippmann.display.view_cone import FUSED_CONE, depth_gain_of_fused_cone, view_cone
 from lippmann.optics.lens import lens_notes
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film import memory_model
@@ -62,6 +63,9 @@ class Forecast:
         Samples per pixel, or per sub-pixel where these have rays of their own.
     depth_range, resolvable_range:
         Lowest and highest z of the scene and of what the display resolves, in mm of the display frame.
+    view_cone, fused_gain:
+        Degrees over which an eye sees the display's own views; how many times as much depth the same panel would
+        resolve in :data:`lippmann.display.view_cone.FUSED_CONE`.
     blur:
         Over how many lens pitches one pixel's light spreads at either end of the depth range; up to 1 is resolved.
     blurred_share:
@@ -91,6 +95,8 @@ class Forecast:
     placement: str
     depth_range: tuple[float, float]
     resolvable_range: tuple[float, float]
+    view_cone: float
+    fused_gain: float
     blur: tuple[float, float]
     blurred_share: float
     rays: dict[str, int]
@@ -107,12 +113,15 @@ class Forecast:
         of_frames = f", {self.frames} frames" if self.frames > 1 else ""
         of_subpixels = ", a ray for every sub-pixel" if self.subpixels else ""
         back, front = self.blur
+        is_wide = self.view_cone > FUSED_CONE + 0.5  # a nominal cone is 35 after rounding
+        gain = f" (in {FUSED_CONE:.0f}, {self.fused_gain:.1f} times as much would fuse)" if is_wide else ""
         stages = ", ".join(f"{stage} {duration_in_words(s)}" for stage, s in self.seconds.items() if stage != "total")
         others = self.rays["shadow"] + self.rays["secondary"]
+        resolved = depths_in_words(*self.resolvable_range)
         return {
             "picture": f"{self.scene} for {self.display}, {width}x{height} pixels{of_frames}{of_subpixels}",
             "scene": depths_in_words(*self.depth_range),
-            "resolved": depths_in_words(*self.resolvable_range),
+            "resolved": f"{resolved}, in a view cone of {self.view_cone:.0f} degrees{gain}",
             "blur": f"{100 * self.blurred_share:.0f} % of the pixels see what lies beyond; "
             f"a pixel's light spreads over {back:.1f} lenses at the back, {front:.1f} at the front",
             "rays": f"{self.rays['primary'] / 1e6:.1f} M from pixels ({samples_in_words(self.spp, 'each')}), "
@@ -180,6 +189,8 @@ def forecast(
         placement=placement.mode,
         depth_range=placement.depth_range,
         resolvable_range=placement.resolvable_range,
+        view_cone=view_cone(display),
+        fused_gain=depth_gain_of_fused_cone(display),
         blur=(abs(placement.depth_range[0]) * per_pixel, abs(placement.depth_range[1]) * per_pixel),
         blurred_share=share_beyond,
         rays={
