@@ -127,8 +127,9 @@ def main() -> None:
 
 def _stage(size: Size, scale: float) -> Stage:
     import lippmann
+    from lippmann.options.placement import PlacementOptions
     from lippmann.runtime import engine
-    from lippmann.scene.placement import PlacementOptions, place
+    from lippmann.scene.placement import place
 
     engine.start("cpu", THREADS)
     display = lippmann.load_display(DEVICE)

@@ -89,9 +89,9 @@ def small_array() -> Any:
 
 def turned() -> Any:
     """How the display is placed in the scenes."""
-    from lippmann.scene.placement import PlacementOptions
+    from lippmann.options.placement import PlacementOptions
 
-    return PlacementOptions(mode="fit", turn=(0.0, 30.0, 0.0))
+    return PlacementOptions(place="fit", turn=(0.0, 30.0, 0.0))
 
 
 def codes(picture: Any) -> Any:

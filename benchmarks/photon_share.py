@@ -77,12 +77,12 @@ def _work(name: str, way: str, samples: int, reference: str | None = None, long:
     import lippmann
     from lippmann.color.transfer import encode_srgb
     from lippmann.display import Display, LensArray, Panel
-    from lippmann.scene.placement import PlacementOptions
+    from lippmann.options.placement import PlacementOptions
 
     display = Display("square", Panel(256, 256, 0.5), LensArray("lenticular", 4.0), 6.8, "", 400.0, 390.0)
     made = name in WORLD_SCENES
     scene = lippmann.load_scene(WORLD_SCENES[name]() if made else str(PUBLIC) if name == PUBLIC.stem else name)
-    placement = PlacementOptions(mode="camera") if made else None
+    placement = PlacementOptions(place="camera") if made else None
 
     def picture(seed: int) -> tuple[float, Any, dict[str, Any]]:
         began = time.process_time()

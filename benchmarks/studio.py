@@ -98,9 +98,9 @@ def wanted_cases(displays: Iterable[str], only: str, cases: dict[str, Any]) -> I
 
 
 def _view(display: Any, size: tuple[int, int], turn: float, **request: Any) -> Any:
+    from lippmann.options.placement import PlacementOptions
     from lippmann.rendering.live.live_view import LiveView
     from lippmann.rendering.request.render_request import RenderRequest
-    from lippmann.scene.placement import PlacementOptions
     from lippmann.viewing.replay import default_eye
 
     placed = PlacementOptions(turn=(turn, 0.0, 0.0))

@@ -32,6 +32,7 @@ ORDER = (
     "display.formats",
     "codecs",
     "scene.values",
+    "options",
     "scene.parsing",
     "scene.whitted",
     "scene.volumes",
@@ -400,14 +401,20 @@ MOST_LINES = 18_330
 MOST_CONSTANTS = 360
 MOST_BRANCHES = 293
 #: Files of which a default render calls a function, and calls from a file to one of a part above its own.
-MOST_FILES = 178
+MOST_FILES = 181
 MOST_CLIMBING = 4
 
 #: What decides how a picture is made, below ``rendering``: packages and modules.
 DECIDES = ("request", "preparation", "adaptive", "methods", "session", "picture", "job", "light_statements")
 
 #: Decorators, by whose functions others are called: these call for whoever calls them.
-DECORATORS = {"device.syntax", "runtime.cached_property", "runtime.engine_lock", "runtime.row_threads"}
+DECORATORS = {
+    "cli.shared.command_options",
+    "device.syntax",
+    "runtime.cached_property",
+    "runtime.engine_lock",
+    "runtime.row_threads",
+}
 
 #: Writes which function called which of the program's files, in the order of the first calls, as JSON into the file
 #: that the last word names. Bodies of modules and classes are no functions.

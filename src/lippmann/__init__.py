@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from lippmann.display import Display, LensArray, Panel, list_displays, load_display
     from lippmann.errors import LippmannError
     from lippmann.image import IntegralImage, read_picture
+    from lippmann.options.light import LightOptions
+    from lippmann.options.placement import PlacementOptions
     from lippmann.progress import Progress
     from lippmann.rendering.request.render_request import RenderRequest
-    from lippmann.scene.light_options import LightOptions
-    from lippmann.scene.placement import PlacementOptions
     from lippmann.scene.scene import Scene
     from lippmann.viewing.focal_stack import focal_stack
     from lippmann.viewing.stereo import replay_stereo
@@ -54,8 +54,8 @@ _HOME = {
     "LippmannError": "lippmann.errors",
     "IntegralImage": "lippmann.image",
     "read_picture": "lippmann.image",
-    "LightOptions": "lippmann.scene.light_options",
-    "PlacementOptions": "lippmann.scene.placement",
+    "LightOptions": "lippmann.options.light",
+    "PlacementOptions": "lippmann.options.placement",
     "Progress": "lippmann.progress",
     "RenderRequest": "lippmann.rendering.request.render_request",
     "Scene": "lippmann.scene.scene",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import subprocess
 import sys
@@ -9,8 +10,9 @@ import sys
 import pytest
 import typer
 
-from lippmann.cli.app import COMMANDS, app_of, make_app
-from lippmann.cli.shared.grouped_help import COMMAND_GROUPS, EXAMPLES, OPTION_GROUPS
+from lippmann.cli.app import COMMANDS, GROUPS, app_of, make_app
+from lippmann.cli.shared.examples import EXAMPLES
+from lippmann.cli.shared.grouped_help import OPTION_GROUPS
 
 
 def commands(command=None, words=()):
@@ -41,21 +43,34 @@ def test_no_example_is_of_something_else():
     assert set(EXAMPLES) == {*commands(), "lippmann"}
 
 
-def test_every_option_of_the_large_commands_has_a_group():
-    grouped = {name for names in OPTION_GROUPS.values() for name in names}
-    for name in ("render", "quilt render", "plan", "preview"):
-        command = commands()[name]
-        options = {part for each in command.params for part in each.opts if part.startswith("--") and not each.hidden}
-        assert options - grouped <= {"--help"}, name
+LARGE = ("render", "quilt render", "plan", "preview")
 
 
-def test_every_command_has_a_group():
-    top = typer.main.get_command(make_app())
-    assert {name for names in COMMAND_GROUPS.values() for name in names} >= set(top.commands)
+@pytest.mark.parametrize("name", LARGE)
+def test_every_option_of_the_large_commands_has_a_group(name):
+    options = [each for each in commands()[name].params if each.param_type_name == "option"]
+    without = {each.opts[0] for each in options if each.rich_help_panel not in OPTION_GROUPS}
+    assert without == {"--help-all"}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("words", [(), ("--help",), ("render", "--help"), ("quilt", "--help"), ("plan", "--help")])
+@pytest.mark.parametrize("name", LARGE)
+def test_the_first_help_shows_what_most_need_and_the_other_all(lippmann, name):
+    first, whole = (lippmann(*name.split(), flag) for flag in ("--help", "--help-all"))
+    assert (first.code, whole.code) == (0, 0)
+    named = [set(re.findall(r"^  (?:-\w, )?(--[\w-]+)", done.out, flags=re.MULTILINE)) for done in (first, whole)]
+    assert named[0] < named[1]
+    options = {each.opts[-1] for each in commands()[name].params if each.param_type_name == "option"}
+    assert {option for option in options if option.startswith("--")} <= named[1]
+    assert {"--display", "--effort", "--turn", "--help-all"} <= named[0]
+    assert len(named[0]) <= 32
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words",
+    [(), ("--help",), ("render", "--help"), ("render", "--help-all"), ("quilt", "--help"), ("plan", "--help-all")],
+)
 def test_help_is_well_formed(lippmann, words):
     done = lippmann(*words)
     assert (done.code, done.err) == (0, "")
@@ -66,10 +81,10 @@ def test_help_is_well_formed(lippmann, words):
         is_example = is_example or line == "Examples:"
         assert is_example or len(line) <= 80, line
     titles = [line[:-1] for line in lines if line.endswith(":") and not line.startswith(" ")]
-    if words == ("render", "--help"):
-        assert titles == ["Arguments", *OPTION_GROUPS, "Options", "Examples"]
+    if words == ("render", "--help-all"):
+        assert titles == [*OPTION_GROUPS, "Examples"]
     if not words:
-        assert titles == ["Options", *COMMAND_GROUPS, "Examples"]
+        assert titles == ["Options", *GROUPS, "Examples"]
 
 
 def test_names_are_completed(monkeypatch, tmp_path):

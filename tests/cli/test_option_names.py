@@ -79,7 +79,7 @@ def test_the_library_says_no_flag():
         ("say display=..., with 3 x 4", "say --display, with 3 x 4"),
         ("use shift=0,0,Z instead", "use --shift 0,0,Z instead"),
         ("add camera_path=FILE.cam for a flight", "add --camera-path FILE.cam for a flight"),
-        ('mode="fit"', "--place fit"),
+        ('place="fit"', "--place fit"),
         ("nothing=3 is named so", "nothing=3 is named so"),
         ("spp=4.", "--spp 4."),
     ],

@@ -76,7 +76,7 @@ def test_studio_shows_and_renders_until_ctrl_c(tmp_path):
         with pytest.raises(HTTPError, match="404"):
             fetch(address[: address.index("/", 8)] + "/")
         base = address.removeprefix("http://")
-        state = values_of_state(StudioState("teapot", "own.toml", spp=1, method="full"))
+        state = values_of_state(StudioState(scene="teapot", display="own.toml", spp=1, method="full"))
         with connect(f"ws://{base}live", origin=f"http://{base.partition('/')[0]}") as socket:
             view = {"type": "view", "number": 3, "state": state, "eye": [0, 0, 300], "size": [60, 48], "window": None}
             socket.send(json.dumps(view))

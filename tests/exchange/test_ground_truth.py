@@ -14,7 +14,7 @@ from PIL import Image
 
 from lippmann.display import Display, LensArray, Panel
 from lippmann.exchange import export_image
-from lippmann.scene.placement import PlacementOptions
+from lippmann.options.placement import PlacementOptions
 
 VIEWS, SIZE = 5, 96
 
@@ -73,7 +73,7 @@ def folder(request, engine, tmp_path_factory):
 
     display = display_at(request.param)
     image = api.render(
-        wavy_cloth(), display, placement=PlacementOptions(mode="display"), integrator="albedo", spp=4, layers=True
+        wavy_cloth(), display, placement=PlacementOptions(place="display"), integrator="albedo", spp=4, layers=True
     )
     folder = tmp_path_factory.mktemp("truth") / "cloth"
     export_image(image, folder, "hci")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from handmade_display import APERTURE, Sheet
 
-from lippmann.scene.placement import PlacementOptions
+from lippmann.options.placement import PlacementOptions
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -39,7 +39,7 @@ def shown(objects, display, **options):
     from lippmann.api import load_scene, render
 
     scene = load_scene({"type": "scene"} | objects, background=(0.0, 0.0, 0.0))
-    placement = PlacementOptions(mode="display")
+    placement = PlacementOptions(place="display")
     defaults = {
         "placement": placement,
         "integrator": "path",
@@ -67,7 +67,7 @@ def test_glow_of_one_before_a_sky_of_one_is_one_exactly(name):
     picture = render(
         scene,
         SHEETS[name].display(),
-        placement=PlacementOptions(mode="display"),
+        placement=PlacementOptions(place="display"),
         spp=3,
         subpixels=name == "slanted",
         tone_map="none",
@@ -84,7 +84,7 @@ def test_white_furnace_is_one_in_every_pixel(name):
     picture = render(
         load_scene({"type": "scene"} | furnace(white)),
         SHEETS[name].display(),
-        placement=PlacementOptions(mode="display"),
+        placement=PlacementOptions(place="display"),
         spp=64,
         tone_map="none",
     )
@@ -351,6 +351,6 @@ def test_no_ray_slips_through_between_triangles():
     for tangent in (0.0, 1e-9):
         display = replace(STRAIGHT, width=16 * 8, tangent=tangent).display()
         depth = render(
-            scene, display, placement=PlacementOptions(mode="display"), integrator="depth", spp=1, pixel_filter="point"
+            scene, display, placement=PlacementOptions(place="display"), integrator="depth", spp=1, pixel_filter="point"
         ).pixels
         assert depth.max() < -9

@@ -79,7 +79,7 @@ def test_micro_images_have_the_light_of_particles():
     import mitsuba as mi
 
     import lippmann
-    from lippmann.scene.placement import PlacementOptions
+    from lippmann.options.placement import PlacementOptions
 
     scene = mi.load_dict(glass_before_a_wall())
     particles = np.stack([micro_images_by_particles(scene, seed) for seed in range(RUNS)])
@@ -96,7 +96,7 @@ def test_micro_images_have_the_light_of_particles():
             spp=64,
             exposure=0,
             tone_map="none",
-            placement=PlacementOptions(mode="display"),
+            placement=PlacementOptions(place="display"),
         )
         return picture.micro_images().mean(axis=(2, 3))
 

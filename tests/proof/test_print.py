@@ -11,7 +11,7 @@ from mitsuba_cameras import camera_rays, in_display, intersect
 
 from lippmann.calibration.finish import Finish
 from lippmann.display.formats.print_sheet import Print
-from lippmann.scene.placement import PlacementOptions
+from lippmann.options.placement import PlacementOptions
 from lippmann.viewing.replay import replay
 
 pytestmark = pytest.mark.usefixtures("engine")
@@ -29,7 +29,7 @@ def made(glowing):
     from lippmann.api import render
 
     scene, display = glowing("teapot"), PRINT.display()
-    options = {"spp": 1, "pixel_filter": "point", "placement": PlacementOptions(mode="fit", scale=4.0)}
+    options = {"spp": 1, "pixel_filter": "point", "placement": PlacementOptions(place="fit", scale=4.0)}
     return {name: render(scene, display, integrator=name, **options) for name in ("position", "normal")}
 
 
@@ -86,7 +86,7 @@ def test_without_regard_to_the_distance_it_would_not(glowing, build_once):
     from lippmann.api import render
 
     display = replace(PRINT.display(), viewing_distance=math.inf)
-    options = {"spp": 1, "pixel_filter": "point", "placement": PlacementOptions(mode="fit", scale=4.0)}
+    options = {"spp": 1, "pixel_filter": "point", "placement": PlacementOptions(place="fit", scale=4.0)}
     scene = glowing("teapot")
     wrong = {name: render(scene, display, integrator=name, **options) for name in ("position", "normal")}
     points = lens_points()

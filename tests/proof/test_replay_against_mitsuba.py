@@ -26,13 +26,13 @@ import pytest
 from handmade_display import Sheet, lens_plane_points, samples_of
 from mitsuba_cameras import camera_rays, direct_pictures, in_display, intersect
 
-from lippmann.scene.placement import PlacementOptions
+from lippmann.options.placement import PlacementOptions
 
 SCENES = ("teapot", "fancy teapot", "clear coat")
 
 pytestmark = pytest.mark.usefixtures("engine")
 
-FITTED = PlacementOptions(mode="fit", depth_scale=1.0, scale=1.1)
+FITTED = PlacementOptions(place="fit", depth_scale=1.0, scale=1.1)
 #: The least agreement (dB), and the largest distance (mm) between what any one lens shows and what the camera sees.
 LEAST_PSNR, LARGEST_ERROR = 45.0, 2e-3
 
@@ -177,7 +177,7 @@ def check_eye_where_views_meet(made, built):
 def test_pixels_per_lens_need_not_be_whole(pictures):
     """A corner of a 4K panel's worth: every pixel stands at a place of its own behind its lens."""
     sheet = Sheet("lenticular", 6.2867, 320, 180, distance=600.0, tangent=-0.1666, pixel=0.0899, gap=0.886)
-    made, built = pictures("teapot", sheet, subpixels=True, placement=PlacementOptions(mode="fit", depth_scale=1.0))
+    made, built = pictures("teapot", sheet, subpixels=True, placement=PlacementOptions(place="fit", depth_scale=1.0))
     figures = compare(made, built, (21.7, 40.3, 550.0), size=(9, 7))
     assert figures["cameras"] > 40
     check(figures)
@@ -241,7 +241,7 @@ def test_the_scenes_own_camera_is_the_eye_at_the_viewing_point(pictures, glowing
     import mitsuba as mi
 
     sheet = Sheet("square", across=7, down=7, width=22 * 7, height=20 * 7, distance=400.0)
-    made, built = pictures("teapot", sheet, placement=PlacementOptions(mode="camera"))
+    made, built = pictures("teapot", sheet, placement=PlacementOptions(place="camera"))
     pose = mi.ScalarTransform4d(glowing("teapot").cameras[0].world_from_camera)
     # Mitsuba's cameras look along +z.
     pose = pose @ mi.ScalarTransform4d().rotate([0, 1, 0], 180)

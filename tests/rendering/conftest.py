@@ -13,7 +13,7 @@ import pytest
 from lippmann.color.transfer import encode_srgb
 from lippmann.display import Display
 from lippmann.metrics.mse_psnr import micro_image_means
-from lippmann.scene.placement import PlacementOptions
+from lippmann.options.placement import PlacementOptions
 
 REFERENCE_SEEDS = 1001, 2002
 
@@ -39,7 +39,7 @@ class JudgedScene:
         return lippmann.render(
             self.scene,
             self.display,
-            placement=PlacementOptions(mode="display", scale=scale),
+            placement=PlacementOptions(place="display", scale=scale),
             seed=seed,
             **({"tone_map": "none"} | options),
         )

@@ -9,7 +9,7 @@ import trimesh
 import lippmann
 from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import MemoryLimitError, UsageError
-from lippmann.scene.placement import PlacementOptions
+from lippmann.options.placement import PlacementOptions
 from lippmann.scene.values.description import Image, Instance, Light, Material, Mesh, SceneDescription, Texture
 
 pytestmark = pytest.mark.usefixtures("engine")
@@ -50,7 +50,7 @@ def emitter_over_glass(*, instances=1, is_exposed=False):
 
 
 def rendered(scene, layout="lenticular", **options):
-    chosen = {"integrator": "path", "method": "full", "spp": 8, "placement": PlacementOptions(mode="display")}
+    chosen = {"integrator": "path", "method": "full", "spp": 8, "placement": PlacementOptions(place="display")}
     return lippmann.render(scene, DISPLAYS[layout], **({"exposure": 0, "tone_map": "none"} | chosen | options))
 
 

@@ -11,7 +11,7 @@ import trimesh
 import lippmann
 from lippmann.color.transfer import encode_srgb
 from lippmann.display import Display, LensArray, Panel
-from lippmann.scene.placement import PlacementOptions
+from lippmann.options.placement import PlacementOptions
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 
 pytestmark = pytest.mark.usefixtures("engine")
@@ -73,7 +73,7 @@ class TestCompressedDepth:
         compressed, flat = scenes
         asked = {"integrator": surface, "method": "full", "spp": 4}
         first = lippmann.render(compressed, lenticular(), placement=PLACED, **asked).pixels
-        second = lippmann.render(flat, lenticular(), placement=PlacementOptions(mode="display"), **asked).pixels
+        second = lippmann.render(flat, lenticular(), placement=PlacementOptions(place="display"), **asked).pixels
         apart = np.abs(first - second).max(axis=2)
         assert np.abs(second).max() > 0.4
         assert (apart > 2e-3 * max(np.abs(second).max(), 1.0)).mean() < 2e-3  # rays that graze an edge
@@ -92,7 +92,7 @@ class TestCompressedDepth:
         compressed, flat = scenes
         asked = {"integrator": "albedo", "layers": True}
         first = lippmann.render(compressed, lenticular(), placement=PLACED, **asked).maps
-        second = lippmann.render(flat, lenticular(), placement=PlacementOptions(mode="display"), **asked).maps
+        second = lippmann.render(flat, lenticular(), placement=PlacementOptions(place="display"), **asked).maps
         seen = np.isfinite(second["depth"]) & np.isfinite(first["depth"])
         assert seen.mean() > 0.2
         for name in ("depth", "normal"):

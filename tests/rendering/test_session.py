@@ -10,10 +10,10 @@ import pytest
 import lippmann
 from lippmann.display import load_display
 from lippmann.errors import MemoryLimitError
+from lippmann.options.placement import PlacementOptions
 from lippmann.rendering import session as sessions
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Stopwatch, memory_limit, open_session
-from lippmann.scene.placement import PlacementOptions
 
 pytestmark = pytest.mark.usefixtures("engine")
 

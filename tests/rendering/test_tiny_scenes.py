@@ -10,8 +10,8 @@ import pytest
 import lippmann
 from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import UsageError
-from lippmann.rendering.request.choices import Integrator, Method
-from lippmann.scene.placement import PlacementOptions
+from lippmann.options.choices import Integrator, Method
+from lippmann.options.placement import PlacementOptions
 from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
 from lippmann.scene.values.splats import Splats
 
@@ -110,7 +110,7 @@ def a_scene(name, folder):
 def render(scene, panel="2 lenses", **options):
     columns, rows, pixels = PANELS[panel]
     display = Display("tiny", Panel(columns, rows, 4.0), LensArray("square", 4.0 * pixels), 20.0)
-    placement = PlacementOptions(mode="display")
+    placement = PlacementOptions(place="display")
     return lippmann.render(scene, display, placement=placement, threads=1, **options)
 
 

@@ -9,9 +9,10 @@ from lippmann import api
 from lippmann.display import load_display
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
+from lippmann.options.placement import PlacementOptions
 from lippmann.scene.camera_placement import FILL, VisibleDepth, place_by_camera
 from lippmann.scene.matrices import inverse, rotation_of
-from lippmann.scene.placement import PlacementOptions, place
+from lippmann.scene.placement import place
 from lippmann.scene.scene import box_corners
 from lippmann.scene.values.description import Camera, Instance, Light, Material, Mesh, SceneDescription
 
@@ -127,7 +128,7 @@ def steps_scene():
 def test_a_picture_shows_the_share_before_the_lens_plane_that_was_asked_for(engine, pop_out):
     """Measured on what the display shows; the box around the scene is a hundred times as deep."""
     display = dataclasses.replace(DISPLAY, aperture_distance=250.0)
-    options = api.PlacementOptions(mode="camera", pop_out=pop_out)
+    options = api.PlacementOptions(place="camera", pop_out=pop_out)
     image = api.render(steps_scene(), display, placement=options, spp=1, integrator="direct", layers=True)
     depth = image.maps["depth"]
     status = np.isfinite(depth) & (image.maps["shape"] >= 0)
@@ -137,7 +138,7 @@ def test_a_picture_shows_the_share_before_the_lens_plane_that_was_asked_for(engi
 
 
 def test_what_a_camera_sees_near_the_eye_is_not_cut_off(engine):
-    options = api.PlacementOptions(mode="camera")
+    options = api.PlacementOptions(place="camera")
     image = api.render(steps_scene(), DISPLAY, placement=options, spp=1, integrator="depth", method="full")
     assert any("the lens plane moved" in note for note in image.provenance.notes)
     assert (image.world_from_display[2, 3], 6.0) == pytest.approx((-6.2, 6.0), abs=0.05)

@@ -9,23 +9,24 @@ import pytest
 
 import lippmann
 from lippmann.errors import UsageError
-from lippmann.scene.light_options import LightOptions
+from lippmann.options.light import LightOptions
+from lippmann.scene.light_options import change_environment, change_source, light_rotation
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Environment, Light
 
 
 def test_light_from_the_front_swings_to_the_right_and_rises():
     front = np.array([0.0, 0.0, 1.0, 0.0])
-    assert LightOptions((90.0, 0.0)).rotation @ front == pytest.approx([1.0, 0.0, 0.0, 0.0])
-    assert LightOptions((0.0, 90.0)).rotation @ front == pytest.approx([0.0, 1.0, 0.0, 0.0])
+    assert light_rotation(LightOptions((90.0, 0.0))) @ front == pytest.approx([1.0, 0.0, 0.0, 0.0])
+    assert light_rotation(LightOptions((0.0, 90.0))) @ front == pytest.approx([0.0, 1.0, 0.0, 0.0])
     up, right = np.radians([30.0, 40.0])
     expected = [np.cos(up) * np.sin(right), np.sin(up), np.cos(up) * np.cos(right), 0.0]
-    assert LightOptions((40.0, 30.0)).rotation @ front == pytest.approx(expected)
+    assert light_rotation(LightOptions((40.0, 30.0))) @ front == pytest.approx(expected)
 
 
 def test_directional_lights_turn_others_stay_and_all_change_their_strength():
     light = LightOptions((90.0, 0.0), 2.0)
-    sun, lamp = (light.source(Light(kind, (1.0, 2.0, 3.0), np.eye(4))) for kind in ("directional", "point"))
+    sun, lamp = (change_source(Light(kind, (1.0, 2.0, 3.0), np.eye(4)), light) for kind in ("directional", "point"))
     assert sun.color == lamp.color == (2.0, 4.0, 6.0)
     assert sun.world_from_light[:3, 2] == pytest.approx([1.0, 0.0, 0.0])
     assert (lamp.world_from_light == np.eye(4)).all()
@@ -33,14 +34,14 @@ def test_directional_lights_turn_others_stay_and_all_change_their_strength():
 
 def test_the_environment_turns_and_changes_its_strength():
     pixels = np.arange(24, dtype=np.float32).reshape(2, 4, 3)
-    changed = LightOptions((0.0, 20.0), 3.0, 0.5).environment(Environment(pixels, follows_viewer=True))
+    changed = change_environment(Environment(pixels, follows_viewer=True), LightOptions((0.0, 20.0), 3.0, 0.5))
     assert (changed.pixels == pixels / 2).all()
     assert changed.follows_viewer
-    assert changed.world_from_environment == pytest.approx(LightOptions((0.0, 20.0)).rotation)
+    assert changed.world_from_environment == pytest.approx(light_rotation(LightOptions((0.0, 20.0))))
 
 
 def test_a_scene_tells_its_light_after_the_change():
-    scene = lippmann.load_scene("gears", light=LightOptions(strength=2.0, environment_strength=3.0))
+    scene = lippmann.load_scene("gears", light=LightOptions(light_strength=2.0, environment_strength=3.0))
     plain = lippmann.load_scene("gears")
     assert np.allclose([each.color for each in scene.lights], 2.0 * np.array([each.color for each in plain.lights]))
     assert np.allclose(scene.environment.pixels, 3.0 * plain.environment.pixels)
@@ -49,9 +50,9 @@ def test_a_scene_tells_its_light_after_the_change():
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        ({"turn": (float("nan"), 0.0)}, "light_turn"),
-        ({"turn": (1.0,)}, "light_turn"),
-        ({"strength": -1.0}, "light_strength"),
+        ({"light_turn": (float("nan"), 0.0)}, "light_turn"),
+        ({"light_turn": (1.0,)}, "light_turn"),
+        ({"light_strength": -1.0}, "light_strength"),
         ({"environment_strength": float("inf")}, "environment_strength"),
     ],
 )
@@ -66,12 +67,12 @@ def test_light_that_cannot_change_is_said(engine):
     from lippmann.device.pbr import build
 
     with pytest.raises(UsageError, match='use integrator="path"'):
-        lippmann.render(lippmann.load_scene("gears", light=LightOptions(strength=2.0)), "seed-lenticular")
+        lippmann.render(lippmann.load_scene("gears", light=LightOptions(light_strength=2.0)), "seed-lenticular")
     ball = {"type": "scene", "ball": {"type": "sphere"}, "lamp": {"type": "point", "position": [0, 0, 5]}}
     own = lippmann.load_scene(mi.load_dict(ball))
     assert isinstance(own, Scene)
     for light, word in (
-        (LightOptions(strength=2.0), "light_strength"),
+        (LightOptions(light_strength=2.0), "light_strength"),
         (LightOptions((10.0, 0.0)), "light_turn"),
         (LightOptions(environment_strength=2.0), "environment_strength"),
     ):

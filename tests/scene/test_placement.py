@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from lippmann.display import Display, LensArray, Panel, list_displays, load_display
 from lippmann.errors import SceneError, UsageError
+from lippmann.options.placement import PlacementOptions
 from lippmann.scene.fit_placement import FILL, POP_OUT
-from lippmann.scene.placement import PlacementOptions, options_of_sequence, place, placement_of
+from lippmann.scene.placement import options_of_sequence, place, placement_of
 from lippmann.scene.values.description import Camera
 
 
@@ -160,9 +161,9 @@ class TestFit:
 
     @pytest.mark.parametrize("mode", ["fit", "display"])
     def test_a_given_depth_scale(self, mode):
-        given = options(mode=mode, depth_scale=0.25, scale=0.5, shift=(1, 2, 3), turn=(20, 30, 40))
+        given = options(place=mode, depth_scale=0.25, scale=0.5, shift=(1, 2, 3), turn=(20, 30, 40))
         placed = place(box(10, 10, 2), display(), options=given)
-        plain = place(box(10, 10, 2), display(), options=options(mode=mode, scale=0.5, turn=(20, 30, 40)))
+        plain = place(box(10, 10, 2), display(), options=options(place=mode, scale=0.5, turn=(20, 30, 40)))
         points = corners(box(10, 10, 2))
         if mode == "fit":  # it stands elsewhere in depth, and larger, as its views move less
             depth, full = (scale_of(each) * np.ptp(in_display(each, points), axis=0)[2] for each in (placed, plain))
@@ -354,7 +355,7 @@ class TestCamera:
         assert placed.mode == "camera"
 
     def test_without_focus_the_centre_lies_in_the_lens_plane(self):
-        placed = place(self.BOUNDS, display(), cameras=[self.camera()], options=options(mode="camera"))
+        placed = place(self.BOUNDS, display(), cameras=[self.camera()], options=options(place="camera"))
         assert in_display(placed, [(0, 0, 0)]) == pytest.approx(np.zeros((1, 3)), abs=1e-9)
 
     def test_the_eye_becomes_the_viewing_point(self):
@@ -397,7 +398,7 @@ class TestCamera:
 
     def test_a_camera_inside_the_scene(self):
         placed = place(
-            box(40, 40, 40, center=(0, 0, 20)), display(), cameras=[self.camera()], options=options(mode="camera")
+            box(40, 40, 40, center=(0, 0, 20)), display(), cameras=[self.camera()], options=options(place="camera")
         )
         assert in_display(placed, [(0, 0, 5)]) == pytest.approx(np.zeros((1, 3)), abs=1e-9)  # between eye and far end
         assert any("cut off" in warning for warning in placed.warnings)
@@ -410,7 +411,8 @@ class TestCamera:
         assert in_display(home, [(0, 0, 0)]) == pytest.approx(np.zeros((1, 3)), abs=1e-9)
         assert place(self.BOUNDS, display(), cameras=cameras).mode == "fit"
         assert (
-            place(self.BOUNDS, display(), cameras=cameras, options=options(mode="fit"), home_camera="eye").mode == "fit"
+            place(self.BOUNDS, display(), cameras=cameras, options=options(place="fit"), home_camera="eye").mode
+            == "fit"
         )
         other = place(self.BOUNDS, display(), cameras=cameras, options=options(camera="other"), home_camera="eye")
         assert in_display(other, [(0, 0, 9)]) == pytest.approx(np.zeros((1, 3)), abs=1e-9)
@@ -449,25 +451,25 @@ class TestCamera:
 
     def test_no_camera_at_all(self):
         with pytest.raises(SceneError, match="the scene has no cameras; fit it"):
-            place(self.BOUNDS, display(), options=options(mode="camera"))
+            place(self.BOUNDS, display(), options=options(place="camera"))
         with pytest.raises(SceneError, match="unknown camera 'eye'; there is none"):
             place(self.BOUNDS, display(), options=options(camera="eye"))
 
 
 class TestDisplayFrame:
     def test_coordinates_are_millimetres(self):
-        placed = place(box(10, 10, 10), display(), options=options(mode="display"))
+        placed = place(box(10, 10, 10), display(), options=options(place="display"))
         assert placed.world_from_display == pytest.approx(np.eye(4))
         assert placed.depth_range == (-5, 5)
         assert placed.warnings == ()
 
     def test_changes_apply(self):
-        changed = options(mode="display", turn=(90, 0, 0), scale=2.0, shift=(0, 0, -10))
+        changed = options(place="display", turn=(90, 0, 0), scale=2.0, shift=(0, 0, -10))
         placed = place(box(10, 10, 10), display(), options=changed)
         assert in_display(placed, [(0, 0, 1)]) == pytest.approx(np.array([[2, 0, -10]]))
 
     def test_what_is_too_near_or_too_deep(self):
-        placed = place(box(10, 10, 200), display(), options=options(mode="display"))
+        placed = place(box(10, 10, 200), display(), options=options(place="display"))
         cut, blurred = placed.warnings
         assert "reaches 100 mm in front of the lens plane; recorded rays begin at 20 mm" in cut
         assert "from -100 to 100 mm; the display resolves -50 to 50 mm" in blurred
@@ -476,8 +478,8 @@ class TestDisplayFrame:
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"mode": "middle"}, "mode: unknown placement 'middle'; known are fit, camera, display"),
-        ({"mode": "disply"}, "mode: unknown placement 'disply', did you mean 'display'"),
+        ({"place": "middle"}, "place: unknown place 'middle'; known are fit, camera, display"),
+        ({"place": "disply"}, "place: unknown place 'disply', did you mean 'display'"),
         ({"camera": 3}, "camera: 3; must be the name of a camera"),
         ({"scale": "big"}, "scale: 'big'; must be a factor"),
         ({"pop_out": "half"}, "pop_out: 'half'; must be a share"),
@@ -496,8 +498,8 @@ class TestDisplayFrame:
         ({"pop_out": math.nan}, "pop_out: nan"),
         ({"shift": 3}, "shift: 3; must be three numbers"),
         ({"shift": (0, math.inf, 0)}, "shift: .*three numbers, none beyond 1e"),
-        ({"mode": "fit", "camera": "eye"}, "camera: camera 'eye' beside placement 'fit'"),
-        ({"mode": "display", "pop_out": 0.5}, "pop_out: coordinates of the display leave nothing to choose"),
+        ({"place": "fit", "camera": "eye"}, "camera: camera 'eye' beside placement 'fit'"),
+        ({"place": "display", "pop_out": 0.5}, "pop_out: coordinates of the display leave nothing to choose"),
     ],
 )
 def test_options_that_cannot_be(fields, message):
@@ -515,7 +517,7 @@ def test_a_turn_of_fewer_angles_is_yaw_then_pitch(turn, kept):
 
 def test_what_stands_for_a_placement():
     assert placement_of(None) == PlacementOptions()
-    assert placement_of({"turn": 30, "mode": "fit"}) == PlacementOptions(mode="fit", turn=(30, 0, 0))
+    assert placement_of({"turn": 30, "place": "fit"}) == PlacementOptions(place="fit", turn=(30, 0, 0))
     placed = place(box(10, 10, 10), display())
     assert placement_of(placed) is placed
     with pytest.raises(UsageError, match="unknown option of a placement 'trun', did you mean 'turn'"):
@@ -538,7 +540,7 @@ def test_what_stands_for_a_placement():
 )
 def test_scenes_without_extent(mode, bounds, message):
     with pytest.raises(SceneError, match=message):
-        place(bounds, display(), options=options(mode=mode))
+        place(bounds, display(), options=options(place=mode))
 
 
 @pytest.mark.parametrize(("thin", "said"), [(0, "side"), (1, "top")])

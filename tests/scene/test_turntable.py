@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import lippmann
+from lippmann.options.placement import PlacementOptions
 from lippmann.scene.matrices import inverse, rotation, transform_points
-from lippmann.scene.placement import PlacementOptions
 from lippmann.scene.turntable import outline, swept_points, turn_about, turning_axis, with_lights_moved
 from lippmann.scene.values.whitted_lighting import Background, ClassicLight
 from lippmann.scene.whitted.world_frame import world_from_scene
@@ -43,8 +43,8 @@ def test_the_axis_is_the_one_that_stands_upright(teapot, turn, axis):
 
 
 def test_a_camera_says_what_is_upright(teapot):
-    assert turning_axis(teapot, PlacementOptions(mode="camera")) == (0.0, 1.0, 0.0)
-    assert turning_axis(teapot, PlacementOptions(mode="camera", turn=(0.0, 0.0, 90.0))) == (1.0, 0.0, 0.0)
+    assert turning_axis(teapot, PlacementOptions(place="camera")) == (0.0, 1.0, 0.0)
+    assert turning_axis(teapot, PlacementOptions(place="camera", turn=(0.0, 0.0, 90.0))) == (1.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("axis", AXES)

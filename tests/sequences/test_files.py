@@ -15,8 +15,8 @@ import pytest
 
 from lippmann.display import load_display
 from lippmann.errors import PictureError, UsageError
+from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.scene.placement import PlacementOptions
 from lippmann.sequences.files import journal_of, saved_sequence
 from lippmann.sequences.motion import open_motion
 

@@ -8,7 +8,9 @@ import pytest
 from lippmann import api
 from lippmann.display import load_display
 from lippmann.errors import SceneError, UsageError
-from lippmann.scene.placement import PlacementOptions, place
+from lippmann.options.placement import PlacementOptions
+from lippmann.options.scene import SceneOptions
+from lippmann.scene.placement import place
 from lippmann.sequences.frames import FrameRange, find_stand, render_sequence, sequence_to_files
 from lippmann.sequences.motion import open_motion
 
@@ -156,7 +158,7 @@ def test_empty_ranges_are_refused(first, stop, step):
 def test_contradictions_are_refused(moving_ball, room, display):
     flight = open_motion(room[0], camera_path=room[1])
     with pytest.raises(UsageError, match="beside a flight"):
-        find_stand(flight, display, PlacementOptions(mode="fit"))
+        find_stand(flight, display, PlacementOptions(place="fit"))
     with pytest.raises(UsageError, match="beside a path"):
         find_stand(flight, display, PlacementOptions(camera="x"))
     with pytest.raises(SceneError, match="unknown camera 'x'"):
@@ -172,6 +174,6 @@ def test_contradictions_are_refused(moving_ball, room, display):
 
 
 def test_surroundings_hold_for_all_frames(moving_ball):
-    motion = open_motion(moving_ball, environment="none", background=(0.1, 0.2, 0.3))
+    motion = open_motion(moving_ball, asked=SceneOptions(environment="none", background=(0.1, 0.2, 0.3)))
     assert [motion.scene(frame).background for frame in (0, 9)] == [(0.1, 0.2, 0.3)] * 2
     assert not motion.scene(9).in_studio

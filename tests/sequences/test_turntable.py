@@ -10,10 +10,10 @@ import pytest
 import lippmann
 from lippmann.display import load_display
 from lippmann.errors import PictureError, UsageError
+from lippmann.options.placement import PlacementOptions
 from lippmann.quilts.quilt import quilt_of_display
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.matrices import transform_points
-from lippmann.scene.placement import PlacementOptions
 from lippmann.scene.turntable import with_meshes_moved
 from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
 from lippmann.sequences.files import saved_sequence
@@ -209,7 +209,7 @@ def test_unfinished_quilts_are_gone_on_with(engine, display, tmp_path):
 
 def test_a_camera_that_places_the_display_cuts_nothing_off(display):
     teapot = lippmann.load_scene("teapot")
-    options = PlacementOptions(mode="camera")
+    options = PlacementOptions(place="camera")
     motion = open_turntable(teapot, 8, placement=options)
     where = find_stand(motion, display, options)
     fronts = [where(frame).depth_range[1] for frame in range(8)]

@@ -96,7 +96,7 @@ def test_renders_take_turns_with_the_studio(studio):
 
 @pytest.mark.long
 def test_a_scene_without_a_file_is_shown_but_not_rendered_from_the_page(engine):
-    scene = lippmann.load_scene("teapot", light=lippmann.LightOptions(turn=(20.0, 0.0)))
+    scene = lippmann.load_scene("teapot", light=lippmann.LightOptions(light_turn=(20.0, 0.0)))
     with lippmann.studio(scene, TINY) as studio, page_of(studio) as socket:
         assert studio.state.light_turn == (20.0, 0.0)
         state = said(socket, "hello")["state"]

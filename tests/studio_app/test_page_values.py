@@ -23,7 +23,13 @@ from lippmann.studio_app.page_values import (
 from lippmann.studio_app.state import StudioState
 
 STATE = StudioState(
-    "teapot", TINY, background=(0.1, 0.2, 0.3), turn=(10.0, -5.0, 0.0), depth_scale=0.5, exposure=1.5, subpixels=True
+    scene="teapot",
+    display=TINY,
+    background=(0.1, 0.2, 0.3),
+    turn=(10.0, -5.0, 0.0),
+    depth_scale=0.5,
+    exposure=1.5,
+    subpixels=True,
 )
 VALUES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5)
 

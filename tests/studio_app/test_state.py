@@ -6,6 +6,8 @@ import dataclasses
 import shlex
 import subprocess
 import sys
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -13,6 +15,10 @@ from hypothesis import strategies as st
 
 from lippmann.cli import run
 from lippmann.errors import LippmannError, UsageError
+from lippmann.options.light import LightOptions
+from lippmann.options.placement import PlacementOptions
+from lippmann.options.quality import QualityOptions
+from lippmann.options.scene import SceneOptions
 from lippmann.studio_app.command_line import render_command, words_of_state
 from lippmann.studio_app.state import StudioState
 from lippmann.studio_app.state_toml import read_state, state_of_text, text_of_state, write_state
@@ -67,22 +73,18 @@ def test_the_command_line_says_all_but_the_eye(state):
     import typer
 
     from lippmann.cli.app import make_app
-    from lippmann.cli.shared import parse
+    from lippmann.cli.shared.command_options import read_options
 
     command = typer.main.get_command(make_app()).commands["render"]
     words = words_of_state(state)
     assert shlex.split(shlex.join(words)) == words
     read = command.make_context("render", list(words)).params
     assert read["scene"].removeprefix("./") == state.scene.removeprefix("./")
-    placed = parse.placement(
-        *(read[n] for n in ("camera", "place", "turn", "shift", "scale", "depth_scale", "pop_out"))
-    )
-    assert placed == state.placement()
-    assert parse.light(read["light_turn"], read["light_strength"], read["environment_strength"]) == state.light()
-    assert parse.color(read["background"]) == state.background
-    assert parse.exposure(read["exposure"]) == state.exposure
-    for name in ("display", "up", "tone_map", "integrator", "depth", "method", "spp", "quality", "seed", "subpixels"):
-        assert read[name] == getattr(state, name), name
+    assert read["display"] == state.display
+    for kind in (PlacementOptions, LightOptions, QualityOptions):
+        assert read_options(kind, read) == kind.part_of(state)
+    environment = None if state.environment is None else Path(state.environment)
+    assert read_options(SceneOptions, read) == replace(SceneOptions.part_of(state), environment=environment)
 
 
 def test_a_draft_is_kept_and_said():
@@ -155,7 +157,7 @@ def test_files_that_a_state_names_lie_beside_it(tmp_path, monkeypatch):
         ("subpixels = 1", "state:1: subpixels: 1; true or false"),
         ('method = "fast"', "known are auto, full"),
         ("\npop_out = 2.0", "state:2: pop_out: 2.0; must be a share of the depth"),
-        ("light_strength = -1.0", "state:1: light_strength: -1; a factor from 0"),
+        ("light_strength = -1.0", "state:1: light_strength: -1.0; a factor from 0"),
         ("exposure = inf", "exposure"),
         ('place = "display"\npop_out = 0.5', "state:2: pop_out"),
         ("[scene]\nname = 1", "state:1: scene"),

@@ -14,8 +14,8 @@ from lippmann import api
 from lippmann.display import Display, LensArray, Panel, load_display
 from lippmann.errors import MemoryLimitError, UsageError
 from lippmann.journal import TileGrid, encode
+from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.scene.placement import PlacementOptions
 from lippmann.tiles.job import FEWEST_TILES, make_job
 
 SETTINGS = RenderRequest(method="full", integrator="direct", spp=2, memory=1 << 30)

@@ -17,58 +17,85 @@ from lippmann.cli.shared.option_names import commands_are
 #: Set where a shell asks for what a line may go on with.
 _COMPLETION = "_LIPPMANN_COMPLETE"
 
-#: Module and name of each command or group of commands, and the first line of its help.
-COMMANDS: Mapping[str, tuple[str, str, str]] = {
-    "render": ("render", "render", "Render a scene into the native pixels of a display."),
-    "preview": (
-        "preview",
-        "preview",
-        "Show in a second or two what a display will show to an eye in front of its middle.",
-    ),
-    "plan": (
-        "plan",
-        "plan",
-        "Say what 'render' will show and take, without rendering: depth, blur, rays, memory and time.",
-    ),
-    "worker": ("cluster", "worker", "Run a Dask worker for renders on a cluster, until its scheduler ends."),
-    "displays": ("system", "displays", "List the bundled displays."),
-    "doctor": ("system", "doctor", "Check the rendering engine of this machine and say how to fix what is missing."),
-    "info": ("picture", "info", "Show a picture's display, size and provenance."),
-    "views": ("picture", "views", "Split a picture into views: one picture per direction, one pixel per lens."),
-    "micro-images": ("picture", "micro_images", "Split a picture into micro-images: one picture per lens."),
-    "compose": ("picture", "compose", "Join views or micro-images into the native picture."),
-    "replay": ("picture", "replay", "Simulate what an eye in front of the display sees."),
-    "refocus": (
-        "picture",
-        "refocus",
-        "Refocus on a plane, or on several, as a camera whose aperture is as wide as the field of view.",
-    ),
-    "export": ("exchange", "export", "Export a picture to the layout of another light-field tool."),
-    "import": ("exchange", "import_", "Import a light field of another tool as a picture for a display."),
-    "studio": ("studio", "studio", "Set up a display by hand in a browser, see live what it will show, and render."),
-    "show": (
-        "studio",
-        "show",
-        "Show a picture on the display itself: a window to put full screen there, native pixels one to one.",
-    ),
-    "view": ("view", "view", "View a picture in a browser as its display shows it."),
-    "quilt": ("quilt", "quilt", "Quilts: all views side by side in one picture."),
-    "weave": ("quilt", "weave", "Make a display's native picture from a quilt or a folder of views."),
-    "interlace": ("interlace", "interlace", "Interlace photographs or frames for a lenticular print or display."),
-    "calibrate": ("calibrate", "calibrate", "Calibrate the pitch, slope and centre of a slanted monitor."),
-    "pitch-test": (
-        "print",
-        "pitch_test",
-        "Write a pitch test: strips at slightly different print pitches, to find the sheet's.",
-    ),
-    "marks": ("print", "marks", "Add a margin with alignment marks to a picture for print, and write its job sheet."),
-    "compare": (
-        "compare",
-        "compare",
-        "Compare a picture with a reference: PSNR, worst micro-images, SSIM of views, the paper's metrics.",
-    ),
-    "reproduce": ("compare", "reproduce", "Reproduce the paper's tables and figures and write a report."),
+#: Commands by what one does with them: module and name of each command or group of commands, and the first line of
+#: its help.
+GROUPS: Mapping[str, Mapping[str, tuple[str, str, str]]] = {
+    "Render": {
+        "render": ("render", "render", "Render a scene into the native pixels of a display."),
+        "preview": (
+            "preview",
+            "preview",
+            "Show in a second or two what a display will show to an eye in front of its middle.",
+        ),
+        "plan": (
+            "plan",
+            "plan",
+            "Say what 'render' will show and take, without rendering: depth, blur, rays, memory and time.",
+        ),
+        "quilt": ("quilt", "quilt", "Quilts: all views side by side in one picture."),
+    },
+    "Look": {
+        "studio": (
+            "studio",
+            "studio",
+            "Set up a display by hand in a browser, see live what it will show, and render.",
+        ),
+        "view": ("view", "view", "View a picture in a browser as its display shows it."),
+        "show": (
+            "studio",
+            "show",
+            "Show a picture on the display itself: a window to put full screen there, native pixels one to one.",
+        ),
+        "replay": ("picture", "replay", "Simulate what an eye in front of the display sees."),
+        "refocus": (
+            "picture",
+            "refocus",
+            "Refocus on a plane, or on several, as a camera whose aperture is as wide as the field of view.",
+        ),
+        "info": ("picture", "info", "Show a picture's display, size and provenance."),
+        "compare": (
+            "compare",
+            "compare",
+            "Compare a picture with a reference: PSNR, worst micro-images, SSIM of views, the paper's metrics.",
+        ),
+    },
+    "From and to other pictures": {
+        "interlace": ("interlace", "interlace", "Interlace photographs or frames for a lenticular print or display."),
+        "weave": ("quilt", "weave", "Make a display's native picture from a quilt or a folder of views."),
+        "views": ("picture", "views", "Split a picture into views: one picture per direction, one pixel per lens."),
+        "micro-images": ("picture", "micro_images", "Split a picture into micro-images: one picture per lens."),
+        "compose": ("picture", "compose", "Join views or micro-images into the native picture."),
+        "export": ("exchange", "export", "Export a picture to the layout of another light-field tool."),
+        "import": ("exchange", "import_", "Import a light field of another tool as a picture for a display."),
+    },
+    "Displays and prints": {
+        "displays": ("system", "displays", "List the bundled displays."),
+        "calibrate": ("calibrate", "calibrate", "Calibrate the pitch, slope and centre of a slanted monitor."),
+        "pitch-test": (
+            "print",
+            "pitch_test",
+            "Write a pitch test: strips at slightly different print pitches, to find the sheet's.",
+        ),
+        "marks": (
+            "print",
+            "marks",
+            "Add a margin with alignment marks to a picture for print, and write its job sheet.",
+        ),
+    },
+    "Program": {
+        "doctor": (
+            "system",
+            "doctor",
+            "Check the rendering engine of this machine and say how to fix what is missing.",
+        ),
+        "worker": ("cluster", "worker", "Run a Dask worker for renders on a cluster, until its scheduler ends."),
+        "reproduce": ("compare", "reproduce", "Reproduce the paper's tables and figures and write a report."),
+    },
 }
+#: All of them.
+COMMANDS = {name: entry for entries in GROUPS.values() for name, entry in entries.items()}
+#: Heading of each command.
+_GROUP_OF = {name: title for title, entries in GROUPS.items() for name in entries}
 
 
 def app_of(words: Sequence[str]) -> typer.Typer:
@@ -89,9 +116,9 @@ def make_app(command: str = "") -> typer.Typer:
         module, attribute, _ = COMMANDS[name]
         found = getattr(importlib.import_module(f"lippmann.cli.commands.{module}"), attribute)
         if isinstance(found, typer.Typer):
-            app.add_typer(found, name=name)
+            app.add_typer(found, name=name, rich_help_panel=_GROUP_OF[name])
         else:
-            app.command(name, cls=HelpfulCommand)(found)
+            app.command(name, cls=HelpfulCommand, rich_help_panel=_GROUP_OF[name])(found)
     return app
 
 
@@ -100,7 +127,7 @@ def _outline() -> typer.Typer:
     """The command line for its own help: commands have their names and the first line of theirs."""
     app = _empty()
     for name, (_, _, line) in COMMANDS.items():
-        app.command(name, cls=HelpfulCommand, help=line)(lambda: None)
+        app.command(name, cls=HelpfulCommand, help=line, rich_help_panel=_GROUP_OF[name])(lambda: None)
     return app
 
 

@@ -23,7 +23,7 @@ from lippmann.journal.tile_file import DamagedTile, decode
 if TYPE_CHECKING:
     from distributed import Future as DaskFuture
 
-    from lippmann.rendering.request.choices import Device
+    from lippmann.options.choices import Device
     from lippmann.tiles.job import TileJob
     from lippmann.tiles.tile_render import Prepared
     from lippmann.tiles.tiled_render import Put, Runner

@@ -10,6 +10,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.options.choices import Method
 from lippmann.rendering.adaptive.extra_samples import extra_samples
 from lippmann.rendering.adaptive.goal import Goal, goal_of
 from lippmann.rendering.adaptive.stopping import Costs, Outcome, reach
@@ -29,7 +30,6 @@ from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.job import Job, Traced
 from lippmann.rendering.light_statements import is_among_mirrors
 from lippmann.rendering.reprojection.common.point_image import STATUS_LAYER, TRACED
-from lippmann.rendering.request.choices import Method
 from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator
 from lippmann.rendering.transport.path import PathIntegrator

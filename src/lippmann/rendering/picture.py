@@ -12,8 +12,8 @@ from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.image import IntegralImage
 from lippmann.optics.lens import lens_notes
+from lippmann.options.choices import REUSING
 from lippmann.progress import ProgressCallback, silent
-from lippmann.rendering.request.choices import REUSING
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.region_of_interest import even_background, panel_window, scene_corners
 from lippmann.rendering.request.render_request import RenderRequest

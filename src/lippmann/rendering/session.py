@@ -18,12 +18,16 @@ from lippmann.display import Display
 from lippmann.display.sheet_layout import trimmed
 from lippmann.errors import UsageError
 from lippmann.image.provenance import Provenance
+from lippmann.options.choices import POOLED_LIGHT, REUSING
+from lippmann.options.option import Options
+from lippmann.options.placement import PlacementOptions
+from lippmann.options.plain import settings_of
+from lippmann.options.quality import QualityOptions
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.light_statements import light_notes, stated_error
-from lippmann.rendering.request.choices import POOLED_LIGHT, REUSING
 from lippmann.rendering.request.plan import follow
 from lippmann.rendering.request.region_of_interest import even_background
 from lippmann.rendering.request.render_plan import Choice
@@ -32,7 +36,7 @@ from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
 from lippmann.scene.camera_placement import CameraView, VisibleDepth
 from lippmann.scene.matrices import rotation_of
-from lippmann.scene.placement import Placement, PlacementOptions, place
+from lippmann.scene.placement import Placement, place
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Matrix
 
@@ -282,7 +286,7 @@ class Session:
             rays={"primary": rays.primary, "shadow": rays.shadow, "secondary": rays.secondary},
             seconds=_stage_seconds(self.watch, frame),
             estimate=stated_error(estimate, samples, self.choices),
-            options={**options, **self.choices, **self._plan_options()},
+            options={**options, **self.choices, **self._plan_options(), "settings": self._settings()},
             notes=(
                 *self.notes,
                 *notes,
@@ -296,6 +300,12 @@ class Session:
         """The plan as files hold it, a line for each choice."""
         plan = self.request.plan
         return {} if plan is None else {"plan": plan.with_pilot(self.choices).lines()}
+
+    def _settings(self) -> list[str]:
+        """Every option that is not at its default, as it was decided."""
+        request, scene = self.request, self.scene
+        parts = (scene.light, request.placement, QualityOptions.part_of(request))
+        return [*scene.settings, *(line for part in parts if isinstance(part, Options) for line in settings_of(part))]
 
     def _warn_of_emptiness(self, frame: Frame, work: int, has_pixels: bool) -> tuple[str, ...]:
         from lippmann.rendering.film.seen_share import nothing_seen, seen_share

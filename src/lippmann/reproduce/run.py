@@ -21,7 +21,7 @@ from lippmann.scene.readers.load import load_scene
 from lippmann.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from lippmann.rendering.request.choices import Device, Method, Order
+    from lippmann.options.choices import Device, Method, Order
 
 #: What :func:`reproduce` writes.
 PAGE, FIGURES = "report.html", "results.json"

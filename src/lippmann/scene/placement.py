@@ -6,21 +6,18 @@ The display frame is right-handed, in millimetres: origin at the array's centre 
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from numbers import Real
-from typing import Literal, get_args
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lippmann.display import Display
 from lippmann.errors import SceneError, UsageError
+from lippmann.options.placement import Mode, PlacementOptions
 from lippmann.scene.camera_placement import DepthProbe, frame_whole, place_by_camera
 from lippmann.scene.fit_placement import fit_scene
 from lippmann.scene.matrices import (
     Bounds,
-    Vector,
     depth_scaling,
     inverse,
     rotation,
@@ -31,91 +28,6 @@ from lippmann.scene.matrices import (
 )
 from lippmann.scene.scene import box, box_corners, find_camera, thin_axis
 from lippmann.scene.values.description import Camera, Matrix
-
-Mode = Literal["fit", "camera", "display"]
-
-#: Depth that is scaled by less, or by more than its inverse, leaves nothing that rays could tell apart.
-_LEAST_DEPTH_SCALE = 1e-4
-
-#: Factors and millimetres beyond which float32 coordinates of the scene overflow, or their squares do.
-_MOST = 1e9
-
-
-@dataclass(frozen=True)
-class PlacementOptions:
-    """Options of placing a display in a scene.
-
-    Parameters
-    ----------
-    mode:
-        ``fit``: the scene's silhouette fills the panel, its depth what the display resolves. ``camera``: as ``camera``
-        looks. ``display``: scene coordinates are millimetres of the display frame. None: ``camera`` if one is named,
-        else the scene's home camera if it has one, else ``fit``.
-    camera:
-        Name of a camera of the scene; None takes its home camera, or its first.
-    turn:
-        Degrees by which the scene is turned: yaw about the display's y axis (positive: its front toward +x), then pitch
-        about x (positive: its top toward the viewer), then roll about z (positive: counter-clockwise). One number is a
-        yaw, two are yaw and pitch; kept as three.
-    shift:
-        Millimetres by which the scene is moved in the display frame, last of all.
-    scale:
-        Factor on the size at which the scene appears.
-    depth_scale:
-        Factor on its depth, about the lens plane, above 0. None: when fitting, what compresses the depth into what the
-        display resolves, at most 1; otherwise 1.
-    pop_out:
-        Share of the scene's depth to lie in front of the lens plane, 0 to 1; with a camera, of the depth that it
-        sees. None: a third when fitting, as the camera focuses otherwise.
-
-    Raises
-    ------
-    UsageError
-        A value is out of its range, or two options contradict each other.
-    """
-
-    mode: Mode | None = None
-    camera: str | None = None
-    turn: Vector = (0.0, 0.0, 0.0)
-    shift: Vector = (0.0, 0.0, 0.0)
-    scale: float = 1.0
-    depth_scale: float | None = None
-    pop_out: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.mode is not None and self.mode not in get_args(Mode):
-            raise UsageError.unknown("placement", self.mode, get_args(Mode), parameter="mode")
-        if self.camera is not None and not isinstance(self.camera, str):
-            raise UsageError(f"{self.camera!r}", parameter="camera", rule="must be the name of a camera")
-        object.__setattr__(self, "turn", _three_numbers("turn", self.turn, least=1))
-        object.__setattr__(self, "shift", _three_numbers("shift", self.shift, least=3))
-        factor = "must be a factor from {:g} to {:g}"
-        _check_number("scale", self.scale, 1.0 / _MOST, _MOST, factor)
-        if self.depth_scale is not None:
-            _check_number("depth_scale", self.depth_scale, _LEAST_DEPTH_SCALE, 1.0 / _LEAST_DEPTH_SCALE, factor)
-        if self.pop_out is not None:
-            _check_number("pop_out", self.pop_out, 0.0, 1.0, "must be a share of the depth, {:g} to {:g}")
-        if self.camera is not None and self.mode not in (None, "camera"):
-            raise UsageError(
-                f"camera '{self.camera}' beside placement '{self.mode}'", parameter="camera", rule="only one"
-            )
-        if self.pop_out is not None and self.mode == "display":
-            raise UsageError(
-                "coordinates of the display leave nothing to choose", parameter="pop_out", fix="use shift=0,0,Z instead"
-            )
-
-    @classmethod
-    def of(cls, values: Mapping[str, object]) -> PlacementOptions:
-        """The options of a mapping, such as ``{"turn": 30, "scale": 0.9}``.
-
-        Raises
-        ------
-        UsageError
-            A name or a value is not known.
-        """
-        known = [field.name for field in fields(cls)]
-        UsageError.refuse_unknown("option of a placement", values, known, parameter="placement")
-        return cls(**values)  # type: ignore[arg-type]  # checked by __post_init__
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +146,7 @@ def place(
     """
     options = options or PlacementOptions()
     box(bounds)
-    mode = options.mode or ("camera" if options.camera or home_camera else "fit")
+    mode = options.place or ("camera" if options.camera or home_camera else "fit")
     warnings: list[str] = []
     exposure = 0.0
     if mode == "fit":
@@ -257,7 +169,7 @@ def place(
             probe=probe,
             warnings=warnings,
         )
-        if contains_home and options.mode is None and options.camera is None:
+        if contains_home and options.place is None and options.camera is None:
             points = box_corners(bounds) if extreme_points is None else extreme_points()
             by_camera = frame_whole(camera, transform_points(by_camera, points), display) @ by_camera
         display_from_world = _resize(by_camera, options)
@@ -301,28 +213,11 @@ def face_viewer(bounds: Bounds, options: PlacementOptions, warnings: list[str]) 
     return replace(options, turn=(-90.0, 0.0, 0.0) if thin == 0 else (0.0, 90.0, 0.0))
 
 
-def _three_numbers(name: str, value: object, *, least: int) -> Vector:
-    """Three numbers of at least ``least``, the others 0."""
-    numbers: list[float] = []
-    with contextlib.suppress(TypeError, ValueError):
-        numbers += np.atleast_1d(np.asarray(value, np.float64)).tolist()
-    if not least <= len(numbers) <= 3 or not (np.abs(numbers) <= _MOST).all():
-        count = "three numbers" if least == 3 else "one to three numbers"
-        raise UsageError(f"{value!r}", parameter=name, rule=f"must be {count}, none beyond {_MOST:g}")
-    x, y, z = (*numbers, *([0.0] * (3 - len(numbers))))
-    return x, y, z
-
-
-def _check_number(name: str, value: object, low: float, high: float, rule: str) -> None:
-    if not isinstance(value, Real) or not low <= float(value) <= high:
-        raise UsageError(f"{value!r}", parameter=name, rule=rule.format(low, high))
-
-
 def _choose_camera(cameras: Sequence[Camera], name: str | None) -> Camera:
     if name is not None:
         return find_camera(cameras, name)
     if not cameras:
-        raise SceneError("the scene has no cameras", parameter="mode", fix="fit it instead")
+        raise SceneError("the scene has no cameras", parameter="place", fix="fit it instead")
     return cameras[0]
 
 

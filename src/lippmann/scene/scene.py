@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
+from lippmann.options.light import LightOptions
 from lippmann.runtime.cached_property import cached_property
 from lippmann.scene.extreme_points import extreme_points_of, used_positions
-from lippmann.scene.light_options import LightOptions
+from lippmann.scene.light_options import change_environment, change_source
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.splat_clouds import check_splats, typical_points
 from lippmann.scene.values.description import (
@@ -57,7 +58,8 @@ class Scene:
     None for all others; ``home_may_move`` says that it need not be kept to exactly where a display shows more or less.
     ``studio`` says whether the built-in studio may light a scene that has no lights. ``light`` changes the direction
     and the strength of its light: :attr:`environment` and :attr:`lights` are those after that change.
-    ``has_chosen_background`` says that the background is of a colour that the caller asked for.
+    ``has_chosen_background`` says that the background is of a colour that the caller asked for; ``settings`` are the
+    options that it was read with, a line each (:func:`lippmann.options.plain.settings_of`).
 
     A scene from Mitsuba knows its ``bounds``, ``cameras``, ``lights`` and hence ``environment``, ``background`` and
     ``notes`` only once the engine has started: asked before, they start it.
@@ -72,6 +74,7 @@ class Scene:
     views: tuple[Camera, ...] = field(default=(), repr=False)
     light: LightOptions = field(default_factory=LightOptions, repr=False)
     has_chosen_background: bool = field(default=False, repr=False)
+    settings: tuple[str, ...] = field(default=(), repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.description is None and self.classic is None:
@@ -202,7 +205,7 @@ class Scene:
     def environment(self) -> Environment | None:
         """Light from far away: the scene's or the caller's; the studio where the scene has no light at all."""
         original = self._original_environment
-        return None if original is None else self.light.environment(original)
+        return None if original is None else change_environment(original, self.light)
 
     @property
     def _original_environment(self) -> Environment | None:
@@ -217,7 +220,7 @@ class Scene:
         """The light sources of a description; none of a scene of Mitsuba's, which keeps its own."""
         if isinstance(self.physical, MitsubaSource):
             return ()
-        return tuple(self.light.source(light) for light in self.physical.lights)
+        return tuple(change_source(light, self.light) for light in self.physical.lights)
 
     @property
     def background(self) -> Color | None:

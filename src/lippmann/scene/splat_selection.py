@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lippmann.errors import UsageError
+from lippmann.options.scene import Crop
 from lippmann.scene.matrices import scaling
 from lippmann.scene.point_clouds import crop_cloud, is_cloud
 from lippmann.scene.scene import Scene
 from lippmann.scene.splat_clouds import check_splats, cropped, moved
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import Splats
-
-#: Lowest corner x, y and z of a box, then its highest.
-Crop = tuple[float, float, float, float, float, float]
 
 _LARGEST_FACTOR = 1e9
 

@@ -13,9 +13,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.options.placement import PlacementOptions
 from lippmann.scene.camera_placement import remove_scale
 from lippmann.scene.matrices import Bounds, Vector, inverse, rotation, transform_points, translation
-from lippmann.scene.placement import PlacementOptions, face_viewer
+from lippmann.scene.placement import face_viewer
 from lippmann.scene.scene import Scene
 from lippmann.scene.splat_clouds import moved
 from lippmann.scene.values.description import Matrix, SceneDescription
@@ -51,10 +52,10 @@ def turning_axis(scene: Scene, options: PlacementOptions) -> Vector:
     SceneError
         The camera that the options name is not found.
     """
-    if options.mode == "camera" or options.camera is not None:
+    if options.place == "camera" or options.camera is not None:
         frame = remove_scale(scene.camera(options.camera))[:3, :3]
         display_from_world = rotation(options.turn)[:3, :3] @ frame.T
-    elif options.mode == "display":
+    elif options.place == "display":
         display_from_world = rotation(options.turn)[:3, :3]
     else:
         display_from_world = rotation(face_viewer(scene.bounds, options, []).turn)[:3, :3]

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from lippmann.errors import UsageError
+from lippmann.options.scene import Crop
 from lippmann.scene.scene import Scene
-from lippmann.scene.splat_selection import Crop, check_crop, holds_none
+from lippmann.scene.splat_selection import check_crop, holds_none
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.volume import TransferFunction, Volume
 from lippmann.scene.volumes.grid import cropped

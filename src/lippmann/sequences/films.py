@@ -12,9 +12,9 @@ from lippmann.color.transfer import Transfer
 from lippmann.display import Display
 from lippmann.errors import OutputError, UsageError
 from lippmann.image.stored_values import FloatArray
+from lippmann.options.choices import REUSING
 from lippmann.progress import silent
 from lippmann.quilts.quilt import DeviceQuilt, Quilt, QuiltLayout
-from lippmann.rendering.request.choices import REUSING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import options_of_sequence
 from lippmann.sequences.files import SavedFrame

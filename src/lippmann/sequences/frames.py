@@ -16,24 +16,18 @@ import numpy as np
 
 from lippmann.display import Display, load_display
 from lippmann.errors import SceneError, UsageError
+from lippmann.options.placement import Mode, PlacementOptions
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.scene.placement import (
-    Mode,
-    Placement,
-    PlacementOptions,
-    options_of_sequence,
-    place,
-    stand,
-)
+from lippmann.scene.placement import Placement, options_of_sequence, place, stand
 from lippmann.scene.values.description import Camera, Matrix
 from lippmann.sequences.forms import INTEGRAL, Form, QuiltForm, Shown
 from lippmann.sequences.motion import Motion, open_motion
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
+    from lippmann.options.choices import Denoiser, Method
     from lippmann.quilts.quilt import Quilt
-    from lippmann.rendering.request.choices import Denoiser, Method
     from lippmann.tiles.tiled_render import Rendered, Runner
 
 
@@ -119,7 +113,7 @@ def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> S
     if own is not None:
         return Stand(motion, display, own.mode, own.world_from_display, warnings=own.warnings)
     camera = motion.camera(0, options.camera)
-    if camera is None and options.mode == "camera":
+    if camera is None and options.place == "camera":
         cameras = motion.scene(0).cameras
         if not cameras:
             raise SceneError("the scene has no cameras", parameter="place", fix="fit it instead")
@@ -128,11 +122,11 @@ def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> S
     if camera is None:
         placement = place(motion.bounds(), display, options=options)
         return Stand(motion, display, placement.mode, placement.world_from_display)
-    if options.mode not in (None, "camera"):
+    if options.place not in (None, "camera"):
         raise UsageError(
-            f"placement '{options.mode}' beside a flight", parameter="place", rule="the display follows the camera"
+            f"placement '{options.place}' beside a flight", parameter="place", rule="the display follows the camera"
         )
-    following = replace(options, mode="camera", camera=camera.name)
+    following = replace(options, place="camera", camera=camera.name)
     placement = place(motion.bounds(), display, cameras=(camera,), options=following)
     return Stand(motion, display, "camera", placement.world_from_display, options.camera, _pose(camera))
 

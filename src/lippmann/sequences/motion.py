@@ -13,12 +13,14 @@ import numpy as np
 
 from lippmann.display import Display
 from lippmann.errors import UsageError
-from lippmann.scene.light_options import LightOptions
+from lippmann.options.light import LightOptions
+from lippmann.options.placement import PlacementOptions
+from lippmann.options.scene import SceneOptions
 from lippmann.scene.matrices import Bounds
-from lippmann.scene.placement import Placement, PlacementOptions
-from lippmann.scene.readers.load import STAGES, kind_of_file, load_scene
+from lippmann.scene.placement import Placement
+from lippmann.scene.readers.load import STAGES, kind_of_file, read_scene
 from lippmann.scene.scene import Scene, check_description, find_camera, override_light
-from lippmann.scene.values.description import Camera, Environment, Matrix, SceneDescription
+from lippmann.scene.values.description import Camera, Matrix, SceneDescription
 from lippmann.scene.values.whitted_camera import CameraPose
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.whitted.world_frame import world_camera
@@ -30,6 +32,12 @@ if TYPE_CHECKING:
 
 #: Frames of an animation per second where nothing is said.
 FRAMES_PER_SECOND = 24.0
+
+#: Nothing is asked for of a scene's file.
+AS_IT_IS = SceneOptions()
+
+#: Options of a scene's file that go with its motion.
+_OF_MOVING = ("variants", "environment", "background", "single_scattering")
 
 #: Moments, spread evenly over an animation, whose boxes together stand for all that it ever fills.
 _MOMENTS = 65
@@ -81,8 +89,8 @@ class AnimatedFile(Motion):
         Frames per second of the animation's own time, which begins at 0.
     animation:
         Its name; ``None`` for the file's first.
-    environment, background, allow_outside, multiple_scattering, light, variants:
-        As of :func:`lippmann.scene.readers.load.load_scene`.
+    asked, light, allow_outside:
+        As of :func:`lippmann.scene.readers.load.read_scene`.
 
     Raises
     ------
@@ -98,26 +106,20 @@ class AnimatedFile(Motion):
         *,
         fps: float = FRAMES_PER_SECOND,
         animation: str | None = None,
-        environment: str | Path | Environment | None = None,
-        background: tuple[float, float, float] | None = None,
-        allow_outside: bool = False,
-        multiple_scattering: bool = True,
+        asked: SceneOptions = AS_IT_IS,
         light: LightOptions | None = None,
-        variants: Mapping[str, str] | None = None,
+        allow_outside: bool = False,
     ) -> None:
+        for name in asked.given:
+            if name not in _OF_MOVING:
+                raise UsageError("is for scenes at rest", parameter=name, fix="leave it out")
         if not (math.isfinite(fps) and fps > 0.0):
             raise UsageError(f"{fps:g} frames per second", parameter="fps", rule="a number above 0")
         self._file = path.name
         self._fps = fps
-        self._moving = _open_moving(path, animation, allow_outside, variants)
+        self._moving = _open_moving(path, animation, allow_outside, asked.variants)
         # Surroundings and background are read once, with the first frame.
-        self._first = load_scene(
-            self._moving.at(0.0),
-            environment=environment,
-            background=background,
-            multiple_scattering=multiple_scattering,
-            light=light,
-        )
+        self._first = read_scene(self._moving.at(0.0), replace(asked, variants=None), light)
 
     @property
     def count(self) -> int:
@@ -211,12 +213,9 @@ def open_motion(
     fps: float | None = None,
     animation: str | None = None,
     camera_path: Path | None = None,
-    environment: str | Path | Environment | None = None,
-    background: tuple[float, float, float] | None = None,
-    allow_outside: bool = False,
-    multiple_scattering: bool = True,
+    asked: SceneOptions = AS_IT_IS,
     light: LightOptions | None = None,
-    variants: Mapping[str, str] | None = None,
+    allow_outside: bool = False,
 ) -> Motion:
     """What moves in a scene file.
 
@@ -226,8 +225,8 @@ def open_motion(
         Of a glTF file, USD stage or Blender file, see :class:`AnimatedFile`.
     camera_path:
         A Tachyon ``.cam`` file: the display flies along it.
-    environment, background, allow_outside, multiple_scattering, light, variants:
-        As of :func:`lippmann.scene.readers.load.load_scene`.
+    asked, light, allow_outside:
+        As of :func:`lippmann.scene.readers.load.read_scene`.
 
     Raises
     ------
@@ -242,15 +241,7 @@ def open_motion(
                 raise UsageError("a camera path has one pose a frame", parameter=name, fix="leave it out")
         from lippmann.scene.readers.tachyon.reader import read_cam
 
-        scene = load_scene(
-            source,
-            environment=environment,
-            background=background,
-            allow_outside=allow_outside,
-            multiple_scattering=multiple_scattering,
-            light=light,
-        )
-        return Flight(scene, read_cam(camera_path))
+        return Flight(read_scene(source, asked, light, allow_outside=allow_outside), read_cam(camera_path))
     if kind_of_file(source) not in (".blend", ".glb", ".gltf", *STAGES):
         raise UsageError(
             f"nothing moves in '{source}'",
@@ -262,10 +253,7 @@ def open_motion(
         Path(source),
         fps=FRAMES_PER_SECOND if fps is None else fps,
         animation=animation,
-        environment=environment,
-        background=background,
-        allow_outside=allow_outside,
-        multiple_scattering=multiple_scattering,
+        asked=asked,
         light=light,
-        variants=variants,
+        allow_outside=allow_outside,
     )

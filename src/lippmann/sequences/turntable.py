@@ -10,10 +10,11 @@ import numpy as np
 
 from lippmann.display import Display
 from lippmann.errors import UsageError
+from lippmann.options.placement import PlacementOptions
 from lippmann.scene.camera_placement import CameraView, VisibleDepth
 from lippmann.scene.matrices import Bounds, Vector, inverse, transform_points
 from lippmann.scene.mitsuba_source import MitsubaSource
-from lippmann.scene.placement import Placement, PlacementOptions, face_viewer, place
+from lippmann.scene.placement import Placement, face_viewer, place
 from lippmann.scene.scene import Scene
 from lippmann.scene.turntable import (
     STEP,
@@ -113,7 +114,7 @@ class Turntable(Motion):
         if isinstance(scene.description, MitsubaSource) and scene.has_lights and scene.description.environment is None:
             notes.append("the light sources of a Mitsuba scene turn with it")
         swept = self.swept()
-        if options.mode not in (None, "fit") or options.camera is not None:
+        if options.place not in (None, "fit") or options.camera is not None:
             found = place(
                 _box_of(swept),
                 display,
@@ -124,7 +125,7 @@ class Turntable(Motion):
                 probe=partial(_depth_of, swept),
             )
             return replace(found, warnings=(*notes, *found.warnings))
-        options = face_viewer(scene.bounds, replace(options, mode="fit"), notes)
+        options = face_viewer(scene.bounds, replace(options, place="fit"), notes)
         yaw, pitch, roll = options.turn
         # About the same axis, the yaw is but another beginning of the turn; fitted after it, the box is the least.
         turn = turn_about(_UP, self._center, yaw if abs(self._axis[1]) == 1.0 else 0.0)

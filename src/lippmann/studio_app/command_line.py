@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 
+from lippmann.options.light import LightOptions
+from lippmann.options.option import default_of, options_of
+from lippmann.options.placement import PlacementOptions
+from lippmann.options.quality import QualityOptions
+from lippmann.options.scene import SceneOptions
 from lippmann.studio_app.state import StudioState
 
-#: Settings that are said otherwise than by an option with their value.
-_SCENE, _EYE, _SUBPIXELS = "scene", "eye", "subpixels"
+#: Settings that are no options of a render.
+_OTHERS = ("scene", "eye")
 
-#: What commands assume where a setting is not said, where that differs from a new studio.
-_ASSUMED = {"integrator": "auto"}
+#: What commands assume where a setting is not said: a new studio may differ.
+_ASSUMED = {
+    each.name: default_of(each)
+    for kind in (SceneOptions, PlacementOptions, LightOptions, QualityOptions)
+    for each, _ in options_of(kind)
+}
 
 
 def render_command(state: StudioState, output: str | None = None, *, allow_outside: bool = False) -> list[str]:
@@ -23,25 +31,31 @@ def render_command(state: StudioState, output: str | None = None, *, allow_outsi
 def words_of_state(state: StudioState) -> list[str]:
     """The scene and the options of a state, those of a render alone; what commands assume anyway is left out."""
     words = [state.scene if not state.scene.startswith("-") else f"./{state.scene}"]
-    for name, text in option_texts(state).items():
-        option = f"--{name.replace('_', '-')}"
-        if name == _SUBPIXELS:
-            words.append(option if state.subpixels else f"--no-{name}")
+    flags = {each.name: its.flag_of(each.name) for each, its in options_of(StudioState)}
+    for name, value in option_values(state).items():
+        flag = flags[name]
+        if isinstance(value, bool):
+            words.append(flag if value else f"--no-{flag[2:]}")
         else:
-            words += [option, text]
+            for text in [value] if isinstance(value, str) else value:
+                words += [flag, text]
     return words
 
 
-def option_texts(state: StudioState) -> Mapping[str, str]:
-    """The values of a render's options as they are typed, by setting; what commands assume anyway is left out."""
-    plain = StudioState()
-    texts = {}
-    for each in fields(StudioState):
+def option_values(state: StudioState) -> Mapping[str, str | bool | list[str]]:
+    """The options of a render by name, as they are typed; switches are bool. What commands assume is left out."""
+    values: dict[str, str | bool | list[str]] = {}
+    for each, _ in sorted(options_of(StudioState), key=lambda found: found[0].name != "display"):
         value = getattr(state, each.name)
-        assumed = _ASSUMED.get(each.name, getattr(plain, each.name))
-        if each.name not in (_SCENE, _EYE) and value is not None and value != assumed:
-            texts[each.name] = _text(value)
-    return texts
+        if each.name not in _OTHERS and value is not None and value != _ASSUMED.get(each.name, default_of(each)):
+            values[each.name] = _typed(value)
+    return values
+
+
+def _typed(value: object) -> str | bool | list[str]:
+    if isinstance(value, Mapping):
+        return [f"{name}={choice}" for name, choice in value.items()]
+    return value if isinstance(value, bool) else _text(value)
 
 
 def _text(value: object) -> str:

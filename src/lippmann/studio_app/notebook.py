@@ -171,7 +171,7 @@ def state_of_settings(
         raise UsageError("is for files", parameter="up", fix="leave it out")
     values: dict[str, object] = {}
     if held is not None:
-        values["light_turn"], values["light_strength"] = held.light.turn, held.light.strength
+        values["light_turn"], values["light_strength"] = held.light.light_turn, held.light.light_strength
         values["environment_strength"] = held.light.environment_strength
     values.update(settings, scene=scene, display=str(display))
     return state_of_values({name: _plain(value) for name, value in values.items()})

@@ -7,16 +7,16 @@ import os
 import re
 import shlex
 import subprocess
-import types
 from collections.abc import Mapping
-from dataclasses import asdict, fields
-from functools import cache
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any
 
 from lippmann.display import Display
 from lippmann.display.formats.inline_spec import size_of_short_form
 from lippmann.errors import UsageError
+from lippmann.options.option import options_of
+from lippmann.options.plain import from_plain, to_plain
 from lippmann.printable import one_line
 from lippmann.scene.placement import Placement
 from lippmann.studio_app.state import StudioState
@@ -31,7 +31,7 @@ _PARAMETER = re.compile(r"\b([a-z]+(?:_[a-z]+)*)=(\S+)")
 
 def values_of_state(state: StudioState) -> dict[str, object]:
     """Fields of a state as types of JSON."""
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(state).items()}
+    return {name: to_plain(value) for name, value in vars(state).items()}
 
 
 def state_of_values(values: object) -> StudioState:
@@ -44,12 +44,16 @@ def state_of_values(values: object) -> StudioState:
     """
     if not isinstance(values, Mapping):
         raise UsageError("the state", rule="must be an object of JSON")
-    kinds = _kinds()
+    kinds = {each.name: each.type for each, _ in options_of(StudioState)}
     found: dict[str, Any] = {}
     for name, value in values.items():
         if name not in kinds:
             raise UsageError.unknown("setting", name, kinds)
-        found[name] = _value_of(kinds[name], value, name)
+        _check_of_page(value, name)
+        try:
+            found[name] = from_plain(kinds[name], value)
+        except UsageError as error:
+            raise UsageError(error.what, parameter=name, rule=error.rule) from None
     return StudioState(**found)
 
 
@@ -103,39 +107,15 @@ def _pair(ends: tuple[float, float]) -> list[float | None]:
     return [end if math.isfinite(end) else None for end in ends]
 
 
-@cache
-def _kinds() -> dict[str, Any]:
-    hints = get_type_hints(StudioState)
-    return {field.name: hints[field.name] for field in fields(StudioState)}
-
-
-def _value_of(kind: Any, value: object, name: str) -> Any:
-    """``value`` as the annotated type ``kind``."""
-    origin, arguments = get_origin(kind), get_args(kind)
-    if origin in (Union, types.UnionType):
-        for each in arguments:
-            try:
-                return _value_of(each, value, name)
-            except UsageError:
-                continue
-    elif origin is Literal:
-        if isinstance(value, str) and value in arguments:
-            return value
-    elif origin is tuple:
-        if isinstance(value, list) and len(value) == len(arguments):
-            return tuple(_value_of(float, part, name) for part in value)
-    elif kind is type(None):
-        if value is None:
-            return None
-    elif kind is float:
-        if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e12:
-            return float(value)
-    elif kind is str:
-        if isinstance(value, str) and 0 < len(value) <= _MOST_TEXT and one_line(value) == value:
-            return value
-    elif kind in (int, bool) and type(value) is kind:
-        return value
-    raise UsageError(f"{str(value)[:60]!r}", parameter=name, rule="must be a value of the setting's type")
+def _check_of_page(value: object, name: str) -> None:
+    """Refuse numbers and texts that no field of the page holds."""
+    if isinstance(value, (list, Mapping)):
+        for part in value.values() if isinstance(value, Mapping) else value:
+            _check_of_page(part, name)
+    elif isinstance(value, str) and not (0 < len(value) <= _MOST_TEXT and one_line(value) == value):
+        raise UsageError(f"{value[:60]!r}", parameter=name, rule=f"a line of at most {_MOST_TEXT} letters")
+    elif isinstance(value, float) and not abs(value) < 1e12:
+        raise UsageError(f"{value!r}", parameter=name, rule="a number below 1e12")
 
 
 def shell_line(words: list[str]) -> str:

@@ -22,6 +22,9 @@ from pathlib import Path
 from typing import Literal
 
 from lippmann.errors import UsageError
+from lippmann.options.forms import LEFT_OUT
+from lippmann.options.option import kinds_of, options_of
+from lippmann.options.quality import QualityOptions
 from lippmann.progress_bar import STAGE_NAMES
 from lippmann.runtime.child_python import python_command
 from lippmann.studio_app.output_names import OutputClaim, claim_output, frames_of, is_unfinished
@@ -64,9 +67,6 @@ _WORDS_OF = {STAGE_NAMES[stage]: words for stage, words in _STAGE_WORDS.items()}
 #: A rate is known from so many seconds and such a share on: kernels are compiled first.
 _RATE_SECONDS, _RATE_SHARE = 4.0, 0.05
 _FORESEEN = re.compile(r"about (\d{1,9}) s left")
-
-#: Options of ``lippmann render`` that quilts, whose views have no sub-pixels, lack.
-_NOT_FOR_QUILTS = ("--subpixels", "--no-subpixels")
 
 _CODE = "from lippmann.cli.render_process import main; main()"
 
@@ -143,7 +143,7 @@ def command_of(kind: Kind, words: list[str], output: Path) -> tuple[str, ...]:
     """
     head, options = words[:2], _without(words[2:], ("-o", "--output"), has_value=True)
     if kind == "quilt":
-        return ("lippmann", "quilt", "render", *_without(options, _NOT_FOR_QUILTS), "-o", str(output))
+        return ("lippmann", "quilt", "render", *_of_quilts(options), "-o", str(output))
     if kind == "turntable":
         frames = frames_of(output)
         film = ("--turntable", str(TURNTABLE_FRAMES), "--video", str(output), "--resume")
@@ -151,6 +151,15 @@ def command_of(kind: Kind, words: list[str], output: Path) -> tuple[str, ...]:
     if kind == "print":
         return (*head, *options, "--marks", PRINT_MARGIN, "-o", str(output))
     return (*head, *options, "--resume", "-o", str(output))
+
+
+def _of_quilts(words: list[str]) -> list[str]:
+    """Options of a picture without those that a quilt has not."""
+    for each, its in options_of(QualityOptions):
+        if each.name in LEFT_OUT["quilt"]:
+            flag, is_switch = its.flag_of(each.name), bool in kinds_of(each.type)
+            words = _without(words, (flag, f"--no-{flag[2:]}"), has_value=not is_switch)
+    return words
 
 
 class JobRunner:

@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING
 from lippmann.display import Display, list_displays
 from lippmann.display.formats.inline_spec import is_short_form
 from lippmann.errors import LippmannError, UsageError
+from lippmann.options.scene import SceneOptions
 from lippmann.scene import bundled
+from lippmann.scene.volumes.presets import PRESETS
 from lippmann.studio_app.command_line import render_command
 from lippmann.studio_app.dropped_scene import ENVIRONMENTS
 from lippmann.studio_app.page_values import title_of
 from lippmann.studio_app.render_jobs import Job, JobRunner, Kind
 from lippmann.studio_app.render_thread import Renderer, RenderThread, Wanted, Watcher
-from lippmann.studio_app.state import PLACED_BY, StudioState
+from lippmann.studio_app.state import FILES, PLACED_BY, StudioState
 from lippmann.studio_app.state_toml import state_of_text
 from lippmann.studio_app.uploads import Dropped, Uploads
 from lippmann.viewing.replay import default_eye
@@ -69,7 +71,7 @@ class StudioSession:
         self._held, self._held_name = held, state.scene
         self._displays: dict[str, Display] = {}
         self._presets = {display.name: display for display in list_displays()}
-        self._files = {name for name in (state.scene, state.environment, state.display) if name is not None}
+        self._files = {name for name in (getattr(state, each) for each in FILES) if name is not None}
         self._titles: dict[str, str] = {}
         self.uploads = uploads
         self.job_listeners: list[Callable[[Job], None]] = []
@@ -104,7 +106,11 @@ class StudioSession:
         """Raise :class:`UsageError` if a state names a file that was not opened."""
         with self._lock:
             scenes = {*self._files, *bundled.names()}
-            opened = {"scene": scenes, "environment": self._files, "display": {*self._files, *self._presets}}
+            opened = dict.fromkeys(FILES, self._files) | {
+                "scene": scenes,
+                "display": {*self._files, *self._presets},
+                "transfer_function": {*self._files, *PRESETS},
+            }
         for name, known in opened.items():
             value = getattr(state, name)
             if value is None or value in known or (name == "display" and is_short_form(value)):
@@ -164,7 +170,7 @@ class StudioSession:
 
     def wanted(self, number: int, state: StudioState, view: LiveView) -> Wanted:
         """What to render for a view of a state."""
-        key = (state.scene, state.environment, state.background, state.up)
+        key = (state.scene, SceneOptions.part_of(state))
 
         def load() -> Scene:
             return state.load_scene(allow_outside=self._allow_outside, source=self._held_scene(state))

@@ -13,18 +13,18 @@ What a file does not say is as in a new studio. Files that a state names are fou
 
 from __future__ import annotations
 
-import json
 import re
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from lippmann.errors import UsageError
+from lippmann.options.option import default_of, options_of
+from lippmann.options.plain import from_plain, toml_of
 from lippmann.runtime.atomic_write import replacing
 from lippmann.runtime.regular_file import check_kind
-from lippmann.studio_app.state import StudioState
+from lippmann.studio_app.state import FILES, StudioState
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -34,8 +34,8 @@ else:
 _MOST_BYTES = 1_000_000  # a picture given by mistake is not read to its end
 _KIND = "a state is a TOML file that the studio wrote"
 
-#: Settings that name files, beside their other meanings.
-_FILES = ("scene", "display", "environment")
+#: Settings that every file says, before the others.
+_FIRST = ("scene", "display")
 
 
 def read_state(path: Path) -> StudioState:
@@ -85,21 +85,21 @@ def state_of_text(text: str, *, where: str = "state", folder: Path | None = None
         values = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also numbers of absurd length, lists in lists in lists
         raise _syntax_error(str(error), where) from None
-    known = [each.name for each in fields(StudioState)]
+    kinds = {each.name: each.type for each, _ in options_of(StudioState)}
     settings: dict[str, Any] = {}
     for name, value in values.items():
         place = f"{where}:{_line_of(text, name)}"
-        if name not in known:
+        if name not in kinds:
             rule = "settings are the options of lippmann render with _ for -"
-            raise UsageError.unknown("setting", name, known, where=place, rule=rule, fix="leave it out")
+            raise UsageError.unknown("setting", name, kinds, where=place, rule=rule, fix="leave it out")
         try:
-            settings[name] = _RULES[name](value)
+            settings[name] = from_plain(kinds[name], value)
             # Alone, so that the line of what is wrong is known; what goes together is checked below.
             StudioState(**{name: settings[name]}) if name != "pop_out" else None
         except UsageError as error:
             what = error.what if error.what else repr(value)
             raise UsageError(what, where=place, parameter=name, rule=error.rule, fix=error.fix) from None
-        if folder is not None and name in _FILES:
+        if folder is not None and name in FILES:
             settings[name] = _found(settings[name], folder)
     try:
         return StudioState(**settings)
@@ -114,21 +114,20 @@ def text_of_state(state: StudioState, folder: Path | None = None) -> str:
 
     ``folder`` is where the file will lie: names of files in it or below it are told from there.
     """
-    plain = StudioState()
     lines = []
-    for each in fields(StudioState):
+    for each, _ in sorted(options_of(StudioState), key=lambda found: found[0].name not in _FIRST):
         value = getattr(state, each.name)
-        if value is None or (value == getattr(plain, each.name) and each.name not in ("scene", "display")):
+        if value is None or (value == default_of(each) and each.name not in _FIRST):
             continue
-        if folder is not None and each.name in _FILES:
+        if folder is not None and each.name in FILES:
             value = _told_from(value, folder)
-        lines.append(f"{each.name} = {_toml(value)}")
+        lines.append(f"{each.name} = {toml_of(value)}")
     return "\n".join(lines) + "\n"
 
 
 def with_whole_paths(state: StudioState) -> StudioState:
     """The state with the whole paths of its files, for one that will lie in a folder that is not known."""
-    names = {name: getattr(state, name) for name in _FILES}
+    names = {name: getattr(state, name) for name in FILES}
     whole: dict[str, Any] = {name: str(Path(value).resolve()) for name, value in names.items() if _is_file(value)}
     return replace(state, **whole)
 
@@ -136,17 +135,6 @@ def with_whole_paths(state: StudioState) -> StudioState:
 def _is_file(name: str | None) -> bool:
     """Whether a setting names a file: bundled scenes and presets, whose names are plain words, come before such."""
     return name is not None and Path(name).exists() and (Path(name).name != name or "." in name)
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        # JSON's strings are TOML's, but for this one control character.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
-    if isinstance(value, tuple):
-        return f"[{', '.join(_toml(float(part)) for part in value)}]"
-    return repr(value)
 
 
 def _found(name: str, folder: Path) -> str:
@@ -175,61 +163,3 @@ def _line_of(text: str, name: str) -> int:
         if re.match(rf"\s*[\[\"']*{re.escape(name)}[\]\"']*\s*([=.]|$)", line):
             return number
     return 1
-
-
-def _word(value: object) -> str:
-    if not isinstance(value, str):
-        raise UsageError(_shown(value), rule="a text in quotation marks")
-    return value
-
-
-def _number(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise UsageError(_shown(value), rule="a number")
-    try:
-        return float(value)
-    except OverflowError:  # a whole number of hundreds of digits
-        raise UsageError(_shown(value), rule="a number below 1.8e308") from None
-
-
-def _whole(value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise UsageError(_shown(value), rule="a whole number")
-    return value
-
-
-def _switch(value: object) -> bool:
-    if not isinstance(value, bool):
-        raise UsageError(_shown(value), rule="true or false")
-    return value
-
-
-def _exposure(value: object) -> float | str:
-    return value if value == "auto" and isinstance(value, str) else _number(value)
-
-
-def _numbers(count: int) -> Callable[[object], tuple[float, ...]]:
-    def read(value: object) -> tuple[float, ...]:
-        if not isinstance(value, list) or len(value) != count:
-            raise UsageError(_shown(value), rule=f"a list of {count} numbers")
-        return tuple(_number(part) for part in value)
-
-    return read
-
-
-def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-_RULES: Mapping[str, Callable[[object], object]] = {
-    **dict.fromkeys(("scene", "display", "up", "environment", "camera", "place"), _word),
-    **dict.fromkeys(("tone_map", "integrator", "method", "effort", "pixel_filter", "denoise", "caustics"), _word),
-    **dict.fromkeys(("background", "turn", "shift", "eye"), _numbers(3)),
-    "light_turn": _numbers(2),
-    **dict.fromkeys(("scale", "depth_scale", "pop_out", "light_strength", "environment_strength"), _number),
-    **dict.fromkeys(("quality", "max_time", "clamp_indirect"), _number),
-    **dict.fromkeys(("depth", "spp", "seed"), _whole),
-    "subpixels": _switch,
-    "exposure": cast("Callable[[object], object]", _exposure),
-}

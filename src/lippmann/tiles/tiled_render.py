@@ -26,13 +26,13 @@ from lippmann.image.stored_values import FloatArray, Layer, Values
 from lippmann.image.write import can_be_banded, check_output, format_for, replacing_output, write_rows
 from lippmann.journal.tile_file import DamagedTile, TileResult
 from lippmann.journal.tile_journal import TileStore, read_job, sweep_beside
+from lippmann.options.choices import tone_map_of
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise import oidn
 from lippmann.rendering.estimate.denoised_psnr import estimate_denoised
 from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, ErrorSums
 from lippmann.rendering.estimate.psnr import Estimate, estimate_of_sums
 from lippmann.rendering.film import memory_model
-from lippmann.rendering.request.choices import tone_map_of
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import memory_limit
 from lippmann.runtime import engine as engines

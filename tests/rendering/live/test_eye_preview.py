@@ -8,10 +8,10 @@ from PIL import Image as Pillow
 
 import lippmann
 from lippmann.display import Display, LensArray, Panel
+from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.live.eye_preview import render_eye_preview
 from lippmann.rendering.live.seen_pixels import EyeMap
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.scene.placement import PlacementOptions
 
 pytestmark = pytest.mark.usefixtures("engine")
 

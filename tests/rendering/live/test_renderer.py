@@ -14,13 +14,13 @@ from lippmann.color.transfer import quantize
 from lippmann.display import Display, LensArray, Panel
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import SceneError, UsageError
+from lippmann.options.light import LightOptions
+from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.live import renderer as live_renderer
 from lippmann.rendering.live import scene_kernels
 from lippmann.rendering.live.live_view import LiveView
 from lippmann.rendering.live.renderer import LiveRenderer
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.scene.light_options import LightOptions
-from lippmann.scene.placement import PlacementOptions
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import Splats
@@ -35,7 +35,7 @@ DISPLAYS = {
 }
 EYES = [(0.0, 0.0, 300.0), (25.0, -10.0, 220.0)]
 SIZE = 60, 40
-PLACED = PlacementOptions(mode="fit", turn=(20.0, 10.0, 0.0), shift=(1.0, 0.0, -2.0))
+PLACED = PlacementOptions(place="fit", turn=(20.0, 10.0, 0.0), shift=(1.0, 0.0, -2.0))
 
 
 @pytest.fixture(scope="module")

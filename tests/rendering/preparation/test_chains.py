@@ -36,10 +36,10 @@ def balls(engine):
 def rendered(scene, **options):
     import lippmann
     from lippmann.display import Display, LensArray, Panel
-    from lippmann.scene.placement import PlacementOptions
+    from lippmann.options.placement import PlacementOptions
 
     display = Display("test", Panel(96, 64, 1.0), LensArray("square", 8.0), 30.0, "", 500.0, 80.0)
-    chosen = {"integrator": "path", "spp": 16, "placement": PlacementOptions(mode="display"), "exposure": 0}
+    chosen = {"integrator": "path", "spp": 16, "placement": PlacementOptions(place="display"), "exposure": 0}
     return lippmann.render(scene, display, tone_map="none", **(chosen | options))
 
 

@@ -11,12 +11,12 @@ from lippmann import api
 from lippmann.display import load_display
 from lippmann.errors import UsageError
 from lippmann.image import read_picture
+from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.live.live_view import LiveView
 from lippmann.rendering.live.renderer import LiveRenderer
 from lippmann.rendering.picture import choose_exposure
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.matrices import translation
-from lippmann.scene.placement import PlacementOptions
 from lippmann.scene.values.description import Camera, Instance, Light, Material, Mesh, SceneDescription
 
 pytestmark = pytest.mark.usefixtures("engine")

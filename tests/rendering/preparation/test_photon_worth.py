@@ -37,7 +37,7 @@ def caustics_of(walls, ball, light, **options):
     """How the caustics come of a glass ball at a depth, between walls at others, under a light; and the picture."""
     import lippmann
     from lippmann.display import Display, LensArray, Panel
-    from lippmann.scene.placement import PlacementOptions
+    from lippmann.options.placement import PlacementOptions
     from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 
     trimesh = pytest.importorskip("trimesh")
@@ -50,7 +50,7 @@ def caustics_of(walls, ball, light, **options):
     instances = [Instance(0, at(0, 0, depth)) for depth in walls] + [Instance(1, at(0, 0, ball))]
     scene = lippmann.load_scene(SceneDescription("ball", meshes, materials, instances, lights=[light]))
     display = Display("test", Panel(96, 64, 1.0), LensArray("square", 8.0), 30.0, "", 500.0, 80.0)
-    placed = PlacementOptions(mode="display")
+    placed = PlacementOptions(place="display")
     picture = lippmann.render(scene, display, placement=placed, method="full", spp=4, integrator="path", **options)
     return picture.provenance.options.get("caustics"), picture
 

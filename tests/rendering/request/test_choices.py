@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lippmann.rendering.request.choices import tone_map_of
+from lippmann.options.choices import tone_map_of
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lippmann.display import load_display
+from lippmann.options.choices import ASKED
 from lippmann.rendering.denoise.cost_model import HIGH_FROM, denoising_cost, effort_of, traced_work
-from lippmann.rendering.request.choices import ASKED
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_plan import Choice
 from lippmann.rendering.request.render_request import RenderRequest

@@ -11,9 +11,10 @@ import trimesh
 
 import lippmann
 from lippmann.display import Display, LensArray, Panel
+from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.request import region_of_interest
 from lippmann.rendering.request.region_of_interest import panel_window, scene_corners, view_window
-from lippmann.scene.placement import PlacementOptions, place
+from lippmann.scene.placement import place
 from lippmann.scene.studio_light import BACKDROP
 
 pytestmark = pytest.mark.usefixtures("engine")
@@ -136,7 +137,7 @@ def test_before_a_sky_that_is_seen_denoised_frames_are_traced_whole():
     image = lippmann.render(
         scene,
         display,
-        placement=PlacementOptions(mode="display", scale=9),
+        placement=PlacementOptions(place="display", scale=9),
         integrator="direct",
         spp=2,
         denoise="oidn-fast",

@@ -56,7 +56,7 @@ def test_values_are_checked_one_by_one(options, parameter):
 
 def test_keyword_arguments_are_those_of_a_request():
     assert RenderRequest.of({"spp": 3, "denoise": "none"}) == RenderRequest(spp=3, denoise="none")
-    with pytest.raises(UsageError, match=r"unknown option of a render 'samples'.*; known are method, "):
+    with pytest.raises(UsageError, match=r"unknown option of a render 'samples'.*; known are integrator, "):
         RenderRequest.of({"samples": 3})
     with pytest.raises(UsageError, match="unknown option of a render 'denoiser', did you mean 'denoise'"):
         RenderRequest.of({"denoiser": "none"})

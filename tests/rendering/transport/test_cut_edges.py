@@ -8,9 +8,9 @@ import pytest
 
 import lippmann
 from lippmann.display import load_display
+from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session
-from lippmann.scene.placement import PlacementOptions
 from lippmann.scene.values.description import Camera, Instance, Material, Mesh, SceneDescription
 
 pytestmark = pytest.mark.usefixtures("engine")
@@ -92,17 +92,17 @@ def test_a_camera_has_another_way_out():
         "eye", np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 300.0], [0, 0, 0, 1]]), fov_y=0.2, focus_distance=300.0
     )
     quads = card(HALF, 0.0, FRONT), card(0.0, 0.0, -30.0, half=200.0)
-    (line,) = warnings(*quads, cameras=[eye], mode="camera", camera="eye")
+    (line,) = warnings(*quads, cameras=[eye], place="camera", camera="eye")
     assert "pop_out=0 or shift=0,0,-20 sets it behind" in line
-    assert not warnings(*quads, cameras=[eye], mode="camera", camera="eye", pop_out=0.0)
+    assert not warnings(*quads, cameras=[eye], place="camera", camera="eye", pop_out=0.0)
 
 
 def test_a_fitted_scene_is_cut_only_where_it_is_enlarged_or_moved():
-    assert not warnings(card(0.0, 0.0, 9.0), card(0.0, 0.0, -9.0), mode="fit")
-    assert warnings(card(0.0, 0.0, 9.0), card(0.0, 0.0, -9.0), mode="fit", scale=1.5)
+    assert not warnings(card(0.0, 0.0, 9.0), card(0.0, 0.0, -9.0), place="fit")
+    assert warnings(card(0.0, 0.0, 9.0), card(0.0, 0.0, -9.0), place="fit", scale=1.5)
 
 
 def test_pictures_say_it():
-    options = PlacementOptions(mode="display")
+    options = PlacementOptions(place="display")
     image = lippmann.render(scene(card(HALF, 0.0, FRONT)), DISPLAY, placement=options, spp=1, integrator="normal")
     assert any("the panel's edge cuts" in note for note in image.provenance.notes)

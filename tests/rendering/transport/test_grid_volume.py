@@ -5,13 +5,13 @@ import pytest
 
 import lippmann
 from lippmann.display import Display, LensArray, Panel
+from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.transport.grid_volume import toward_light
-from lippmann.scene.placement import PlacementOptions
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 from lippmann.scene.values.volume import TransferFunction, Volume
 
 SHEET = Display("sheet", Panel(48, 36, 0.25), LensArray("lenticular", 2.0), gap=6.0)
-IN_PLACE = PlacementOptions(mode="display")
+IN_PLACE = PlacementOptions(place="display")
 #: A slab 4 mm thick from z = -8 to -4, which lets 0.8 of the light through each millimetre.
 SLAB = Volume(
     np.zeros((4, 2, 2), np.int16),

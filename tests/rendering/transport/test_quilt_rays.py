@@ -12,9 +12,9 @@ import lippmann
 from lippmann.display import NUMPY, Display, LensArray, Panel, load_display
 from lippmann.display.view_cone import cone_tangent
 from lippmann.errors import PictureError, UsageError
+from lippmann.options.placement import PlacementOptions
 from lippmann.quilts.quilt import quilt_of_display
 from lippmann.quilts.weave import view_fraction, weave
-from lippmann.scene.placement import PlacementOptions
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -214,9 +214,9 @@ def test_noise_is_taken_out_view_by_view():
 @pytest.mark.long
 def test_a_woven_quilt_is_near_the_direct_picture():
     """Many views of a flat scene in and near the lens plane, woven: what the display's own rays see."""
-    place = PlacementOptions(mode="fit")
+    place = PlacementOptions(place="fit")
     options = {"integrator": "albedo", "spp": 16, "seed": 3}
-    direct = lippmann.render("teapot", SHEET, subpixels=True, placement=PlacementOptions(mode="fit"), **options)
+    direct = lippmann.render("teapot", SHEET, subpixels=True, placement=PlacementOptions(place="fit"), **options)
     # A view as fine as the panel, 60 of them.
     quilt = lippmann.render_quilt("teapot", SHEET, views=(10, 6), size=(1500, 1200), placement=place, **options)
     woven = weave(quilt, SHEET)

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 import lippmann
 from lippmann.color.transfer import decode_srgb, encode_srgb
 from lippmann.display import Display, LensArray, Panel
-from lippmann.scene.placement import PlacementOptions
+from lippmann.options.placement import PlacementOptions
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 from lippmann.scene.values.splats import Splats, real_harmonics
 
@@ -16,7 +16,7 @@ SLANTED = Display("slanted", Panel(48, 36, 0.25), LensArray("lenticular", 1.9, s
 HEXAGONS = Display("hexagons", Panel(48, 36, 0.25), LensArray("hexagonal", 2.0), gap=6.0)
 CASES = [(SHEET, 0), (SHEET, 1), (SLANTED, 2), (SLANTED, 3), (HEXAGONS, 3)]
 #: The display's millimetres are the scene's.
-IN_PLACE = PlacementOptions(mode="display")
+IN_PLACE = PlacementOptions(place="display")
 
 
 def random_splats(count, degree, seed=0):

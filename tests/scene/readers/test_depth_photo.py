@@ -14,8 +14,9 @@ from lippmann.codecs.pfm import write_pfm
 from lippmann.color.primaries import REC709
 from lippmann.display import load_display
 from lippmann.errors import SceneError, UsageError
+from lippmann.options.placement import PlacementOptions
 from lippmann.scene.matrices import transform_points
-from lippmann.scene.placement import PlacementOptions, place
+from lippmann.scene.placement import place
 from lippmann.scene.readers.depth_layers import split_layers
 from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map
 from lippmann.scene.readers.load import load_scene

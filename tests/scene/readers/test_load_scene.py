@@ -203,13 +203,13 @@ def test_light_and_background():
 
 def test_single_scattering_is_noted(save):
     assert load_scene(triangle()).physical.multiple_scattering
-    scene = load_scene(triangle(), multiple_scattering=False)
+    scene = load_scene(triangle(), single_scattering=True)
     assert not scene.physical.multiple_scattering
     assert any("single scattering" in note for note in scene.notes)
-    classic = load_scene("teapot", multiple_scattering=False)
+    classic = load_scene("teapot", single_scattering=True)
     assert not classic.is_classic
-    with pytest.raises(UsageError, match=r"multiple_scattering: .*leave it out"):
-        load_scene(save("a.xml", XML.encode()), multiple_scattering=False)
+    with pytest.raises(UsageError, match=r"single_scattering: .*leave it out"):
+        load_scene(save("a.xml", XML.encode()), single_scattering=True)
 
 
 @pytest.mark.parametrize("background", [(1, 2), (0, 0, -1), (0, 0, np.nan), (1e300, 0, 0), (1, 1, 1, 1)])

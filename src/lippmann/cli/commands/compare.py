@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lippmann.cli.shared import options, parse
+from lippmann.cli.shared.command_options import only, with_options
 from lippmann.cli.shared.console import Console
 from lippmann.errors import UsageError
+from lippmann.options.quality import MachineOptions
 
 if TYPE_CHECKING:
     from lippmann.metrics import Comparison, MicroImage
@@ -60,15 +62,16 @@ def compare(
     console.result(values, "\n".join(_lines(comparison)))
 
 
+@with_options
 def reproduce(
     output: options.Folder,
     quick: Annotated[
         bool, typer.Option("--quick", help="Take about a minute: two scenes, fewer pixels, one run.")
     ] = False,
-    device: options.Device = "auto",
-    threads: options.Threads = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
+    *,
+    machine: Annotated[MachineOptions, only("device", "threads")],
 ) -> None:
     """Reproduce the paper's tables and figures and write a report."""
     from lippmann.reproduce.experiment import Manner, Variant
@@ -79,7 +82,9 @@ def reproduce(
 
     console = Console(quiet, as_json)
     with console.progress() as progress:
-        results = reproduce_paper(output, quick=quick, device=device, threads=threads, progress=progress)
+        results = reproduce_paper(
+            output, quick=quick, device=machine.device, threads=machine.threads, progress=progress
+        )
     page = output / PAGE
     lines = [f"{page}: {', '.join(results.runs)}"]
     for scene in results.runs:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -10,8 +11,10 @@ import typer
 
 from lippmann.cli.commands import print as printing
 from lippmann.cli.shared import options
+from lippmann.cli.shared.command_options import with_options, without
 from lippmann.cli.shared.console import Console
 from lippmann.errors import UsageError
+from lippmann.options.prints import FinishOptions, PrintOptions
 
 if TYPE_CHECKING:
     from lippmann.display import Display
@@ -27,24 +30,14 @@ FitOption = Annotated[
 ]
 
 
+@with_options
 def interlace(
     photos: Annotated[list[Path], typer.Argument(help="Photographs or frames, in natural order; or their folder.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The .tif or .png file to write.")],
-    lpi: printing.Lpi = None,
-    print_lpi: printing.PrintLpi = None,
-    ppi: printing.Ppi = None,
-    size: printing.Size = None,
-    viewing_distance: printing.Distance = None,
-    thickness: printing.Thickness = None,
-    index: printing.Index = None,
-    field: printing.Field = None,
     display: Annotated[
         str | None,
         typer.Option("--display", "-d", help="A lenticular display in place of a print, such as lkg-portrait."),
     ] = None,
-    bleed: printing.Bleed = None,
-    marks: printing.MarksMargin = None,
-    mirror: printing.Mirror = False,
     lenses: Annotated[
         Literal["along", "across"],
         typer.Option("--lenses", help="along: upright lenses; across: lying lenses, for flips."),
@@ -78,6 +71,9 @@ def interlace(
     ] = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
+    *,
+    printed: PrintOptions,
+    finishing: Annotated[FinishOptions, without("icc")],
 ) -> None:
     """Interlace photographs or frames for a lenticular print or display."""
     from lippmann.quilts.interlace import check_interlaced_path, view_size, write_interlaced
@@ -85,12 +81,8 @@ def interlace(
 
     console = Console(quiet, as_json)
     check_interlaced_path(output)
-    texts = {"lpi": lpi, "print_lpi": print_lpi, "ppi": ppi, "size": size, "viewing_distance": viewing_distance}
-    texts |= {"thickness": thickness, "index": index, "field": field}
     across = lenses == "across"
-    target, finish = printing.sheet_of(
-        _display(display, texts, turned=across), bleed=bleed, marks=marks, icc=icc, mirror=mirror
-    )
+    target, finish = printing.sheet_of(_display(display, printed, turned=across), replace(finishing, icc=icc))
     paths = natural_order(_pictures(photos))
     if reverse:
         paths.reverse()
@@ -133,14 +125,12 @@ def interlace(
     console.result(result, f"{line}, {target.pixels_per_lens[0]:.4g} a lens")
 
 
-def _display(name: str | None, texts: dict[str, str | None], *, turned: bool) -> Display:
+def _display(name: str | None, printed: PrintOptions, *, turned: bool) -> Display:
     """The display, or the print; lying on its side if ``turned``."""
-    from dataclasses import replace
-
     if name is None:
-        sheet = printing.print_of(**texts)
+        sheet = printing.print_of(printed)
         return (replace(sheet, size=sheet.size[::-1]) if turned else sheet).display()
-    for option, value in {**texts, "lenses": "across" if turned else None}.items():
+    for option, value in {**vars(printed), "lenses": "across" if turned else None}.items():
         if value is not None:
             rule = f"it applies to prints, and --display {name} is given"
             raise UsageError("does not apply", where=f"--{option.replace('_', '-')}", rule=rule)

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from lippmann.cli.commands.quilt import Aspect, Layout, layout_of
-from lippmann.cli.commands.sequence import Codec
 from lippmann.cli.shared import options, parse
+from lippmann.cli.shared.command_options import only, with_options
 from lippmann.cli.shared.console import Console, estimate_in_words
 from lippmann.cli.shared.default_output import output_of
 from lippmann.errors import UsageError
+from lippmann.options.outputs import SequenceOptions
+from lippmann.options.texts import triple
 from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
@@ -121,6 +123,7 @@ def compose(
     console.result(result, f"{output}: {width}x{height} pixels for {image.display.name}")
 
 
+@with_options
 def replay(
     picture: options.Picture,
     output: options.OptionalOutput = None,
@@ -150,7 +153,6 @@ def replay(
     ] = None,
     anaglyph: Annotated[bool, typer.Option("--anaglyph", help="Two eyes in one picture for red-cyan glasses.")] = False,
     eyes: Annotated[float | None, typer.Option("--eyes", help="Distance between the two eyes in mm; 63.")] = None,
-    codec: Codec = None,
     size: Size = None,
     filter: Filter = "nearest",
     layout: Layout = None,
@@ -159,6 +161,8 @@ def replay(
     display: options.PictureDisplay = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
+    *,
+    film: Annotated[SequenceOptions, only("codec")],
 ) -> None:
     """Simulate what an eye in front of the display sees."""
     from lippmann.image.streamed import open_picture
@@ -177,10 +181,10 @@ def replay(
     moves = sweep or path is not None
     output = output_of(output, picture, "-sweep.mp4" if moves else "-seen.png")
     if moves:
-        check_animation_path(output, codec)
+        check_animation_path(output, film.codec)
         check_writable(output)
     else:
-        if codec is not None:
+        if film.codec is not None:
             raise UsageError("applies to an animation only", where="--codec", fix="add --sweep, or leave it out")
         check_output(output, format_for(output, bits)[0])
     if width is not None and not sweep:
@@ -192,7 +196,7 @@ def replay(
         target, transfer = image.display, image.provenance.transfer
     else:
         target, transfer = quilt_display(quilt, parse.display(display), str(picture)), quilt.provenance.transfer
-    position = default_eye(target) if eye is None else parse.triple(eye, "--eye")
+    position = default_eye(target) if eye is None else triple(eye, "--eye")
     pixels, framed = _size_of(size, target, console)
 
     def seen_by(place: tuple[float, float, float]) -> FloatArray:
@@ -215,7 +219,7 @@ def replay(
         reach = _field_width(target, position[2]) if width is None else width
         start, stop = ((position[0] + side * reach / 2, *position[1:]) for side in (-1, 1))
         places = path_of_eye(start, stop, frames)
-    write_animation((seen_from(place) for place in places), output, transfer=transfer, codec=codec)
+    write_animation((seen_from(place) for place in places), output, transfer=transfer, codec=film.codec)
     start, stop = places[0], places[-1]
     result |= {"frames": len(places), "start": list(start), "stop": list(stop)}
     console.result(result, f"{output}: {len(places)} frames, seen{by} from {_position(start)} to {_position(stop)}")

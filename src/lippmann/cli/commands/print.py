@@ -1,4 +1,4 @@
-"""``lippmann pitch-test`` and ``lippmann marks``, and the options that describe a print."""
+"""``lippmann pitch-test`` and ``lippmann marks``, and the print that options describe."""
 
 from __future__ import annotations
 
@@ -8,55 +8,21 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lippmann.cli.shared import options, parse
+from lippmann.cli.shared.command_options import only, with_options
 from lippmann.cli.shared.console import Console
 from lippmann.errors import DisplayError, OutputError, UsageError
+from lippmann.options.prints import FinishOptions, PrintOptions
 
 if TYPE_CHECKING:
     from lippmann.calibration.finish import Finish
     from lippmann.display import Display
     from lippmann.display.formats.print_sheet import Print
 
-Lpi = Annotated[str | None, typer.Option("--lpi", help="Pitch of the lens sheet in lenses per inch.")]
-PrintLpi = Annotated[
-    str | None,
-    typer.Option("--print-lpi", help="Print pitch in lenses per inch from a pitch test, in place of --lpi."),
-]
-Ppi = Annotated[str | None, typer.Option("--ppi", help="Resolution in pixels per inch.")]
-Size = Annotated[
-    str | None, typer.Option("--size", help="Of a print: WIDTHxHEIGHT with a unit, such as 200x300mm or 8x10in.")
-]
-Distance = Annotated[
-    str | None,
-    typer.Option("--viewing-distance", help="Viewing distance, such as 600mm, or infinite. Default: 500mm."),
-]
-Thickness = Annotated[str | None, typer.Option("--thickness", help="Thickness of the sheet, such as 0.66mm or 26mil.")]
-Index = Annotated[str | None, typer.Option("--index", help="Refractive index of the sheet. Default: 1.57.")]
-Field = Annotated[
-    str | None,
-    typer.Option("--field", help="Field of view in degrees, instead of --thickness. Default: 54."),
-]
-Bleed = Annotated[
-    str | None,
-    typer.Option("--bleed", help="Of a print: go on by this width beyond every edge, such as 3mm; it is cut off."),
-]
-MarksMargin = Annotated[
-    str | None,
-    typer.Option("--marks", help="Of a print: add a margin of this width, such as 10mm, with alignment marks."),
-]
-Icc = Annotated[
-    Path | None,
-    typer.Option("--icc", help="Of a print: convert to this ICC profile (RGB). Default: sRGB.", show_default=False),
-]
-Mirror = Annotated[
-    bool,
-    typer.Option("--mirror", help="Of a print: write it mirrored, for ink on the back of the lenses."),
-]
-
 _PRINT = "print"
 
 
-def print_of(**texts: str | None) -> Print:
-    """The print that the options describe; ``texts`` are their values by parameter name.
+def print_of(printed: PrintOptions) -> Print:
+    """The print that the options describe.
 
     Raises
     ------
@@ -66,13 +32,13 @@ def print_of(**texts: str | None) -> Print:
     from lippmann.display.formats.print_sheet import print_of_texts
 
     try:
-        return print_of_texts({_option(key): text for key, text in texts.items() if text is not None})
+        return print_of_texts({_option(key): text for key, text in _given(printed).items()})
     except DisplayError as error:
         raise DisplayError(error.what, where=f"--{error.where}", rule=error.rule, fix=error.fix) from None
 
 
-def display_of(name: str, **texts: str | None) -> Display:
-    """The display ``name``; ``print`` is described by ``texts``, the values of the print options by parameter name.
+def display_of(name: str, printed: PrintOptions) -> Display:
+    """The display ``name``; ``print`` is described by its options.
 
     Raises
     ------
@@ -84,23 +50,18 @@ def display_of(name: str, **texts: str | None) -> Display:
     from lippmann.display import load_display
 
     if name == _PRINT:
-        return print_of(**texts).display()
-    for key, text in texts.items():
-        if text is not None:
-            rule = f"it applies to --display {_PRINT} only"
-            raise UsageError(f"does not apply to the display {name}", where=f"--{_option(key)}", rule=rule)
+        return print_of(printed).display()
+    for key in _given(printed):
+        rule = f"it applies to --display {_PRINT} only"
+        raise UsageError(f"does not apply to the display {name}", where=f"--{_option(key)}", rule=rule)
     return load_display(name)
 
 
-def sheet_of(
-    display: Display,
-    *,
-    bleed: str | None,
-    marks: str | None,
-    icc: Path | None,
-    mirror: bool,
-    in_frames: bool = False,
-) -> tuple[Display, Finish]:
+def _given(printed: PrintOptions) -> dict[str, str]:
+    return {key: text for key, text in vars(printed).items() if text is not None}
+
+
+def sheet_of(display: Display, finishing: FinishOptions, *, in_frames: bool = False) -> tuple[Display, Finish]:
     """The display with its bleed, and what is done to its picture afterwards.
 
     Raises
@@ -116,8 +77,8 @@ def sheet_of(
     from lippmann.display.sheet_layout import with_bleed
     from lippmann.display.units import length
 
-    given = {"--bleed": bleed, "--marks": marks, "--icc": icc, "--mirror": mirror or None}
-    asked = [option for option, value in given.items() if value is not None]
+    bleed, marks, icc = finishing.bleed, finishing.marks, finishing.icc
+    asked = [f"--{name}" for name, value in vars(finishing).items() if value not in (None, False)]
     if not asked:
         return display, NO_FINISH
     if display.sheet is None:
@@ -126,13 +87,13 @@ def sheet_of(
     if in_frames:
         raise UsageError("does not apply to frames of a moving scene", where=asked[0], fix="leave it out")
     display = with_bleed(display, 0.0 if bleed is None else length(bleed, "--bleed"))
-    finish = Finish(
-        None if marks is None else length(marks, "--marks"), mirror, None if icc is None else read_profile(icc)
-    )
+    margin = None if marks is None else length(marks, "--marks")
+    finish = Finish(margin, finishing.mirror, None if icc is None else read_profile(icc))
     finish.display(display)  # which checks the margin
     return display, finish
 
 
+@with_options
 def marks(
     picture: options.Picture,
     output: Annotated[
@@ -146,14 +107,14 @@ def marks(
         str | None,
         typer.Option("--bleed", help="Bleed that a picture without its own record has on every side, such as 3mm."),
     ] = None,
-    icc: Icc = None,
-    mirror: Mirror = False,
     job_sheet: Annotated[
         Path | None, typer.Option("--job-sheet", help="Write a page for whoever prints and laminates: a .pdf file.")
     ] = None,
     bits: options.Bits = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
+    *,
+    finishing: Annotated[FinishOptions, only("icc", "mirror")],
 ) -> None:
     """Add a margin with alignment marks to a picture for print, and write its job sheet."""
     from lippmann.calibration.finish import Finish, write_finished
@@ -177,7 +138,8 @@ def marks(
     if output is None:
         printed = file.metadata_for(target).display
     else:
-        finish = Finish(length(margin, "--margin"), mirror, None if icc is None else read_profile(icc))
+        icc = finishing.icc
+        finish = Finish(length(margin, "--margin"), finishing.mirror, None if icc is None else read_profile(icc))
         image = picture_of_file(file, target)
         with console.progress() as progress:
             printed = write_finished(image, output, finish, icc=file.icc, bits=bits, progress=progress)
@@ -210,16 +172,9 @@ def _display_with_bleed(display: Display | None, bleed: str | None) -> Display |
     return with_bleed(display, width)
 
 
+@with_options
 def pitch_test(
     output: Annotated[Path, typer.Option("--output", "-o", help="TIFF file to write.")],
-    lpi: Lpi = None,
-    print_lpi: PrintLpi = None,
-    ppi: Ppi = None,
-    size: Size = None,
-    viewing_distance: Distance = None,
-    thickness: Thickness = None,
-    index: Index = None,
-    field: Field = None,
     strips: Annotated[int, typer.Option("--strips", help="Number of strips.")] = 21,
     step: Annotated[
         float | None,
@@ -227,6 +182,8 @@ def pitch_test(
     ] = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
+    *,
+    printed: PrintOptions,
 ) -> None:
     """Write a pitch test: strips at slightly different print pitches, to find the sheet's."""
     from lippmann.calibration.pitch_strips import PitchTest
@@ -238,16 +195,7 @@ def pitch_test(
     if output.suffix.lower() not in (".tif", ".tiff"):
         rule = "a pitch test is a TIFF file, which holds its resolution"
         raise OutputError(f"the ending is '{output.suffix}'", where=str(output), rule=rule)
-    sheet = print_of(
-        lpi=lpi,
-        print_lpi=print_lpi,
-        ppi=ppi,
-        size=size,
-        viewing_distance=viewing_distance,
-        thickness=thickness,
-        index=index,
-        field=field,
-    )
+    sheet = print_of(printed)
     test = PitchTest(sheet, strips, step)
     check_writable(output)
     width, height = sheet.pixels

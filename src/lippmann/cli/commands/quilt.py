@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,13 +13,21 @@ from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence
 from lippmann.cli.commands.interlace import FitOption, fit_note
 from lippmann.cli.shared import options, parse
+from lippmann.cli.shared.command_options import with_options, without
 from lippmann.cli.shared.console import Console, estimate_in_words
 from lippmann.cli.shared.grouped_help import HelpfulCommand
 from lippmann.cli.shared.picture_report import add_seconds, depth_line, report
 from lippmann.cli.shared.scene_source import SceneSource
 from lippmann.errors import UsageError
+from lippmann.options.choices import tone_map_of
+from lippmann.options.forms import LEFT_OUT
+from lippmann.options.light import LightOptions
+from lippmann.options.outputs import AccessOptions, SequenceOptions
+from lippmann.options.placement import PlacementOptions
+from lippmann.options.prints import FinishOptions
+from lippmann.options.quality import MachineOptions, QualityOptions
+from lippmann.options.scene import SceneOptions
 from lippmann.progress import Progress, ProgressCallback
-from lippmann.rendering.request.choices import tone_map_of
 from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
@@ -33,6 +41,7 @@ Device = Annotated[
         "--display",
         "-d",
         help="A device (see 'lippmann quilt sizes'; 'portrait' will do), its visual.json, or any lenticular display.",
+        rich_help_panel="Display",
     ),
 ]
 Output = Annotated[
@@ -43,21 +52,19 @@ Output = Annotated[
         help="The quilt to write: NAME.png, .exr or .tif; _qsCOLUMNSxROWSaASPECT is added. By default the scene's "
         "name, here. Of a sequence a film (.mp4), a folder, or a name with %04d.",
         show_default=False,
+        rich_help_panel="Output",
     ),
 ]
 Views = Annotated[
     str | None,
-    typer.Option("--views", help="Columns x rows of views; by default those that the device is given."),
+    typer.Option(
+        "--views", help="Columns x rows of views; by default those that the device is given.", rich_help_panel="Display"
+    ),
 ]
 Size = Annotated[
-    str | None, typer.Option("--size", help="Width x height of the quilt in pixels; by default the device's.")
-]
-Method = Annotated[
-    Literal["auto", "full", "pooled"],
+    str | None,
     typer.Option(
-        "--method",
-        help="auto: pooled where light has noise; full: every ray is traced; "
-        "pooled: neighbouring views share their light before it is denoised.",
+        "--size", help="Width x height of the quilt in pixels; by default the device's.", rich_help_panel="Display"
     ),
 ]
 Layout = Annotated[
@@ -71,70 +78,33 @@ Format = Annotated[str | None, typer.Option("--format", help="png, exr or tiff; 
 
 
 @quilt.command("render", cls=HelpfulCommand)
+@with_options
 def render(
     scene: options.Scene,
     output: Output = None,
     display: Device = "portrait",
     views: Views = None,
     size: Size = None,
-    method: Method = "auto",
-    up: options.Up = None,
-    crop: options.Crop = None,
-    unit_scale: options.UnitScale = None,
-    min_opacity: options.MinOpacity = None,
-    variants: options.Variants = None,
-    depth_map: options.DepthMap = None,
-    transfer_function: options.TransferFunction = None,
-    window: options.Window = None,
-    series: options.Series = None,
-    integrator: options.Integrator = "auto",
-    depth: options.Depth = None,
-    spp: options.Spp = None,
-    effort: options.Effort = "normal",
-    quality: options.Quality = None,
-    quality_worst: options.QualityWorst = None,
-    quality_mean: options.QualityMean = None,
-    max_time: options.MaxTime = None,
-    seed: options.Seed = 0,
-    exposure: options.Exposure = "auto",
-    tone_map: options.ToneMap = "auto",
-    pixel_filter: options.PixelFilter = "auto",
-    denoise: options.Denoise = "auto",
-    caustics: options.Caustics = "auto",
-    clamp_indirect: options.ClampIndirect = None,
-    camera: options.Camera = None,
-    place: options.Place = None,
-    turn: options.Turn = None,
-    shift: options.Shift = None,
-    scale: options.Scale = 1.0,
-    depth_scale: options.DepthScale = "auto",
-    pop_out: options.PopOut = None,
-    environment: options.Environment = None,
-    background: options.Background = None,
-    light_turn: options.LightTurn = None,
-    light_strength: options.LightStrength = 1.0,
-    environment_strength: options.EnvironmentStrength = 1.0,
-    allow_outside: options.AllowOutside = False,
-    single_scattering: options.SingleScattering = False,
+    state: options.State = None,
     bits: options.Bits = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Of a sequence: keep the frames that an interrupted run finished.")
+        bool,
+        typer.Option(
+            "--resume",
+            help="Of a sequence: keep the frames that an interrupted run finished.",
+            rich_help_panel="Output",
+        ),
     ] = False,
-    frames: sequence.Frames = None,
-    fps: sequence.Fps = None,
-    animation: sequence.Animation = None,
-    camera_path: sequence.CameraPath = None,
-    turntable: sequence.TurntableFrames = None,
-    swing: sequence.Swing = None,
-    video: sequence.Video = None,
-    eye: sequence.Eye = None,
-    codec: sequence.Codec = None,
-    state: options.State = None,
-    device: options.Device = "auto",
-    threads: options.Threads = None,
-    memory: options.Memory = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
+    *,
+    asked: SceneOptions,
+    access: AccessOptions,
+    placement: PlacementOptions,
+    light: LightOptions,
+    how: Annotated[QualityOptions, without(*LEFT_OUT["quilt"])],
+    in_frames: SequenceOptions,
+    machine: MachineOptions,
 ) -> None:
     """Render a scene as a quilt: the views of cameras side by side in front of the display."""
     from lippmann.display import load_display
@@ -148,48 +118,19 @@ def render(
     target = load_display(display)
     grid = None if views is None else parse.size(views, "--views", rule="columns x rows, such as 8x6")
     wanted = quilt_of_display(target, grid, None if size is None else parse.size(size, "--size"))
-    moving = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye, codec)
+    moving = sequence.Wanted.part_of(in_frames)
     path = output or Path(f"{Path(scene).stem}{'' if moving else '.png'}")
     moving, file = sequence.with_film(moving, path)
     if file != path:
-        moving = moving if eye is not None else replace(moving, video=_named(path, wanted.layout.ending))
+        moving = moving if moving.eye is not None else replace(moving, video=_named(path, wanted.layout.ending))
     elif not moving or (path.suffix and not path.is_dir()):
         file = _named(path, wanted.layout.ending)
     if not moving:
         if resume:
             raise UsageError("a quilt is rendered in one piece", where="--resume", fix="leave it out")
         check_output(file, format_for(file, bits)[0])
-    request = RenderRequest(
-        method=method,
-        integrator=integrator,
-        depth=depth,
-        spp=spp,
-        effort=effort,
-        quality=parse.quality(quality, quality_mean, console),
-        quality_worst=quality_worst,
-        max_time=max_time,
-        seed=seed,
-        exposure=parse.exposure(exposure),
-        tone_map=tone_map_of(tone_map, path),
-        pixel_filter=pixel_filter,
-        denoise=denoise,
-        caustics=caustics,
-        clamp_indirect=clamp_indirect,
-        placement=parse.placement(camera, place, turn, shift, scale, depth_scale, pop_out),
-        device=device,
-        threads=threads,
-        memory=parse.memory(memory),
-    )
-    source = SceneSource(
-        *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
-        *(parse.crop(crop), unit_scale, min_opacity),
-        light=parse.light(light_turn, light_strength, environment_strength),
-        variants=parse.variants(variants),
-        depth_map=depth_map,
-        transfer_function=transfer_function,
-        window=parse.window(window),
-        series=series,
-    )
+    request = RenderRequest.from_options(how, machine, placement=placement, tone_map=tone_map_of(how.tone_map, path))
+    source = SceneSource(scene, asked, light, access)
     if moving:
         from lippmann.sequences.forms import QuiltForm
 
@@ -297,6 +238,7 @@ def sizes(as_json: options.Json = False) -> None:
     Console(as_json=as_json).result({"quilts": rows}, "\n".join(lines))
 
 
+@with_options
 def weave(
     source: Annotated[Path, typer.Argument(help="A quilt, or a folder with one picture per view.")],
     output: options.Output,
@@ -307,13 +249,11 @@ def weave(
     fit: FitOption = None,
     layout: Layout = None,
     aspect: Aspect = None,
-    bleed: printing.Bleed = None,
-    marks: printing.MarksMargin = None,
-    icc: printing.Icc = None,
-    mirror: printing.Mirror = False,
     bits: options.Bits = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
+    *,
+    finishing: FinishOptions,
 ) -> None:
     """Make a display's native picture from a quilt or a folder of views."""
     from lippmann.calibration.finish import write_finished
@@ -328,7 +268,7 @@ def weave(
     console = Console(quiet, as_json)
     name, stored = format_for(output, bits)
     check_output(output, name)
-    target, finish = printing.sheet_of(load_display(display), bleed=bleed, marks=marks, icc=icc, mirror=mirror)
+    target, finish = printing.sheet_of(load_display(display), finishing)
     finish.check_stored(stored, output)
     panel, trim = finish.display(target).panel, trim_of(target)
     width, height = panel.width, panel.height

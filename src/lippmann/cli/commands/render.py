@@ -14,14 +14,21 @@ import typer
 from lippmann.cli.commands import cluster as clusters
 from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence, view
-from lippmann.cli.shared import command_clock, options, parse
+from lippmann.cli.shared import command_clock, options
+from lippmann.cli.shared.command_options import with_options
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.default_output import output_of
 from lippmann.cli.shared.picture_report import add_seconds, remarks, report
 from lippmann.cli.shared.scene_source import SceneSource
 from lippmann.errors import UsageError
+from lippmann.options.choices import tone_map_of
+from lippmann.options.light import LightOptions
+from lippmann.options.outputs import AccessOptions, ClusterOptions, SequenceOptions
+from lippmann.options.placement import PlacementOptions
+from lippmann.options.prints import FinishOptions, PrintOptions
+from lippmann.options.quality import MachineOptions, QualityOptions
+from lippmann.options.scene import SceneOptions
 from lippmann.progress import Progress, ProgressCallback
-from lippmann.rendering.request.choices import tone_map_of
 from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
@@ -35,8 +42,9 @@ Maps = Annotated[
     Path | None,
     typer.Option(
         "--maps",
-        help="Write pictures of where pixels came from and of their estimated error into this folder.",
+        help="Write diagnostic maps (estimated error, samples per pixel, reused pixels) into this folder.",
         show_default=False,
+        rich_help_panel="Output",
     ),
 ]
 Resume = Annotated[
@@ -45,92 +53,34 @@ Resume = Annotated[
         "--resume",
         help="Keep finished tiles beside the output, and go on with those (of a sequence: with the frames) that an "
         "interrupted run left. See docs/how-to/large-pictures.md.",
+        rich_help_panel="Output",
     ),
 ]
 
 
+@with_options
 def render(
     scene: options.Scene,
     output: options.OptionalOutput = None,
     display: options.DisplayName = "seed-lenticular",
-    method: options.Method = "auto",
-    order: options.Order = None,
-    respect_gloss: options.RespectGloss = None,
-    maps: Maps = None,
-    up: options.Up = None,
-    crop: options.Crop = None,
-    unit_scale: options.UnitScale = None,
-    min_opacity: options.MinOpacity = None,
-    variants: options.Variants = None,
-    depth_map: options.DepthMap = None,
-    transfer_function: options.TransferFunction = None,
-    window: options.Window = None,
-    series: options.Series = None,
-    integrator: options.Integrator = "auto",
-    depth: options.Depth = None,
-    spp: options.Spp = None,
-    effort: options.Effort = "normal",
-    quality: options.Quality = None,
-    quality_worst: options.QualityWorst = None,
-    quality_mean: options.QualityMean = None,
-    max_time: options.MaxTime = None,
-    seed: options.Seed = 0,
-    exposure: options.Exposure = "auto",
-    tone_map: options.ToneMap = "auto",
-    subpixels: options.Subpixels = None,
-    pixel_filter: options.PixelFilter = "auto",
-    denoise: options.Denoise = "auto",
-    caustics: options.Caustics = "auto",
-    clamp_indirect: options.ClampIndirect = None,
-    layers: options.Layers = False,
-    camera: options.Camera = None,
-    place: options.Place = None,
-    turn: options.Turn = None,
-    shift: options.Shift = None,
-    scale: options.Scale = 1.0,
-    depth_scale: options.DepthScale = "auto",
-    pop_out: options.PopOut = None,
-    environment: options.Environment = None,
-    background: options.Background = None,
-    light_turn: options.LightTurn = None,
-    light_strength: options.LightStrength = 1.0,
-    environment_strength: options.EnvironmentStrength = 1.0,
-    allow_outside: options.AllowOutside = False,
-    single_scattering: options.SingleScattering = False,
-    lpi: printing.Lpi = None,
-    print_lpi: printing.PrintLpi = None,
-    ppi: printing.Ppi = None,
-    size: printing.Size = None,
-    viewing_distance: printing.Distance = None,
-    thickness: printing.Thickness = None,
-    index: printing.Index = None,
-    field: printing.Field = None,
-    bleed: printing.Bleed = None,
-    marks: printing.MarksMargin = None,
-    icc: printing.Icc = None,
-    mirror: printing.Mirror = False,
-    bits: options.Bits = None,
-    resume: Resume = False,
-    opens: options.Open = False,
-    cluster: clusters.ClusterName = None,
-    tls_ca: clusters.TlsCa = None,
-    tls_cert: clusters.TlsCert = None,
-    tls_key: clusters.TlsKey = None,
-    frames: sequence.Frames = None,
-    fps: sequence.Fps = None,
-    animation: sequence.Animation = None,
-    camera_path: sequence.CameraPath = None,
-    turntable: sequence.TurntableFrames = None,
-    swing: sequence.Swing = None,
-    video: sequence.Video = None,
-    eye: sequence.Eye = None,
-    codec: sequence.Codec = None,
     state: options.State = None,
-    device: options.Device = "auto",
-    threads: options.Threads = None,
-    memory: options.Memory = None,
+    opens: options.Open = False,
+    bits: options.Bits = None,
+    maps: Maps = None,
+    resume: Resume = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
+    *,
+    asked: SceneOptions,
+    access: AccessOptions,
+    placement: PlacementOptions,
+    light: LightOptions,
+    how: QualityOptions,
+    printed: PrintOptions,
+    finishing: FinishOptions,
+    moving: SequenceOptions,
+    on: ClusterOptions,
+    machine: MachineOptions,
 ) -> None:
     """Render a scene into the native pixels of a display."""
     from lippmann.image.write import check_output, format_for
@@ -139,74 +89,35 @@ def render(
     from lippmann.runtime.atomic_write import check_folder_writable
 
     console = Console(quiet, as_json)
-    target = printing.display_of(
-        display,
-        lpi=lpi,
-        print_lpi=print_lpi,
-        ppi=ppi,
-        size=size,
-        viewing_distance=viewing_distance,
-        thickness=thickness,
-        index=index,
-        field=field,
-    )
-    wanted = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye, codec)
-    target, finish = printing.sheet_of(target, bleed=bleed, marks=marks, icc=icc, mirror=mirror, in_frames=bool(wanted))
+    target = printing.display_of(display, printed)
+    wanted = sequence.Wanted.part_of(moving)
+    target, finish = printing.sheet_of(target, finishing, in_frames=bool(wanted))
     wanted, output = sequence.with_film(wanted, output_of(output, scene, "-frames" if wanted else ".png"))
     if opens and wanted and wanted.video is None:
         raise UsageError("shows a picture or a film", where="--open", fix="add --video film.mp4")
-    request = RenderRequest(
-        method=method,
-        order=order,
-        respect_gloss=respect_gloss,
-        integrator=integrator,
-        depth=depth,
-        spp=spp,
-        effort=effort,
-        quality=parse.quality(quality, quality_mean, console),
-        quality_worst=quality_worst,
-        max_time=max_time,
+    request = RenderRequest.from_options(
+        *(how, machine),
+        placement=placement,
+        tone_map=tone_map_of(how.tone_map, output),
         began=None if wanted else command_clock.began(),
-        seed=seed,
-        exposure=parse.exposure(exposure),
-        tone_map=tone_map_of(tone_map, output),
-        subpixels=subpixels,
-        pixel_filter=pixel_filter,
-        denoise=denoise,
-        caustics=caustics,
-        clamp_indirect=clamp_indirect,
-        layers=layers,
-        placement=parse.placement(camera, place, turn, shift, scale, depth_scale, pop_out),
-        device=device,
-        threads=threads,
-        memory=parse.memory(memory),
     )
-    source = SceneSource(
-        *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
-        *(parse.crop(crop), unit_scale, min_opacity),
-        light=parse.light(light_turn, light_strength, environment_strength),
-        variants=parse.variants(variants),
-        depth_map=depth_map,
-        transfer_function=transfer_function,
-        window=parse.window(window),
-        series=series,
-    )
-    on_cluster = clusters.ClusterOptions(cluster, tls_ca, tls_cert, tls_key)
+    source = SceneSource(scene, asked, light, access)
+    on_cluster = clusters.Cluster(on)
     if wanted:
         files = sequence.Files(output, bits, maps, resume)
-        with on_cluster.runner(console, threads) as runner:
+        with on_cluster.runner(console, machine.threads) as runner:
             sequence.render_frames(source, target, request, wanted, files, console, runner=runner)
         if opens and wanted.video is not None:
             view.open_file(wanted.video)
         return
     name, stored = format_for(output, bits)
-    _check_layers(layers, name, output)
+    _check_layers(how.layers, name, output)
     if on_cluster or is_tiled(output, bits, target, request, resume=resume):
         if maps is not None:
             fix = "leave it out: a file that ends in .exr holds each pixel's error and samples itself"
             rule = "with --resume, to Zarr and beyond the memory pictures are rendered in tiles"
             raise UsageError("needs the whole picture at once", where="--maps", rule=rule, fix=fix)
-        with on_cluster.runner(console, threads) as runner:
+        with on_cluster.runner(console, machine.threads) as runner:
             _render_tiled(
                 source, target, request, output, console, bits=bits, resume=resume, finish=finish, runner=runner
             )

@@ -9,13 +9,12 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from lippmann.cli.shared import parse
 from lippmann.cli.shared.console import Console
 from lippmann.errors import OutputError, PictureError, UsageError
+from lippmann.options.outputs import SequenceOptions
+from lippmann.options.texts import triple
 
 if TYPE_CHECKING:
     from lippmann.cli.shared.scene_source import SceneSource
@@ -29,62 +28,6 @@ if TYPE_CHECKING:
     from lippmann.sequences.motion import Motion
     from lippmann.tiles.tiled_render import Runner
 
-Frames = Annotated[
-    str | None,
-    typer.Option(
-        "--frames",
-        help="Render frames of a scene that moves: FIRST:STOP or FIRST:STOP:STEP, such as 0:48 for 0 to 47; 0: is all. "
-        "The output is then a film (.mp4), a folder or a name with %04d.",
-    ),
-]
-Fps = Annotated[float | None, typer.Option("--fps", help="Frames per second of an animation and of the film; 24.")]
-Animation = Annotated[
-    str | None, typer.Option("--animation", help="A glTF file's animation by name; its first by default.")
-]
-CameraPath = Annotated[
-    Path | None, typer.Option("--camera-path", help="Fly through a Tachyon or NFF scene along this .cam file.")
-]
-TurntableFrames = Annotated[
-    int | None,
-    typer.Option(
-        "--turntable",
-        help="Render so many frames of a whole turn of the scene about its upright axis; display and light stand "
-        "still. The output is a film (.mp4), a folder or a name with %04d.",
-        show_default=False,
-    ),
-]
-Swing = Annotated[
-    float | None,
-    typer.Option(
-        "--swing",
-        help="Swing the scene to and fro by so many degrees in all, instead of a whole turn.",
-        show_default=False,
-    ),
-]
-Video = Annotated[
-    Path | None,
-    typer.Option(
-        "--video",
-        help="Write a film (.mp4, .png) of what an eye sees of the frames, or with a name such as "
-        "film_qs8x6a0.75.mp4 of their quilts.",
-    ),
-]
-Eye = Annotated[
-    str | None,
-    typer.Option(
-        "--eye",
-        help="Where the film's eye is: X,Y,Z in mm, z toward the viewer; central. Of quilts also 'sweep': the eye goes "
-        "to and fro across their views.",
-    ),
-]
-
-Codec = Annotated[
-    Literal["h264", "hevc", "av1"] | None,
-    typer.Option(
-        "--codec", help="How an .mp4 is coded: h264 plays everywhere, hevc and av1 make smaller files. Default: h264."
-    ),
-]
-
 #: Endings of outputs that are films themselves; ``.png`` stays a picture's.
 _FILMS = (".mp4", ".apng")
 _NUMBER = re.compile(r"%(?:0(\d{1,2}))?d")
@@ -92,19 +35,8 @@ _NUMERAL = re.compile(r"[\d.]+")
 _FOLDER_PATTERN = "frame_%04d"
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """What ``--frames``, ``--turntable``, ``--swing`` and the options beside them ask for; else a picture at rest."""
-
-    frames: str | None
-    fps: float | None
-    animation: str | None
-    camera_path: Path | None
-    turntable: int | None
-    swing: float | None
-    video: Path | None
-    eye: str | None
-    codec: Literal["h264", "hevc", "av1"] | None = None
+class Wanted(SequenceOptions):
+    """What is asked for of frames; true if there is anything, else a picture at rest is wanted."""
 
     @property
     def turns(self) -> bool:
@@ -279,8 +211,8 @@ def render_frames(
 def open_moving(source: SceneSource, wanted: Wanted, request: RenderRequest) -> Motion:
     """What moves."""
     if wanted.turns:
+        from lippmann.options.placement import PlacementOptions
         from lippmann.runtime import engine
-        from lippmann.scene.placement import PlacementOptions
         from lippmann.sequences.turntable import open_turntable
 
         # A scene of Mitsuba's tells its box only once the engine runs, and that on the device that was asked for.
@@ -300,12 +232,9 @@ def open_moving(source: SceneSource, wanted: Wanted, request: RenderRequest) -> 
         fps=None if wanted.camera_path is not None else wanted.fps,
         animation=wanted.animation,
         camera_path=wanted.camera_path,
-        environment=source.environment,
-        background=source.background,
-        allow_outside=source.allow_outside,
-        multiple_scattering=not source.single_scattering,
+        asked=source.asked,
         light=source.light,
-        variants=source.variants,
+        allow_outside=source.access.allow_outside,
     )
 
 
@@ -320,7 +249,7 @@ def _filming(
 
     if isinstance(form, QuiltForm):
         return film_of_quilts(wanted.video, display, form, _eye(wanted.eye), count)
-    eye = None if wanted.eye is None else parse.triple(wanted.eye, "--eye")
+    eye = None if wanted.eye is None else triple(wanted.eye, "--eye")
     return film_of_pictures(wanted.video, motion, display, request, eye)
 
 
@@ -328,7 +257,7 @@ def _eye(text: str | None) -> FilmEye:
     """The eye of a film of quilts."""
     if text is None or text == "sweep":
         return text  # type: ignore[return-value]
-    x, y, z = parse.triple(text, "--eye")
+    x, y, z = triple(text, "--eye")
     if z <= 0.0:
         raise UsageError(f"an eye at z = {z:g}", where="--eye", rule="z is toward the viewer, above 0 mm")
     return x, y, z

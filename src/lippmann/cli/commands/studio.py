@@ -10,8 +10,12 @@ import typer
 
 from lippmann.cli.commands import view as viewing
 from lippmann.cli.shared import options, parse
+from lippmann.cli.shared.command_options import only, with_options
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.end_signals import ended_by_signals
+from lippmann.options.outputs import AccessOptions
+from lippmann.options.quality import MachineOptions
+from lippmann.options.scene import SceneOptions
 
 if TYPE_CHECKING:
     from lippmann.studio_app.state import StudioState
@@ -28,22 +32,21 @@ State = Annotated[
 Folder = Annotated[Path, typer.Option("--folder", help="Folder that renders are written into.")]
 
 
+@with_options
 def studio(
     model: Model = None,
     display: DisplayChoice = None,
     state: State = None,
-    environment: options.Environment = None,
-    up: options.Up = None,
-    allow_outside: options.AllowOutside = False,
     folder: Folder = Path(),
     host: viewing.Host = "127.0.0.1",
     port: viewing.Port = 0,
     no_browser: viewing.NoBrowser = False,
-    device: options.Device = "auto",
-    threads: options.Threads = None,
-    memory: options.Memory = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
+    *,
+    asked: Annotated[SceneOptions, only("environment", "up")],
+    access: AccessOptions,
+    machine: MachineOptions,
 ) -> None:
     """Set up a display by hand in a browser, see live what it will show, and render."""
     from lippmann.rendering.request.render_request import RenderRequest
@@ -52,9 +55,11 @@ def studio(
     from lippmann.viewer.secret_folder import secret_folder
 
     console = Console(quiet, as_json)
-    first = _state(state, model, display, environment, up)
-    machine = RenderRequest(device=device, threads=threads, memory=parse.memory(memory))
-    with ended_by_signals(), open_session(first, folder, machine, allow_outside=allow_outside) as session:
+    first = _state(state, model, display, asked)
+    with (
+        ended_by_signals(),
+        open_session(first, folder, RenderRequest.from_options(machine), allow_outside=access.allow_outside) as session,
+    ):
         viewing.serve(
             StudioSite(session, "jpeg" if viewing.is_remote() else "rgb"),
             f"studio, {Path(first.scene).name} on {first.display}",
@@ -84,18 +89,11 @@ def show(
     viewing.serve(PanelSite(file), str(picture), Console(quiet, as_json), host=host, port=port, browser=not no_browser)
 
 
-def _state(
-    path: Path | None, model: str | None, display: str | None, environment: Path | None, up: str | None
-) -> StudioState:
+def _state(path: Path | None, model: str | None, display: str | None, asked: SceneOptions) -> StudioState:
     """The first state: that of the file, or a new one, with what the options say."""
     from lippmann.studio_app.state import StudioState
     from lippmann.studio_app.state_toml import read_state
 
-    given = {
-        "scene": model,
-        "display": display,
-        "environment": None if environment is None else str(environment),
-        "up": up,
-    }
-    changed = {name: value for name, value in given.items() if value is not None}
-    return replace(StudioState() if path is None else read_state(path), **changed)  # type: ignore[arg-type]
+    names = {"scene": model, "display": display, **asked.given}
+    given = {name: str(value) for name, value in names.items() if value is not None}
+    return replace(StudioState() if path is None else read_state(path), **given)  # type: ignore[arg-type]

@@ -18,10 +18,8 @@ if TYPE_CHECKING:
 
 #: Parameters whose options have other names than they have.
 _OTHERWISE = {
-    "mode": "--place",
     "layout": "--as",
     "grid": "--views",
-    "multiple_scattering": "--single-scattering",
 }
 #: ``name="value"``, ``name=True``, ``name=3.5`` or, for any value, ``name=...``.
 _SETTING = re.compile(r"\b([a-z_]+)=(?:\"([^\"]*)\"|(\.\.\.|[\w+-]+(?:\.\w+)*))")

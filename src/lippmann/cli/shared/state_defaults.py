@@ -20,14 +20,12 @@ def read_defaults(context: typer.Context, state: Path | None) -> Path | None:
     """
     if state is None or context.resilient_parsing:
         return state
-    from lippmann.studio_app.command_line import option_texts
+    from lippmann.studio_app.command_line import option_values
     from lippmann.studio_app.state_toml import read_state
 
     read = read_state(state)
     known = {parameter.name for parameter in context.command.params}
-    texts: dict[str, object] = {"scene": read.scene, **option_texts(read)}
-    if read.subpixels is not None:
-        texts["subpixels"] = read.subpixels
+    texts: dict[str, object] = {"scene": read.scene, **option_values(read)}
     if read.eye is not None and context.command.name in _OF_PREVIEWS:
         texts["eye"] = ",".join(repr(part) for part in read.eye)
     context.default_map = {name: text for name, text in texts.items() if name in known}

@@ -22,9 +22,9 @@ from lippmann.device.types import Emitter, MitsubaScene, Shape
 from lippmann.device.volumes.table import VolumeTable
 from lippmann.device.volumes.table import make_table as make_volume_table
 from lippmann.errors import SceneError, UsageError
+from lippmann.options.light import LightOptions
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
-from lippmann.scene.light_options import LightOptions
 from lippmann.scene.mitsuba_source import MitsubaSource, with_sky
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Color, Matrix, SceneDescription
@@ -165,12 +165,12 @@ def _build_source(source: MitsubaSource, scene: Scene) -> BuiltScene:
 def _check_light(light: LightOptions, *, has_environment: bool) -> None:
     """Refuse changes to the light sources that a scene of Mitsuba's brings."""
     rule = "a Mitsuba scene keeps its own light sources"
-    if light.strength != 1.0:
-        raise UsageError(f"{light.strength:g}", parameter="light_strength", rule=rule, fix="use exposure")
+    if light.light_strength != 1.0:
+        raise UsageError(f"{light.light_strength:g}", parameter="light_strength", rule=rule, fix="use exposure")
     if has_environment:
         return
     for parameter, changes in (
-        ("light_turn", any(light.turn)),
+        ("light_turn", any(light.light_turn)),
         ("environment_strength", light.environment_strength != 1.0),
     ):
         if changes:

@@ -7,8 +7,8 @@ Open Image Denoise and of its guides is set against the middle of this.
 
 from __future__ import annotations
 
+from lippmann.options.choices import Denoiser
 from lippmann.rendering.denoise.oidn import Effort
-from lippmann.rendering.request.choices import Denoiser
 
 #: What a shadow ray costs, in rays that are followed and shaded: a third to four fifths in the bundled scenes.
 SHADOW_COST = 0.5

@@ -9,7 +9,8 @@ import mitsuba as mi
 import numpy as np
 
 from lippmann.device.pbr.emitters import environment_to_world
-from lippmann.scene.light_options import LightOptions
+from lippmann.options.light import LightOptions
+from lippmann.scene.light_options import change_source, light_rotation
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Light, Matrix
 
@@ -41,21 +42,21 @@ class EmitterUpdates:
 
     def can_apply(self, light: LightOptions) -> bool:
         """Whether ``light`` is data: spots with a radius keep the strength that they were built with."""
-        return light.strength == 1.0 or all(source.has_strength for _, source in self._sources)
+        return light.light_strength == 1.0 or all(source.has_strength for _, source in self._sources)
 
     def apply(self, light: LightOptions, world_from_viewer: Matrix) -> None:
         """Set the light, which may follow the viewer, whose axes ``world_from_viewer`` ``(4, 4)`` tells."""
         environment = self._environment
         if environment is not None and self._surroundings is not None:
             viewer = world_from_viewer if environment.follows_viewer else np.eye(4)
-            placed = viewer @ light.rotation @ environment.world_from_environment
+            placed = viewer @ light_rotation(light) @ environment.world_from_environment
             self._surroundings.scale(light.environment_strength)
             self._surroundings.place(environment_to_world(placed))
-        if (light.turn, light.strength) != (self._last.turn, self._last.strength):
+        if (light.light_turn, light.light_strength) != (self._last.light_turn, self._last.light_strength):
             for original, emitter in self._sources:
-                emitter.scale(light.strength)
+                emitter.scale(light.light_strength)
                 if original.kind == "directional":
-                    emitter.place(_directional_frame(light.source(original)))
+                    emitter.place(_directional_frame(change_source(original, light)))
         self._last = light
 
 

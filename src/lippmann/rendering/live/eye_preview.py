@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from lippmann.display import Display
+from lippmann.options.choices import LIGHT, POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import denoise, load_denoiser
 from lippmann.rendering.film.wavefront_plan import make_plan
@@ -16,7 +17,6 @@ from lippmann.rendering.live.develop import arrange
 from lippmann.rendering.live.seen_pixels import EyeMap, Vector
 from lippmann.rendering.picture import placed_options
 from lippmann.rendering.preview import Preview
-from lippmann.rendering.request.choices import LIGHT, POOLED_LIGHT
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
+from lippmann.options.light import LightOptions
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.scene.light_options import LightOptions
 from lippmann.scene.placement import Placement
 
 Vector = tuple[float, float, float]

@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 
 from lippmann.display import Display
+from lippmann.options.light import LightOptions
 from lippmann.rendering.film.memory_model import BYTES_PER_LANE
 from lippmann.rendering.live.emitter_updates import EmitterUpdates
 from lippmann.rendering.live.hull_bounds import bounds_by_hull
@@ -23,7 +24,6 @@ from lippmann.rendering.transport.first_surface import make_surfaces
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.prepared_light import PreparedLight
 from lippmann.rendering.transport.ray_source import DisplayRays
-from lippmann.scene.light_options import LightOptions
 from lippmann.scene.placement import Placement
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ clear glass or smooth gloss (docs/research/seen-light.md).
 from __future__ import annotations
 
 from lippmann.device.types import MitsubaScene
+from lippmann.options.choices import REUSING
 from lippmann.rendering.preparation.tuning import TUNING
-from lippmann.rendering.request.choices import REUSING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import has_sharp_surfaces
 

@@ -14,7 +14,7 @@ from typing import Literal
 
 from lippmann.display import Display
 from lippmann.errors import UsageError
-from lippmann.rendering.request.choices import (
+from lippmann.options.choices import (
     LIGHT,
     POOLED_LIGHT,
     REUSING,
@@ -25,11 +25,12 @@ from lippmann.rendering.request.choices import (
     PixelFilter,
     ToneMap,
 )
+from lippmann.options.forms import Form
+from lippmann.options.light import LightOptions
 from lippmann.rendering.request.off_surface_request import check_off_surfaces
-from lippmann.rendering.request.preconditions import Form, check
+from lippmann.rendering.request.preconditions import check
 from lippmann.rendering.request.render_plan import Choice, RenderPlan
 from lippmann.rendering.request.render_request import DEFAULT_DEPTH, DEFAULT_SPP, RenderRequest
-from lippmann.scene.light_options import LightOptions
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import SceneDescription
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from lippmann.display import Display
 from lippmann.errors import PictureError, UsageError
-from lippmann.rendering.request.choices import LIGHT, POOLED_LIGHT, REUSING
+from lippmann.options.choices import LIGHT, POOLED_LIGHT, REUSING
+from lippmann.options.forms import LEFT_OUT, Form
 from lippmann.rendering.request.render_request import RenderRequest
-
-#: What is made of a request: a picture in one piece, one in tiles, a quilt, a forecast, a camera's plain picture.
-Form = Literal["picture", "tiles", "quilt", "forecast", "preview"]
 
 #: Pictures number their sub-pixels in 32 bits.
 MOST_SUBPIXELS = 1 << 32
@@ -26,6 +22,12 @@ def check(request: RenderRequest, form: Form, display: Display | None) -> None:
     PictureError
         The display's lenses have no quilt.
     """
+    plain = type(request)()
+    for name in LEFT_OUT[form]:
+        if getattr(request, name) not in (getattr(plain, name), False, "full"):
+            raise _refuse(name, request, form)
+    if form in ("quilt", "forecast") and request.method in REUSING:
+        raise _refuse("method", request, form)
     if form == "tiles":
         _check_tiles(request, display)
     if form == "quilt":
@@ -140,23 +142,8 @@ def _check_goal(request: RenderRequest) -> None:
 
 
 def _check_tiles(request: RenderRequest, display: Display | None) -> None:
-    whole = {
-        "method": request.method if request.method in REUSING else None,
-        "order": request.order,
-        "respect_gloss": request.respect_gloss,
-        "quality": request.quality,
-        "quality_worst": request.quality_worst,
-        "max_time": request.max_time,
-        "layers": True if request.layers else None,
-    }
-    for name, value in whole.items():
-        if value is not None:
-            raise UsageError(
-                "needs the whole picture" if value is True else f"{value} needs the whole picture",
-                parameter=name,
-                rule="with resume=True, to Zarr and beyond the memory pictures are rendered in tiles",
-                fix='use method="full" or method="pooled"' if name == "method" else "leave it out",
-            )
+    if request.method in REUSING:
+        raise _refuse("method", request, "tiles", fix='use method="full" or method="pooled"')
     if display is None:
         return
     panel = display.panel
@@ -175,12 +162,18 @@ def _check_quilt(request: RenderRequest, display: Display | None) -> None:
             f"the display {display.name} has {display.lens_array.layout} lenses",
             rule="a quilt's views lie side by side, for cylindrical lenses",
         )
-    for name, given in (
-        ("method", request.method in REUSING),
-        ("subpixels", request.subpixels),
-        ("layers", request.layers),
-    ):
-        if given:
-            value = request.method if name == "method" else "it"
-            rule = "every pixel of a quilt is traced, for all colours"
-            raise UsageError(f"{value} is not possible in a quilt", parameter=name, rule=rule, fix="leave it out")
+
+
+#: Why a form has not all options.
+_WHY: dict[Form, str] = {
+    "tiles": "with resume=True, to Zarr and beyond the memory pictures are rendered in tiles",
+    "quilt": "every pixel of a quilt is traced, for all colours",
+    "forecast": "a forecast is of a number of samples, each of a traced ray",
+    "preview": "it is for pictures on a display",
+}
+
+
+def _refuse(name: str, request: RenderRequest, form: Form, fix: str = "leave it out") -> UsageError:
+    value = getattr(request, name)
+    needs = "needs the whole picture" if form == "tiles" else f"is not possible in a {form}"
+    return UsageError(f"{'it' if value is True else value} {needs}", parameter=name, rule=_WHY[form], fix=fix)

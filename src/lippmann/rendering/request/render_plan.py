@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Generic, Literal, TypeVar, cast
 
-from lippmann.rendering.request.choices import (
+from lippmann.options.choices import (
     ASKED,
     Caustics,
     Denoiser,

@@ -6,12 +6,16 @@ from collections.abc import Mapping
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Literal, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from lippmann.errors import SceneError, UsageError
-from lippmann.scene.light_options import LightOptions
+from lippmann.options.keywords import takes
+from lippmann.options.light import LightOptions
+from lippmann.options.outputs import AccessOptions
+from lippmann.options.plain import settings_of
+from lippmann.options.scene import LoadKeywords, SceneOptions, Up
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.ply import UP_NOTE
@@ -19,7 +23,7 @@ from lippmann.scene.readers.splats.sog_folder import holds_sog
 from lippmann.scene.readers.volumes.dicom_files import DICOM, holds_dicom
 from lippmann.scene.scene import Scene, check_description, override_light
 from lippmann.scene.splat_clouds import moved
-from lippmann.scene.splat_selection import Crop, SplatSelection
+from lippmann.scene.splat_selection import SplatSelection
 from lippmann.scene.values.description import (
     Camera,
     Color,
@@ -29,12 +33,14 @@ from lippmann.scene.values.description import (
     Matrix,
     SceneDescription,
 )
-from lippmann.scene.values.volume import TransferFunction
 from lippmann.scene.values.whitted_lighting import Background
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.volume_selection import VolumeSelection
 from lippmann.scene.volumes.grid import moved as moved_volume
 from lippmann.scene.whitted.world_frame import world_camera
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 #: Words in place of an environment file: the built-in studio, and no light but the scene's own.
 STUDIO, NO_ENVIRONMENT = "studio", "none"
@@ -131,7 +137,6 @@ _ELSEWHERE = {
 }
 
 #: Kinds of files that do not say which way is up, and which way it mostly is: for 3D printing, z.
-Up = Literal["y", "z", "-y"]
 _USUAL_UP: dict[str, Up] = {
     ".npy": "y",
     ".npz": "y",
@@ -146,96 +151,75 @@ _USUAL_UP: dict[str, Up] = {
 _DIRECTIONS: dict[Up, Direction] = {"y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0), "-y": (0.0, -1.0, 0.0)}
 
 
+@takes(SceneOptions, AccessOptions)
 def load_scene(
-    source: object,
-    *,
-    environment: str | Path | Environment | None = None,
-    background: Color | None = None,
-    allow_outside: bool = False,
-    multiple_scattering: bool = True,
-    up: Up | None = None,
-    crop: Crop | None = None,
-    unit_scale: float | None = None,
-    min_opacity: float | None = None,
-    light: LightOptions | None = None,
-    variants: Mapping[str, str] | None = None,
-    depth_map: Path | None = None,
-    transfer_function: str | Path | TransferFunction | None = None,
-    window: tuple[float, float] | None = None,
-    series: str | None = None,
+    source: object, *, light: LightOptions | Mapping[str, object] | None = None, **options: Unpack[LoadKeywords]
 ) -> Scene:
-    """Load a scene.
+    """Load a scene from a file, a bundled scene's name, or an object of another library.
 
     Parameters
     ----------
     source:
-        The path of a scene file, the name of a bundled scene, or an object: a :class:`SceneDescription`, a
-        :class:`ClassicScene`, a ``trimesh.Scene`` or ``Trimesh``, a PyVista data set, a ``mitsuba.Scene`` or a
-        dictionary for ``mitsuba.load_dict``.
-    environment:
-        Light from all around in place of the scene's own: an EXR or HDR file, or "studio" for the built-in one.
-        A scene without any light gets the studio anyway, unless this is "none".
-    background:
-        Linear RGB seen where nothing is hit; None for the environment (for the studio a grey backdrop).
-    allow_outside:
-        Let the scene file name files outside its own folder.
-    multiple_scattering:
-        Give back the light that rough surfaces reflect more than once between microfacets. False: as dark as glTF's
-        formulas make them.
-    up:
-        The axis that points up in a file that does not say so: OBJ, PLY (None: "y"; with Gaussian splats "-y", as
-        trainers have it), SOG (None: "-y"), SPZ (None: "y") and STL (None: "z", as 3D printing has it).
-    crop, unit_scale, min_opacity:
-        Of Gaussian splats; see :class:`~lippmann.scene.splat_selection.SplatSelection`.
+        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.spz``, ``.sog``, ``.stl``, ``.blend``, ``.usd``
+        (``.usda``, ``.usdc``, ``.usdz``), Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff`` file; of a volume (``.nii``,
+        ``.nii.gz``, ``.vdb``, ``.npy``, ``.npz``, Mitsuba ``.vol``, ``.dcm`` or a folder of such) or of VTK (``.vtp``,
+        ``.vtu``, ``.vtk``, ``.vti``); name of a bundled scene; a ``mi.Scene`` or Mitsuba dict; a trimesh scene or
+        mesh; a PyVista data set or plotter; a :class:`~lippmann.scene.values.description.SceneDescription`.
     light:
-        Direction and strength of the scene's light; None: as the file has them.
-    variants:
-        Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one. Of
-        a glTF file: ``{"materials": "name"}`` for a material variant.
-    depth_map:
-        The depth of a photograph, as a file; None for one that a JPEG file holds.
-    transfer_function, window:
-        Of a volume; see :class:`~lippmann.scene.volume_selection.VolumeSelection`, also for ``crop``.
-    series:
-        Of files with several volumes the one to show: number, name or UID of a DICOM series, number of a NIfTI volume,
-        name of an array, also of VTK's files.
+        A :class:`~lippmann.options.light.LightOptions`, or a dict of them: turns and scales the scene's light.
+    **options:
+        Fields of :class:`~lippmann.options.scene.SceneOptions`, and ``allow_outside``.
 
     Raises
     ------
     SceneError
         The scene or something it needs is missing, damaged, foreign, or has nothing to see.
     UsageError
-        The background is no colour, a choice of splats is for a scene without any, ``source`` is an object that is not
-        understood, or materials that Mitsuba describes are to be changed.
+        An option is out of its range or not for such a scene, or ``source`` is an object that is not understood.
     """
-    sky = _environment(environment)
-    color = _background(background)
+    allow_outside = options.pop("allow_outside", False)
+    if isinstance(light, Mapping):
+        light = LightOptions.of(light)
+    return read_scene(source, SceneOptions.of(options), light, allow_outside=allow_outside)
+
+
+def read_scene(
+    source: object, asked: SceneOptions, light: LightOptions | None = None, *, allow_outside: bool = False
+) -> Scene:
+    """:func:`load_scene` with all that is asked for in one value; without ``light`` it stays as the file has it.
+
+    Raises
+    ------
+    SceneError, UsageError
+        As :func:`load_scene`.
+    """
+    sky = _environment(asked.environment)
+    color = _background(asked.background)
     if isinstance(source, str | Path):
-        scene = _from_name(source, allow_outside, up, variants, depth_map, series)
-    elif up is None and not variants and depth_map is None and series is None:
+        scene = _from_name(source, allow_outside, asked)
+    else:
+        for name in ("up", "variants", "depth_map", "series"):
+            if getattr(asked, name):
+                raise UsageError("is for files", parameter=name, fix="leave it out")
         scene = _from_object(source)
-    else:
-        asked = {"up": up, "variants": variants, "depth_map": depth_map, "series": series}
-        parameter = next(name for name, value in asked.items() if value)
-        raise UsageError("is for files", parameter=parameter, fix="leave it out")
     if scene.has_volume:
-        scene = VolumeSelection(crop, transfer_function, window).of(
-            SplatSelection(None, unit_scale, min_opacity).of(scene)
+        scene = VolumeSelection(asked.crop, asked.transfer_function, asked.window).of(
+            SplatSelection(None, asked.unit_scale, asked.min_opacity).of(scene)
         )
     else:
-        scene = SplatSelection(crop, unit_scale, min_opacity).of(
-            VolumeSelection(None, transfer_function, window).of(scene)
+        scene = SplatSelection(asked.crop, asked.unit_scale, asked.min_opacity).of(
+            VolumeSelection(None, asked.transfer_function, asked.window).of(scene)
         )
-    scene = scene if light is None else replace(scene, light=light)
+    scene = replace(scene, light=light or scene.light, settings=(*scene.settings, *settings_of(asked)))
     scene = scene if color is None else replace(scene, has_chosen_background=True)
-    studio = scene.studio and str(environment) != NO_ENVIRONMENT
+    studio = scene.studio and str(asked.environment) != NO_ENVIRONMENT
     if scene.classic is not None and color is not None:
         scene = replace(scene, classic=replace(scene.classic, background=Background(color=color)))
-    if scene.is_classic and sky is None and multiple_scattering:
+    if scene.is_classic and sky is None and not asked.single_scattering:
         return replace(scene, studio=studio)
     # The classic light models know neither surroundings nor microfacets: who asks for them gets the physical form.
     description = override_light(scene.physical, sky, color)
-    if not multiple_scattering:
+    if asked.single_scattering:
         description = _single_scattering(description)
     return replace(scene, description=description, studio=studio)
 
@@ -245,7 +229,7 @@ def _single_scattering(description: SceneDescription | MitsubaSource) -> SceneDe
         raise UsageError(
             "a scene of Mitsuba's has materials of its own",
             where=description.name,
-            parameter="multiple_scattering",
+            parameter="single_scattering",
             rule="it is for materials in glTF's terms",
             fix="leave it out",
         )
@@ -287,18 +271,13 @@ def kind_of_name(path: Path) -> str:
     return ".nii.gz" if path.name.lower().endswith(".nii.gz") else path.suffix.lower()
 
 
-def _from_name(
-    source: str | Path,
-    allow_outside: bool,
-    up: Up | None = None,
-    variants: Mapping[str, str] | None = None,
-    depth_map: Path | None = None,
-    series: str | None = None,
-) -> Scene:
+def _from_name(source: str | Path, allow_outside: bool, asked: SceneOptions) -> Scene:
+    up, variants, series = asked.up, asked.variants, asked.series
+    depth_map = None if asked.depth_map is None else Path(asked.depth_map)
     path = Path(source)
     suffix = ".sog" if holds_sog(path) else kind_of_name(path)
-    if up is not None and (up not in get_args(Up) or suffix not in _USUAL_UP):
-        what = f"'{up}'" if up not in get_args(Up) else f"{path.name} says itself which way is up"
+    if up is not None and suffix not in _USUAL_UP:
+        what = f"{path.name} says itself which way is up"
         raise UsageError(what, parameter="up", rule=f"y, z or -y, for {', '.join(_USUAL_UP)}", fix="leave it out")
     if variants and kind_of_file(source) not in _WITH_VARIANTS:
         rule = f"{', '.join(_WITH_VARIANTS)} files may have some"

@@ -1,0 +1,144 @@
+"""Options of commands, made from the dataclasses of :mod:`lippmann.options`.
+
+A command takes such a dataclass as a parameter; :func:`with_options` puts an option for each of its fields in its
+place, reads their words, and hands the command the whole::
+
+    @with_options
+    def plan(scene: Scene, *, quality: Annotated[QualityOptions, without("layers")], light: LightOptions) -> None: ...
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import Field, dataclass
+from typing import Annotated, Any, TypeVar, get_args, get_origin
+
+import typer
+
+from lippmann.cli.shared.grouped_help import ALL, MANY
+from lippmann.options.option import Option, Options, default_of, kinds_of, options_of
+from lippmann.options.quality import MachineOptions
+
+T = TypeVar("T", bound=Options)
+
+
+@dataclass(frozen=True)
+class Subset:
+    """Which options of a dataclass a command has; the others stay at their defaults."""
+
+    names: tuple[str, ...]
+    are_left_out: bool
+
+    def has(self, name: str) -> bool:
+        """Whether the command has this option."""
+        return (name in self.names) is not self.are_left_out
+
+
+def only(*names: str) -> Subset:
+    """These options alone."""
+    return Subset(names, are_left_out=False)
+
+
+def without(*names: str) -> Subset:
+    """All options but these."""
+    return Subset(names, are_left_out=True)
+
+
+def with_options(command: Callable[..., None]) -> Callable[..., None]:
+    """A command whose parameters that are option dataclasses have become options."""
+    signature = inspect.signature(command, eval_str=True)
+    groups: dict[str, tuple[type[Options], list[tuple[Field[Any], Option]]]] = {}
+    parameters = []
+    for parameter in signature.parameters.values():
+        kind, subset = _dataclass_of(parameter.annotation)
+        if kind is None:
+            parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
+            continue
+        chosen = [(each, its) for each, its in options_of(kind) if subset.has(each.name)]
+        groups[parameter.name] = kind, chosen
+        parameters += [_parameter(each, its) for each, its in chosen]
+    options = {each.name: its for _, chosen in groups.values() for each, its in chosen}
+    if len(parameters) > MANY:
+        parameters.append(_HELP_ALL)
+
+    def run(**values: Any) -> None:
+        values.pop(_HELP_ALL.name, None)
+        made = {name: _make(kind, chosen, values) for name, (kind, chosen) in groups.items()}
+        for each in made.values():
+            if isinstance(each, MachineOptions):
+                _limit_inputs(each.memory)
+        own = {name: value for name, value in values.items() if name not in options}
+        command(**own, **made)
+
+    run.__name__, run.__doc__, run.__module__ = command.__name__, command.__doc__, command.__module__
+    run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {each.name: each.annotation for each in parameters}
+    run.options = options  # type: ignore[attr-defined]
+    return run
+
+
+def read_options(kind: type[T], values: Mapping[str, Any]) -> T:
+    """Options of a dataclass from a command's parameters, as they were typed; what it has not stays at its default."""
+    return _make(kind, [(each, its) for each, its in options_of(kind) if each.name in values], values)
+
+
+def _make(kind: type[T], chosen: list[tuple[Field[Any], Option]], values: Mapping[str, Any]) -> T:
+    return kind(**{each.name: _value(each, its, values[each.name]) for each, its in chosen})
+
+
+def _dataclass_of(annotation: Any) -> tuple[type[Options] | None, Subset]:
+    kind, *notes = get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
+    subset = next((note for note in notes if isinstance(note, Subset)), without())
+    return (kind, subset) if isinstance(kind, type) and issubclass(kind, Options) else (None, subset)
+
+
+def _parameter(each: Field[Any], its: Option) -> inspect.Parameter:
+    """A field as typer's parameter; where its words are read here, None stands for its default."""
+    default, kind = default_of(each), its.words or each.type
+    if its.read is not None:
+        kind, default = its.words or (str | None), default if isinstance(default, str) else its.default_text
+    flag = its.flag_of(each.name)
+    if bool in kinds_of(kind) and default is None:
+        flag = f"{flag}/--no-{flag[2:]}"
+    shown = typer.Option(
+        flag,
+        help=its.help_in_flags,
+        metavar=its.metavar,
+        rich_help_panel=its.group,
+        show_default=default is not None and default is not False,
+    )
+    return inspect.Parameter(
+        each.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, shown]
+    )
+
+
+def _value(each: Field[Any], its: Option, words: Any) -> Any:
+    """The value of an option's words."""
+    if its.read is None:
+        return words
+    return default_of(each) if words is None or words in ([], ()) else its.read(words, its.flag_of(each.name))
+
+
+def _limit_inputs(memory: int | None) -> None:
+    """Hold what is read from files to the limit, too, from the moment that it is known."""
+    from lippmann.runtime.input_memory import limit_inputs
+
+    limit_inputs(memory)
+
+
+def _show_all(context: typer.Context, is_asked: bool) -> None:
+    if is_asked and not context.resilient_parsing:
+        context.meta[ALL] = True
+        print(context.get_help())
+        raise typer.Exit
+
+
+_HELP_ALL = inspect.Parameter(
+    "help_all",
+    inspect.Parameter.KEYWORD_ONLY,
+    default=False,
+    annotation=Annotated[
+        bool, typer.Option("--help-all", help="Show all options and exit.", is_eager=True, callback=_show_all)
+    ],
+)

@@ -1,0 +1,174 @@
+"""An option: a field of a frozen dataclass that knows its meaning, its range, and how the command line shows it.
+
+A field of a subclass of :class:`Options` that is made by :func:`option` becomes an option of the commands that take its
+class (:mod:`lippmann.cli.shared.command_options`), a keyword of the calls that do (:mod:`lippmann.options.keywords`),
+and a setting of the studio and its files. It has the same name everywhere, with ``-`` for ``_`` on the command line.
+
+Annotations of such classes are types, not texts: their modules do without ``from __future__ import annotations``.
+"""
+
+import math
+import re
+import types
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import MISSING, Field, dataclass, field, fields
+from numbers import Real
+from typing import Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
+
+from lippmann.errors import UsageError
+
+T = TypeVar("T", bound="Options")
+
+#: Key of a field's metadata.
+_KEY = "option"
+#: Another option, named in a help text.
+_OPTION = re.compile(r"`(\w+)`")
+
+
+@dataclass(frozen=True)
+class Option:
+    """What is known of an option beside its name, its type and its default.
+
+    Parameters
+    ----------
+    help:
+        What it does. Another option is written as `` `spp` ``.
+    group:
+        Heading under which help lists it.
+    first:
+        Whether the first help shows it; else the help of all options does.
+    low, high:
+        Range of a number; ``excludes_low`` leaves the lowest out.
+    rule:
+        The range in words, for errors.
+    metavar:
+        What stands for the value in help.
+    default_text:
+        What help calls a default of None.
+    read:
+        Value of the words of the command line; they and the option's flag are handed over.
+    words:
+        Type of the words, where it is not that of the field, or with ``read`` not one text.
+    is_file:
+        Whether it names a file.
+    flag:
+        Name on the command line, where it is not the field's.
+    """
+
+    help: str
+    group: str
+    first: bool = False
+    low: float = -math.inf
+    high: float = math.inf
+    excludes_low: bool = False
+    rule: str = ""
+    metavar: str | None = None
+    default_text: str | None = None
+    read: Callable[[Any, str], Any] | None = None
+    words: Any = None
+    is_file: bool = False
+    flag: str = ""
+
+    @property
+    def help_in_flags(self) -> str:
+        """The help with other options as the command line names them."""
+        return _OPTION.sub(lambda found: flag_of(found[1]), self.help)
+
+    def flag_of(self, name: str) -> str:
+        """The option of the command line that sets the field ``name``."""
+        return flag_of(self.flag or name)
+
+    @property
+    def help_in_python(self) -> str:
+        """The help with other options as keywords."""
+        return _OPTION.sub(r"``\1``", self.help)
+
+    def check(self, name: str, value: object, kind: Any) -> None:
+        """Refuse a value that is not of the annotated type ``kind``, or out of range.
+
+        Raises
+        ------
+        UsageError
+            Of the parameter ``name``.
+        """
+        kinds = kinds_of(kind)
+        choices = [word for each in kinds if get_origin(each) is Literal for word in get_args(each)]
+        if (value is None and type(None) in kinds) or (isinstance(value, str) and value in choices):
+            return
+        if bool in kinds:
+            if value not in (True, False):
+                raise UsageError(f"{value!r}", parameter=name, rule=self.rule or "must be True, False or None")
+        elif int in kinds or float in kinds:
+            self._check_number(name, value, int in kinds)
+        elif choices:
+            raise UsageError.unknown(name, value, choices, parameter=name)
+
+    def _check_number(self, name: str, value: object, is_whole: bool) -> None:
+        kind: type = int if is_whole else Real
+        is_number = isinstance(value, kind) and not isinstance(value, bool)
+        if not (is_number and self.low <= value <= self.high and (value != self.low or not self.excludes_low)):  # type: ignore[operator]
+            rule = f"must be {f'a whole number from {self.low}' if is_whole else f'a number from {self.low:g}'}"
+            raise UsageError(f"{value!r}", parameter=name, rule=self.rule or f"{rule} to {self.high}")
+
+
+def option(default: Any, help: str, **facts: Any) -> Any:
+    """A field of an :class:`Options` class; ``facts`` are those of :class:`Option`."""
+    return field(default=default, metadata={_KEY: Option(help, **facts)})
+
+
+def again(kind: type, name: str, **changes: Any) -> Any:
+    """A field of ``kind`` for a subclass that has it with another type or default."""
+    each, its = next(found for found in options_of(kind) if found[0].name == name)
+    return field(default=changes.get("default", each.default), metadata={_KEY: its})
+
+
+@dataclass(frozen=True)
+class Options:
+    """Base of what is asked for: every option is checked by itself."""
+
+    #: What they are options of, and the keyword that takes them all, for errors.
+    noun: ClassVar[str] = "render"
+    keyword: ClassVar[str] = ""
+
+    def __post_init__(self) -> None:
+        for each, its in options_of(type(self)):
+            its.check(each.name, getattr(self, each.name), each.type)
+
+    @classmethod
+    def of(cls: type[T], values: Mapping[str, object]) -> T:
+        """The options of keywords.
+
+        Raises
+        ------
+        UsageError
+            A name or a value is not known.
+        """
+        known = [each.name for each in fields(cls) if each.compare]
+        UsageError.refuse_unknown(f"option of a {cls.noun}", values, known, parameter=cls.keyword)
+        return cls(**values)
+
+    @classmethod
+    def part_of(cls: type[T], values: object) -> T:
+        """These options as an object has them that has more."""
+        return cls(**{each.name: getattr(values, each.name) for each, _ in options_of(cls)})
+
+
+def options_of(kind: type) -> Iterator[tuple[Field[Any], Option]]:
+    """Fields that are options, and what is known of them."""
+    return ((each, each.metadata[_KEY]) for each in fields(kind) if _KEY in each.metadata)
+
+
+def default_of(each: Field[Any]) -> Any:
+    """The default of a field that is an option."""
+    assert each.default is not MISSING
+    return each.default
+
+
+def kinds_of(kind: Any) -> tuple[Any, ...]:
+    """The members of a union, or the one type."""
+    return get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
+
+
+def flag_of(name: str) -> str:
+    """The option of the command line."""
+    return f"--{name.replace('_', '-')}"
