@@ -165,6 +165,35 @@ def test_depth_in_any_form_of_xmp(quote, prefix):
     assert found[0] == pytest.approx([1, 1 - 0.2 * 0.75, 0.25], abs=2e-3)
 
 
+@pytest.mark.parametrize("form", ["attributes", "elements", "uri"])
+def test_depth_behind_a_portrait(form):
+    """Dynamic Depth 1.0: a gain map, the depth with padding behind it, and its confidence follow the picture."""
+    depth, gain = encoded(np.array([[0, 51, 255]], np.uint8)), b"gain map"
+    ours = ("Semantic", "Depth") if form != "uri" else ("DataURI", "android/depthmap")
+    items = [
+        {"Mime": "image/jpeg", "Length": 0, "Semantic": "Primary"},
+        {"Mime": "image/jpeg", "Length": len(gain), "Semantic": "GainMap"},
+        {"Mime": "image/png", "Length": len(depth), "Padding": 3, ours[0]: ours[1]},
+        {"Mime": "image/jpeg", "Length": 4, "Semantic": "Confidence"},
+    ]
+    values = {"Format": "RangeInverse", "Near": 1, "Far": 4, "DepthURI": "android/depthmap"}
+
+    def element(name, prefix, fields):
+        if form == "elements":
+            return f"<{name}>" + "".join(f"<{prefix}:{k}>{v}</{prefix}:{k}>" for k, v in fields.items()) + f"</{name}>"
+        return f"<{name} " + " ".join(f'{prefix}:{k}="{v}"' for k, v in fields.items()) + "/>"
+
+    listed = "".join(f"<rdf:li>{element('Container:Item', 'Item', each)}</rdf:li>" for each in items)
+    space = 'xmlns:DepthMap="http://ns.google.com/photos/dd/1.0/depthmap/"'
+    text = f"<x {space}>{listed}{element('Camera:DepthMap', 'DepthMap', values)}</x>"
+    segment = b"http://ns.adobe.com/xap/1.0/\0" + text.encode()
+    picture = encoded(np.full((4, 6, 3), 90, np.uint8), "JPEG")
+    data = picture[:2] + b"\xff\xe1" + (len(segment) + 2).to_bytes(2, "big") + segment + picture[2:]
+    found = embedded_depth(data + gain + depth + bytes(3) + b"conf", "p.jpg").inverse
+    assert found[0] == pytest.approx([1, 1 - 0.2 * 0.75, 0.25], abs=2e-3)
+    assert embedded_depth(data.replace(b"Item", b"Itum"), "p.jpg") is None
+
+
 @pytest.mark.parametrize(
     "names", [["Z"], ["ViewLayer.Depth.Z"], ["Depth.V"], ["cam.Z"], ["linearDepth"], ["WorldDepth.R"], ["V"], ["R"]]
 )

@@ -36,9 +36,15 @@ _EXTENSION_HEAD = 40
 #: Widths in pixels of the means that take the stairs out of whole numbers: plateaus of up to about the first are slopes
 #: after that, the others make what is narrower even.
 _SMOOTHING = (65, 33, 17, 9, 5, 3)
-#: The prefix that XMP has for the namespace of GDepth, and a property of it: an attribute, or an element.
-_GDEPTH = re.compile(rb"""xmlns:([\w.-]+)\s*=\s*["']http://ns\.google\.com/photos/1\.0/depthmap/["']""")
-_PROPERTY = rb"""\b%s:(Format|Near|Far|Data)(?:\s*=\s*(["'])(.*?)\2|\s*>([^<]*)<)"""
+#: The prefix that XMP has for the namespace of GDepth, or of Dynamic Depth, which took its place; and a property with
+#: such a prefix: an attribute, or an element.
+_GDEPTH = re.compile(rb"""xmlns:([\w.-]+)\s*=\s*["']http://ns\.google\.com/photos/(?:dd/)?1\.0/depthmap/["']""")
+_PROPERTY = rb"""\b%s:(%s)(?:\s*=\s*(["'])(.*?)\2|\s*>([^<]*)<)"""
+#: An item of the directory that says what follows the picture in its file, and its properties.
+_ITEM = re.compile(rb"<([\w.-]+:Item)\b(.{0,2000}?)(?:/>|</\1>)", re.DOTALL)
+_PRIMARY = (b"Primary", b"primary_image")
+#: Digits of a length and a padding together; no file is so long.
+_LONGEST_NUMBER = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +194,8 @@ def _luminance(values: NDArray[np.generic], where: str) -> tuple[NDArray[np.gene
 
 
 def embedded_depth(data: bytes, where: str, turn: int = 1) -> DepthMap | None:
-    """The depth that a JPEG file carries as XMP (GDepth, as Android's portrait pictures have it); None without it.
+    """The depth that a JPEG file carries, as Android's portraits have it: in its XMP (GDepth), or behind its picture
+    (Dynamic Depth 1.0); None without it.
 
     Its pixels lie as those of the picture are stored, whose EXIF orientation is ``turn``.
 
@@ -203,13 +210,13 @@ def embedded_depth(data: bytes, where: str, turn: int = 1) -> DepthMap | None:
     found: dict[bytes, bytes] = {}
     xmp = _xmp(data)
     for prefix in dict.fromkeys((b"GDepth", *_GDEPTH.findall(xmp))):
-        for name, _, attribute, element in re.findall(_PROPERTY % re.escape(prefix), xmp, re.DOTALL):
-            found.setdefault(name, attribute or element.strip())
-    if b"Data" not in found:
+        found = _properties(xmp, re.escape(prefix), b"Format|Near|Far|Data|DepthURI") | found
+    behind = None if b"Data" in found else _item_of_depth(data, xmp, found.get(b"DepthURI"))
+    if b"Data" not in found and behind is None:
         return None
     try:
         near, far = float(found.get(b"Near", b"nan")), float(found.get(b"Far", b"nan"))
-        encoded = base64.b64decode(found[b"Data"])
+        encoded = base64.b64decode(found[b"Data"]) if behind is None else behind
     except (ValueError, binascii.Error) as error:
         raise SceneError(f"has depth that is not readable ({error})", where=where, rule="GDepth in XMP") from None
     if not 0.0 < near < far < np.inf:
@@ -219,6 +226,36 @@ def embedded_depth(data: bytes, where: str, turn: int = 1) -> DepthMap | None:
     if found.get(b"Format") == b"RangeLinear":
         return of_depth((near + share * (far - near)).astype(np.float32))
     return DepthMap((1.0 / near + share * (1.0 / far - 1.0 / near)).astype(np.float32))
+
+
+def _properties(xmp: bytes, prefix: bytes, names: bytes) -> dict[bytes, bytes]:
+    """Values of the properties of these names, of each the first."""
+    found: dict[bytes, bytes] = {}
+    for name, _, attribute, element in re.findall(_PROPERTY % (prefix, names), xmp, re.DOTALL):
+        found.setdefault(name, attribute or element.strip())
+    return found
+
+
+def _item_of_depth(data: bytes, xmp: bytes, uri: bytes | None) -> bytes | None:
+    """The depth picture behind a JPEG file's own, by the directory of Dynamic Depth; None where that lists none.
+
+    Items follow each other up to the file's end, each with its padding behind it.
+    """
+    items = [_properties(body, rb"[\w.-]+", b"Length|Padding|Semantic|DataURI") for _, body in _ITEM.findall(xmp)]
+    primary = [number for number, item in enumerate(items) if {*item.values()} & {*_PRIMARY}]
+    end = len(data)
+    for item in reversed(items[primary[-1] + 1 if primary else 0 :]):
+        length, padding = (item.get(name, b"0") for name in (b"Length", b"Padding"))
+        if not (length.isdigit() and padding.isdigit() and len(length + padding) < _LONGEST_NUMBER):
+            return None
+        end -= int(padding)
+        start = end - int(length)
+        if start < 0:
+            return None
+        if item.get(b"Semantic") == b"Depth" or (uri is not None and item.get(b"DataURI") == uri):
+            return data[start:end]
+        end = start
+    return None
 
 
 def _xmp(data: bytes) -> bytes:
