@@ -51,8 +51,8 @@ def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path
     allow_outside:
         Without effect: the files are named by the caller.
     depth_map:
-        A depth map; None for one within the picture (Dynamic Depth or XMP GDepth in JPEG files, an auxiliary picture in HEIF files), or
-        one beside it (:func:`depth_beside`).
+        A depth map; None for one within the picture (Dynamic Depth or XMP GDepth in JPEG files, an auxiliary picture in
+        HEIF files), or one beside it (:func:`depth_beside`).
 
     Raises
     ------
