@@ -6,6 +6,7 @@
 #   the cell data of the one that it is cut from.
 # What happens: of a PolyData with one point, one line and two triangles, three cells remain, and the cell array has
 #   five values: three that nobody wrote, then those of the triangles. PyVista warns that the mesh is not valid.
+#   The tracker knows of the case of lines alone (pyvista 8897, open).
 # Who is hurt: whoever colours triangles by cell data of a file with lines beside its faces (outlines, CAD edges,
 #   contours): colours belong to other cells, or to none.
 # Seen: "3 cells, 5 values: [0.0, 0.0, 0.0, 1.0, 2.0]"; in a longer program "[6.9e-310, 6.9e-310, 6.9e-310, 1.0, 2.0]".
