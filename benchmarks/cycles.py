@@ -316,13 +316,13 @@ class _Cut:
 
 def _traced(stage: Stage, source: Any, samples: int) -> Picture:
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.rendering.session import open_session
 
     session = open_session(stage.scene, RenderRequest(integrator="path", depth=DEPTH))
     integrator = session.integrator(source, stage.placement.display_from_world)
-    plan = make_plan(source.width, source.height, samples, channels=source.channels, memory=2 << 30)
+    plan = cut_wavefronts(source.width, source.height, samples, channels=source.channels, memory=2 << 30)
     return trace_frame(integrator, source, plan, seed=2).pixels
 
 

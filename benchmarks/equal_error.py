@@ -278,9 +278,9 @@ def trace_lit(stage: Stage, samples: int, seed: int) -> Picture:
 
 def trace_paths(stage: Stage, samples: int, seed: int) -> Picture:
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
-    plan = make_plan(stage.source.width, stage.source.height, samples, memory=4 << 30)
+    plan = cut_wavefronts(stage.source.width, stage.source.height, samples, memory=4 << 30)
     return trace_frame(stage.integrator, stage.source, plan, seed=seed).pixels
 
 

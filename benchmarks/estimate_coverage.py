@@ -110,9 +110,9 @@ class Case:
 
     def _long(self, seconds: float) -> tuple[NDArray[np.float64], int]:
         from lippmann.rendering.film.wavefront import trace_frame
-        from lippmann.rendering.film.wavefront_plan import make_plan
+        from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
-        plan = make_plan(self.source.width, self.source.height, 128, memory=MEMORY)
+        plan = cut_wavefronts(self.source.width, self.source.height, 128, memory=MEMORY)
         parts = np.zeros((REFERENCE_PARTS, self.source.height, self.source.width, 3))
         start, rounds = time.process_time(), 0
         while rounds == 0 or time.process_time() - start < seconds:

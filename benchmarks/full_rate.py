@@ -23,7 +23,7 @@ def main() -> None:
     from lippmann.device.pbr import build
     from lippmann.display import load_display
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import DisplayRays
     from lippmann.rendering.transport.scene_features import make_scene_features
@@ -35,7 +35,7 @@ def main() -> None:
     placement = place(scene.bounds, display, cameras=scene.cameras, home_camera=scene.home_camera)
     source = DisplayRays(display, placement.world_from_display)
     width, height = source.width, source.height
-    plan = make_plan(width, height, 1, memory=2**31)
+    plan = cut_wavefronts(width, height, 1, memory=2**31)
     ours = PathIntegrator(
         built.mitsuba,
         make_scene_features(

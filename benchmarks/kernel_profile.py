@@ -90,12 +90,12 @@ def _kernels(stage: Stage) -> dict[str, Any]:
 
     from lippmann.rendering.film import wavefront
     from lippmann.rendering.film.wavefront import samples_of_tile
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport import caustic_light, path, path_techniques
     from lippmann.rendering.transport.shadow_rays import ShadowRays
 
     source, paths = stage.source, stage.integrator
-    plan = make_plan(source.width, source.height, SAMPLES, memory=4 << 30)
+    plan = cut_wavefronts(source.width, source.height, SAMPLES, memory=4 << 30)
     tile, run = next(iter(plan))
 
     class Unshadowed(path.PathIntegrator):

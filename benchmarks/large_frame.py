@@ -28,7 +28,7 @@ TILES_BETWEEN = 8
 def main() -> None:
     import lippmann
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.rendering.session import open_session
     from lippmann.rendering.transport.ray_source import DisplayRays
@@ -49,7 +49,7 @@ def main() -> None:
         at = place(scene.bounds, shown, cameras=scene.cameras, home_camera=scene.home_camera)
         source = DisplayRays(shown, at.world_from_display)
         integrator = session.integrator(source, at.display_from_world)
-        frames[name] = (integrator, source, make_plan(source.width, source.height, SPP, memory=MEMORY))
+        frames[name] = (integrator, source, cut_wavefronts(source.width, source.height, SPP, memory=MEMORY))
 
     for seed in range(5):
         trace_frame(*frames["small"], seed=seed)

@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from lippmann.rendering.film.wavefront import trace_frame
-from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.transport.ray_source import DisplayRays
 
 
@@ -34,5 +34,5 @@ class PixelRays:
 def trace_pixels(session, source, integrator, columns, rows, spp, seed=991):
     """Linear radiance of pixels, ``(N, 3)``."""
     rays = PixelRays(source, columns, rows)
-    plan = make_plan(rays.width, 1, spp, channels=rays.channels, memory=session.memory)
+    plan = cut_wavefronts(rays.width, 1, spp, channels=rays.channels, memory=session.memory)
     return trace_frame(integrator, rays, plan, seed=seed, box_filter=True).pixels[0]

@@ -85,14 +85,14 @@ def tracer(path: Path, size: int, depth: int) -> Callable[[], Any]:
     """Our picture of the scene, everything but the tracing done."""
     from lippmann.device.whitted.scene import build_classic
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.whitted import WhittedIntegrator
     from lippmann.rendering.transport.whitted_camera import WhittedCameraRays
 
     scene = read_tachyon(path)
     integrator = WhittedIntegrator(build_classic(scene), depth)
     source = WhittedCameraRays(scene.camera, scene.handedness, size, size)
-    plan = make_plan(size, size, 1, memory=2**32)
+    plan = cut_wavefronts(size, size, 1, memory=2**32)
     return lambda: trace_frame(integrator, source, plan, box_filter=False)
 
 

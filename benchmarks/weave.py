@@ -84,9 +84,9 @@ def _measure(name: str, reference: int) -> tuple[dict[str, Any], list[Picture]]:
 
     def traced(source: Any, samples: int, seed: int) -> tuple[Picture, float]:
         from lippmann.rendering.film.wavefront import trace_frame
-        from lippmann.rendering.film.wavefront_plan import make_plan
+        from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
-        plan = make_plan(source.width, source.height, samples, channels=source.channels, memory=4 << 30)
+        plan = cut_wavefronts(source.width, source.height, samples, channels=source.channels, memory=4 << 30)
         started = time.perf_counter()
         pixels = trace_frame(integrator, source, plan, seed=seed).pixels
         return pixels, time.perf_counter() - started

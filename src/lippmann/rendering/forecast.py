@@ -19,7 +19,7 @@ from lippmann.display.view_cone import FUSED_CONE, depth_gain_of_fused_cone, vie
 from lippmann.optics.lens import lens_notes
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film import memory_model
-from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.picture import traced_window
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.preconditions import why_no_estimate
@@ -221,7 +221,9 @@ def _plan(
     else:
         place = f"{window.width}x{window.height} pixels at {window.left},{window.top}"
         traced = {"value": place, "reason": "no others see the scene's box; the background is of one colour"}
-    waves = make_plan(source.width, source.height, request.samples, channels=source.channels, memory=session.memory)
+    waves = cut_wavefronts(
+        source.width, source.height, request.samples, channels=source.channels, memory=session.memory
+    )
     number = len(waves.tiles) * len(waves.passes)
     reason = f"up to {waves.lanes} samples each, as the memory and the caches hold"
     return {**plan, "window": traced, "wavefronts": {"value": number, "reason": reason}}
@@ -351,7 +353,7 @@ def _working_bytes(source: DisplayRays | WindowRays, session: Session) -> int:
 
     request, limit = session.request, session.memory
     pixels = source.width * source.height * (3 if request.keeps_colors(source.display) else 1)
-    lanes = make_plan(source.width, source.height, request.samples, channels=source.channels, memory=limit).lanes
+    lanes = cut_wavefronts(source.width, source.height, request.samples, channels=source.channels, memory=limit).lanes
     wave = lanes * memory_model.BYTES_PER_LANE
     if why_no_estimate(request) is not None:
         kept = 0

@@ -26,7 +26,7 @@ from lippmann.rendering.estimate.pixel_errors import PixelErrors
 from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts, PictureEstimator
 from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
 from lippmann.rendering.film.wavefront import Frame, RayTotals, trace_frame
-from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.job import Job, Traced
 from lippmann.rendering.light_statements import is_among_mirrors
 from lippmann.rendering.reprojection.common.point_image import STATUS_LAYER, TRACED
@@ -89,7 +89,9 @@ def _samples_of_pixels(traced: Traced) -> NDArray[np.uint32]:
 def _one_stream(job: Job, why: str) -> Traced:
     """All samples in one stream: nothing is known of the error."""
     request, source = job.request, job.traced
-    plan = make_plan(source.width, source.height, request.samples, channels=source.channels, memory=job.session.memory)
+    plan = cut_wavefronts(
+        source.width, source.height, request.samples, channels=source.channels, memory=job.session.memory
+    )
     frame = trace_frame(
         job.integrator,
         source,

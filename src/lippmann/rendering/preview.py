@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lippmann.image import Provenance
 from lippmann.progress import ProgressCallback, silent
-from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session
@@ -60,7 +60,7 @@ def render_preview(
     session.face_viewer(remove_scale(pose))
     frame_from_world = np.linalg.inv(np.asarray(pose.world_from_camera, dtype=np.float64))
     integrator = session.integrator(source, frame_from_world, pose.exposure)
-    plan = make_plan(*size, request.samples, memory=session.memory)
+    plan = cut_wavefronts(*size, request.samples, memory=session.memory)
     frame = trace_frame(integrator, source, plan, seed=request.seed, box_filter=request.box_filter, progress=progress)
     options = {"pixel_filter": request.pixel_filter, "camera": pose.name}
     return Preview(request.shown(frame.pixels), session.provenance(frame, samples=request.samples, options=options))

@@ -26,7 +26,7 @@ from lippmann.options.quality import QualityOptions
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.estimate.psnr import Estimate
-from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.light_statements import light_notes, stated_error
 from lippmann.rendering.request.plan import follow
 from lippmann.rendering.request.region_of_interest import even_background
@@ -358,7 +358,7 @@ def open_session(
     watch = Stopwatch(progress)
     memory = memory or memory_limit(request)
     if size is not None:
-        make_plan(*size, 1, channels=request.channels, memory=memory)
+        cut_wavefronts(*size, 1, channels=request.channels, memory=memory)
     if request.denoises:
         load_denoiser()
     engine = watch.stage("load", lambda: engines.start(request.device, request.threads))

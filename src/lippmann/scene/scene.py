@@ -197,6 +197,13 @@ class Scene:
         return self.has_splats or self.has_volume
 
     @property
+    def is_off_surfaces_alone(self) -> bool:
+        """Whether splats or a volume are all there is: their light has no noise."""
+        description = self.description
+        has_surfaces = not isinstance(description, SceneDescription) or bool(description.placements)
+        return self.lies_off_surfaces and not has_surfaces
+
+    @property
     def in_studio(self) -> bool:
         """Whether the built-in studio lights the scene, for want of other light."""
         return self.studio and not self.has_lights

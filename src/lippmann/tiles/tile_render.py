@@ -19,7 +19,7 @@ from lippmann.rendering.estimate.pixel_errors import ErrorSums, PixelErrors
 from lippmann.rendering.estimate.psnr import ERROR_LAYER
 from lippmann.rendering.film.sample_batches import FullInBatches
 from lippmann.rendering.film.wavefront import RayTotals, trace_frame
-from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.job import Job
 from lippmann.rendering.methods import SAMPLES_LAYER, trace
 from lippmann.rendering.request.preconditions import why_no_estimate
@@ -116,7 +116,7 @@ def trace_tile(prepared: Prepared, index: int) -> TracedTile:
         return _trace_window(prepared, index)
     window = job.grid[index]
     if prepared.no_estimate is not None:
-        plan = make_plan(
+        plan = cut_wavefronts(
             window.width,
             window.height,
             request.samples,

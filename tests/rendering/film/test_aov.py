@@ -128,7 +128,7 @@ def test_ball_and_wall_are_where_they_stand():
 def test_layers_do_not_depend_on_tiles():
     built = of_mitsuba(ball_and_wall())
     from lippmann.rendering.film.aov import plan_layers
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.ray_source import DisplayRays
 
     source = DisplayRays(DISPLAY, WORLD_FROM_DISPLAY)
@@ -137,7 +137,7 @@ def test_layers_do_not_depend_on_tiles():
     from lippmann.rendering.film.aov import trace_layers
 
     for rows in (1, 7):
-        plan = make_plan(48, 30, 1, memory=2**30, preferred_lanes=48 * rows)
+        plan = cut_wavefronts(48, 30, 1, memory=2**30, preferred_lanes=48 * rows)
         assert len(plan.tiles) > 3
         parts = trace_layers(built, source, plan, DISPLAY_FROM_WORLD)
         for name, values in whole.items():
@@ -306,13 +306,13 @@ def test_guides_average_over_the_pixel():
 @pytest.mark.long
 def test_guides_do_not_depend_on_tiles_and_passes():
     from lippmann.rendering.film.feature_buffers import trace_guides
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.ray_source import DisplayRays
 
     built = of_mitsuba(ball_and_wall())
     source = DisplayRays(DISPLAY, WORLD_FROM_DISPLAY)
     whole = guided(built, samples=8)
-    plan = make_plan(48, 30, 8, memory=2**30, preferred_lanes=48 * 2)
+    plan = cut_wavefronts(48, 30, 8, memory=2**30, preferred_lanes=48 * 2)
     assert len(plan.tiles) > 1
     assert len(plan.passes) > 1
     parts = trace_guides(built, source, plan, DISPLAY_FROM_WORLD, seed=3)

@@ -95,7 +95,7 @@ def test_sub_pixels_have_their_own(session, truth):
 
 def test_parts_and_one_stream_have_that_of_the_whole(session, truth):
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
     window = PixelWindow(20, 10, 40, 30)
     whole = batches(session, rays(), 5).coverage_halves()
@@ -103,7 +103,7 @@ def test_parts_and_one_stream_have_that_of_the_whole(session, truth):
     for half, cut in zip(whole, part, strict=True):
         assert half.samples == cut.samples
         assert np.array_equal(half.share[10:40, 20:60], cut.share)
-    plan = make_plan(96, 64, 4, memory=1 << 28)
+    plan = cut_wavefronts(96, 64, 4, memory=1 << 28)
     integrator = session.integrator(rays(), np.eye(4))
     frame = trace_frame(integrator, rays(), plan, seed=3, for_denoiser=True)
     assert frame.coverage.samples == 4

@@ -130,9 +130,9 @@ def test_the_mean_is_that_of_full_and_the_error_what_it_says(integrator, subpixe
     from lippmann.color.transfer import encode_srgb
     from lippmann.rendering.estimate.psnr import PictureEstimator
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
-    plan = make_plan(SIZE, SIZE, 768, channels=3 if subpixels else 1, memory=2**30)
+    plan = cut_wavefronts(SIZE, SIZE, 768, channels=3 if subpixels else 1, memory=2**30)
     reference = encode_srgb(trace_frame(integrator, rays(subpixels), plan, seed=77).pixels)
     estimator = PictureEstimator(SHOWN)
     renderer = batches(integrator, subpixels=subpixels)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from lippmann.errors import MemoryLimitError
 from lippmann.rendering.film.memory_model import BYTES_PER_LANE, PICTURE, preferred_lanes
-from lippmann.rendering.film.wavefront_plan import cut_batches, equal_length, make_plan
+from lippmann.rendering.film.wavefront_plan import cut_batches, cut_wavefronts, equal_length
 
 
 @settings(deadline=None, max_examples=60)
@@ -17,7 +17,7 @@ from lippmann.rendering.film.wavefront_plan import cut_batches, equal_length, ma
 )
 def test_every_sample_once_and_within_memory(width, height, samples, channels, memory):
     try:
-        plan = make_plan(width, height, samples, channels=channels, memory=memory)
+        plan = cut_wavefronts(width, height, samples, channels=channels, memory=memory)
     except MemoryLimitError:
         least = max(width * channels, min(1 << 14, width * channels * height * samples))
         assert memory - width * height * PICTURE < least * BYTES_PER_LANE
@@ -34,19 +34,19 @@ def test_every_sample_once_and_within_memory(width, height, samples, channels, m
 
 
 def test_a_small_picture_is_one_wavefront():
-    plan = make_plan(512, 512, 1, memory=2**31)
+    plan = cut_wavefronts(512, 512, 1, memory=2**31)
     assert len(plan.tiles) == len(plan.passes) == 1
 
 
 def test_an_8k_picture_of_four_samples_fits_two_gigabytes():
-    plan = make_plan(7680, 4320, 4, memory=2 * 2**30)
+    plan = cut_wavefronts(7680, 4320, 4, memory=2 * 2**30)
     assert plan.samples_per_pass == 4
     assert preferred_lanes() // 2 <= plan.lanes <= preferred_lanes()
 
 
 def test_too_little_memory_says_how_much_is_needed():
     with pytest.raises(MemoryLimitError, match=r"memory: .* too small .* it needs \d+ MiB; raise the limit"):
-        make_plan(4096, 4096, 1, memory=2**20)
+        cut_wavefronts(4096, 4096, 1, memory=2**20)
 
 
 @given(total=st.integers(1, 10**6), most=st.integers(-3, 10**6))

@@ -30,11 +30,11 @@ class Case:
     def full(self, samples=1):
         from lippmann.rendering.film.sample_batches import trace_in_batches
         from lippmann.rendering.film.wavefront import trace_frame
-        from lippmann.rendering.film.wavefront_plan import make_plan
+        from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
         if samples > 1:
             return trace_in_batches(self.integrator, self.source, samples, memory=1 << 30)[0]
-        plan = make_plan(self.source.width, self.source.height, samples, memory=1 << 30)
+        plan = cut_wavefronts(self.source.width, self.source.height, samples, memory=1 << 30)
         return trace_frame(self.integrator, self.source, plan, box_filter=False)
 
     def reused(self, method="lens-view", careful=True, samples=1, **others):

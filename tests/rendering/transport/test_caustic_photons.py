@@ -154,7 +154,7 @@ def traced(scene_dict, view, *, photons, size=24, spp=64, seed=0, depth=6, sampl
     import mitsuba as mi
 
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.casters import find_casters
     from lippmann.rendering.transport.caustic_photons import CausticPhotons
     from lippmann.rendering.transport.path import PathIntegrator
@@ -167,7 +167,7 @@ def traced(scene_dict, view, *, photons, size=24, spp=64, seed=0, depth=6, sampl
     if photons:
         photons = CausticPhotons(scene, features, find_casters(scene), samples=samples, seed=seed)
         integrator = integrator.lit_with(photons=photons.of_pass(0))
-    plan = make_plan(size, size, spp, memory=2**31)
+    plan = cut_wavefronts(size, size, spp, memory=2**31)
     return trace_frame(integrator, CameraRays(view, size, size), plan, seed=seed).pixels
 
 

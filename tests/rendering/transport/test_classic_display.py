@@ -73,14 +73,14 @@ def test_the_picture_does_not_depend_on_how_it_was_cut(corners):
 
     from lippmann.device.whitted.scene import build_classic
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.whitted import WhittedIntegrator
     from lippmann.rendering.transport.whitted_camera import WhittedCameraRays
 
     scene = api.load_scene(corners).classic
     integrator = WhittedIntegrator(build_classic(scene), 3)
     source = WhittedCameraRays(scene.camera, scene.handedness, 40, 30)
-    plan = make_plan(40, 30, 4, memory=2**30)
+    plan = cut_wavefronts(40, 30, 4, memory=2**30)
     cut = replace(plan, rows_per_tile=7, samples_per_pass=1)
     whole, parts = (trace_frame(integrator, source, each) for each in (plan, cut))
     np.testing.assert_allclose(whole.pixels, parts.pixels, atol=1e-6)

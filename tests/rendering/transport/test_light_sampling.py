@@ -55,9 +55,9 @@ def stage(scene, depth=3):
 
 def picture(integrator, source, samples, seed):
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
-    return trace_frame(integrator, source, make_plan(SIZE, SIZE, samples, memory=2**31), seed=seed).pixels
+    return trace_frame(integrator, source, cut_wavefronts(SIZE, SIZE, samples, memory=2**31), seed=seed).pixels
 
 
 def sampling_weights(scene):
@@ -315,9 +315,9 @@ def test_two_renders_of_one_scene_leave_each_other_alone(engine):
 
     def traced(session, integrator, source):
         from lippmann.rendering.film.wavefront import trace_frame
-        from lippmann.rendering.film.wavefront_plan import make_plan
+        from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
-        plan = make_plan(SIZE, SIZE, 2, memory=session.memory)
+        plan = cut_wavefronts(SIZE, SIZE, 2, memory=session.memory)
         return trace_frame(integrator, source, plan, seed=request.seed).pixels.tobytes()
 
     places = (-0.9, 0.9)

@@ -119,9 +119,9 @@ def passes(integrator, seed):
 
 def pictures(integrator, source, joined, *, seeds, spp=8):
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
-    plan = make_plan(SIDE, SIDE, spp, memory=2**30)
+    plan = cut_wavefronts(SIDE, SIDE, spp, memory=2**30)
     found = []
     for seed in seeds:
         lit = integrator.lit_with(light_vertices=passes(integrator, seed).of_pass(0) if joined else None)

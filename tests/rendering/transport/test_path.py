@@ -22,7 +22,7 @@ def trace(scene_dict, cam, size=32, spp=64, depth=6, seed=0, background=None, ab
     import mitsuba as mi
 
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
     from lippmann.rendering.transport.scene_features import make_scene_features
@@ -31,7 +31,9 @@ def trace(scene_dict, cam, size=32, spp=64, depth=6, seed=0, background=None, ab
     has_null = "mask" in str(scene_dict)
     features = make_scene_features(scene, background=background, has_null=has_null, absorption=absorption)
     integrator = PathIntegrator(scene, features, depth)
-    return trace_frame(integrator, CameraRays(cam, size, size), make_plan(size, size, spp, memory=2**31), seed=seed)
+    return trace_frame(
+        integrator, CameraRays(cam, size, size), cut_wavefronts(size, size, spp, memory=2**31), seed=seed
+    )
 
 
 def mitsuba_reference(scene_dict, cam, size, spp, depth, seed):
@@ -187,7 +189,7 @@ def test_roulette_changes_no_mean():
     import mitsuba as mi
 
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
     from lippmann.rendering.transport.scene_features import make_scene_features
@@ -204,7 +206,7 @@ def test_roulette_changes_no_mean():
     integrator = PathIntegrator(scene, make_scene_features(scene), depth)
     source = CameraRays(Camera("inside", np.eye(4), fov_y=1.0), 16, 16)
     frames = [
-        trace_frame(integrator, source, make_plan(16, 16, 256, memory=2**30), seed=seed).pixels.mean()
+        trace_frame(integrator, source, cut_wavefronts(16, 16, 256, memory=2**30), seed=seed).pixels.mean()
         for seed in range(8)
     ]
     expected = sum(albedo**k for k in range(depth + 1))

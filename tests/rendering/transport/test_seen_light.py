@@ -93,10 +93,10 @@ def chained(integrator, chains):
 
 def pictures(integrator, source, chains, *, seeds, spp=8):
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
     integrator = chained(integrator, chains)
-    plan = make_plan(SIDE, SIDE, spp, memory=2**30)
+    plan = cut_wavefronts(SIDE, SIDE, spp, memory=2**30)
     return np.stack([trace_frame(integrator, source, plan, seed=seed).pixels for seed in seeds]).astype(np.float64)
 
 
@@ -271,14 +271,14 @@ def test_seen_light_is_told_apart_and_is_all_that_is_seen(all_events):
 
     from lippmann.rendering.film.sample_batches import FullInBatches
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
     integrator, source = all_events
     integrator = chained(integrator, 4)
     both = [FullInBatches(integrator, source, seed=5, memory=1 << 30, for_denoiser=keeps) for keeps in (True, False)]
     for batches in both:
         batches.add(16)
-    frame = trace_frame(integrator, source, make_plan(SIDE, SIDE, 16, memory=2**30), seed=5, for_denoiser=True)
+    frame = trace_frame(integrator, source, cut_wavefronts(SIDE, SIDE, 16, memory=2**30), seed=5, for_denoiser=True)
     picture, seen, halves = both[0].picture(), both[0].seen(), both[0].seen_halves()
     assert np.array_equal(picture, both[1].picture())
     assert both[1].seen() is None
@@ -337,7 +337,7 @@ def test_of_many_chains_each_counts_as_a_whole(all_events):
 
     from lippmann.rendering.film.sample_batches import FullInBatches
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.seen_light import most_of_chain
 
     assert 5 < most_of_chain(8.0) < 6
@@ -351,7 +351,7 @@ def test_of_many_chains_each_counts_as_a_whole(all_events):
         each.add(2)
     many.add(16)
     limited.add(2)
-    frame = trace_frame(dim, source, make_plan(SIDE, SIDE, 2, memory=2**30), seed=5, for_denoiser=True)
+    frame = trace_frame(dim, source, cut_wavefronts(SIDE, SIDE, 2, memory=2**30), seed=5, for_denoiser=True)
     assert FullInBatches(integrator, source, memory=1 << 30).excess() is None
     assert many.excess().max() == 0
     assert limited.excess().max() == frame.excess.max() == 0  # the gain leaves less than 5.7
@@ -368,7 +368,7 @@ def test_sky_at_outlines_stays_with_paths(engine):
     import mitsuba as mi
 
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
     from lippmann.rendering.transport.scene_features import make_scene_features
@@ -385,7 +385,7 @@ def test_sky_at_outlines_stays_with_paths(engine):
     pose = np.eye(4)
     pose[2, 3] = 3.0
     source = CameraRays(Camera("eye", pose, fov_y=0.6), SIDE, SIDE)
-    plan = make_plan(SIDE, SIDE, 4, memory=2**30)
+    plan = cut_wavefronts(SIDE, SIDE, 4, memory=2**30)
     plain = trace_frame(integrator, source, plan, for_denoiser=True)
     further = trace_frame(chained(integrator, 4), source, plan, for_denoiser=True)
     assert plain.seen is None

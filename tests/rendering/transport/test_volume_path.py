@@ -76,12 +76,12 @@ def fog_room(medium, distance=4.0):
 
 def trace(scene, camera, spp, depth=DEPTH, seed=0):
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.ray_source import CameraRays
     from lippmann.rendering.transport.volume_path import VolumePathIntegrator
 
     integrator = VolumePathIntegrator(scene, depth)
-    plan = make_plan(SIZE, SIZE, spp, memory=2**31)
+    plan = cut_wavefronts(SIZE, SIZE, spp, memory=2**31)
     return trace_frame(integrator, CameraRays(camera, SIZE, SIZE), plan, seed=seed).pixels
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lippmann.rendering.denoise.cost_model import effort_of, traced_work
 from lippmann.rendering.denoise.oidn import Effort
 from lippmann.rendering.film.wavefront import trace_frame
-from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.preparation.scattered_rays import ScatteredRays
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.integrator import Integrator
@@ -42,7 +42,7 @@ def survey(integrator: Integrator, source: DisplayRays, request: RenderRequest) 
     """What suits the picture as a whole: the same for the same picture, whoever looks."""
     few, box = ScatteredRays(source, SIDE), request.box_filter
     samples = min(request.samples, SAMPLES) if box else 1
-    plan = make_plan(few.width, few.height, samples, channels=few.channels, memory=MEMORY)
+    plan = cut_wavefronts(few.width, few.height, samples, channels=few.channels, memory=MEMORY)
     frame = trace_frame(integrator, few, plan, seed=request.seed, box_filter=box)
     rays = traced_work(frame.rays.primary, frame.rays.shadow, frame.rays.secondary)
     # What is denoised: pixels, or sub-pixels.

@@ -17,7 +17,7 @@ from lippmann.device.kernel_ops import divide
 from lippmann.device.types import Float, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.memory_model import AOVS
-from lippmann.rendering.film.wavefront_plan import Plan, Tile, make_plan
+from lippmann.rendering.film.wavefront_plan import Plan, Tile, cut_wavefronts
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.scene.matrices import normal_matrix
@@ -44,7 +44,7 @@ def plan_layers(source: RaySource, memory: int) -> Plan:
         If that is too little for one row.
     """
     kept = source.width * source.height * AOVS
-    return make_plan(source.width, source.height, 1, memory=memory, kept=kept)
+    return cut_wavefronts(source.width, source.height, 1, memory=memory, kept=kept)
 
 
 def trace_layers(

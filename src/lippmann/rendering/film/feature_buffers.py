@@ -17,7 +17,7 @@ from lippmann.rendering.film.coverage import Coverage
 from lippmann.rendering.film.lane_order import to_rows
 from lippmann.rendering.film.memory_model import FEATURE_BUFFERS
 from lippmann.rendering.film.wavefront import samples_of_tile
-from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile, make_plan
+from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile, cut_wavefronts
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.scene.matrices import inverse, rotation_of
@@ -28,14 +28,8 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float32]
 
-#: Samples of a pixel: fewer leave steps in the guides where edges cross it, more gain nothing.
-LEAST_SAMPLES, MOST_SAMPLES = 8, 16
-
 #: Heights beyond this many millimetres count as lying there: light lines of all lenses are parallel for them.
 _FARTHEST = 1e5
-
-#: Added to the albedo.
-_LEAST_ALBEDO = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +51,7 @@ class Guides:
 
         The albedo, and a little more: black surfaces that shine have light, too.
         """
-        return np.asarray(np.clip(self.albedo, 0, 1) + np.float32(_LEAST_ALBEDO), dtype=np.float32)
+        return np.asarray(np.clip(self.albedo, 0, 1) + np.float32(0.02), dtype=np.float32)
 
 
 def plan_guides(source: RaySource, samples: int, memory: int) -> Plan:
@@ -69,8 +63,7 @@ def plan_guides(source: RaySource, samples: int, memory: int) -> Plan:
         If that is too little for one row.
     """
     kept = source.width * source.height * FEATURE_BUFFERS
-    samples = min(max(samples, LEAST_SAMPLES), MOST_SAMPLES)
-    return make_plan(source.width, source.height, samples, channels=source.channels, memory=memory, kept=kept)
+    return cut_wavefronts(source.width, source.height, samples, channels=source.channels, memory=memory, kept=kept)
 
 
 def trace_guides(

@@ -90,67 +90,30 @@ def trace_frame(
     """
     frame = Frame(np.zeros((plan.height, plan.width, 3), dtype=np.float32))
     parts = {"radiance": frame.pixels}
-    tracer = _Tracer(integrator, source, plan, seed, box_filter, corner, for_denoiser)
     started = time.perf_counter()
     done = 0
     for tile, run in plan:
-        first = done == 0
-        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, first):
-            sums = tracer.trace(tile, run, frame.rays)
-            if first:
+        lanes = tile.rows * plan.width * plan.channels * run.count
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, done == 0):
+            pixels, stream = samples_of_tile(source, plan, tile, run, seed, box_filter, corner)
+            samples = dr.opaque(mi.Float, plan.samples) if for_denoiser else None
+            sample = sample_pixels(integrator, pixels, stream, samples)
+            evaluate(sample, lanes, frame.rays)
+            sums = sums_of(sample, plan.channels, 1, run.count)
+            if done == 0:
                 frame.seconds_compile = compile_seconds()
-        for name, part in sums.items():
+        for name, values in sums.items():
+            part = values[:, 0] * np.float32(1 / plan.samples)
             if name not in parts:
                 parts[name] = np.zeros((plan.height, plan.width, part.shape[1]), dtype=np.float32)
-            part *= 1 / plan.samples
             in_rows = to_rows(part, plan.width).reshape(tile.rows, plan.width, -1)
             parts[name][tile.first_row : tile.first_row + tile.rows] += in_rows
-        done += tile.rows * plan.width * plan.channels * run.count
+        done += lanes
         progress(Progress("trace", done, plan.work))
     frame.seen, frame.excess = parts.get("seen"), parts.get("excess")
     frame.coverage = Coverage(parts["covered"], plan.samples) if "covered" in parts else None
     frame.seconds_trace = time.perf_counter() - started - frame.seconds_compile
     return frame
-
-
-class _Tracer:
-    """Traces the wavefronts of one plan.
-
-    Lanes are ordered pixel (see :mod:`.lane_order`), then channel, then sample. Whatever differs from tile to tile is
-    opaque to the compiler, so that all tiles run the same kernel.
-    """
-
-    def __init__(
-        self,
-        integrator: Integrator,
-        source: RaySource,
-        plan: Plan,
-        seed: int,
-        box_filter: bool,
-        corner: tuple[int, int],
-        for_denoiser: bool,
-    ) -> None:
-        self._integrator = integrator
-        self._source = source
-        self._plan = plan
-        self._seed = seed
-        self._box_filter = box_filter
-        self._corner = corner
-        self._for_denoiser = for_denoiser
-
-    def trace(self, tile: Tile, run: Pass, totals: RayTotals) -> dict[str, NDArray[np.float32]]:
-        """Sums over the samples of one pass, by the names of :class:`PixelSample`, in the order of lanes.
-
-        They are ``(pixels of the tile, 3)``; of coverage ``(pixels of the tile, channels)``. ``totals`` grows by the
-        rays it took.
-        """
-        plan = self._plan
-        pixels, stream = samples_of_tile(self._source, plan, tile, run, self._seed, self._box_filter, self._corner)
-        samples = dr.opaque(mi.Float, plan.samples) if self._for_denoiser else None
-        sample = sample_pixels(self._integrator, pixels, stream, samples)
-        evaluate(sample, tile.rows * plan.width * plan.channels * run.count, totals)
-        sums = sums_of(sample, plan.channels, 1, run.count)
-        return {name: np.ascontiguousarray(values[:, 0]) for name, values in sums.items()}
 
 
 def samples_of_tile(
@@ -165,7 +128,8 @@ def samples_of_tile(
     """The pixels and sample streams of one wavefront, lanes ordered pixel (see :mod:`.lane_order`), then channel, then
     sample.
 
-    ``corner``: row and column at which the part of the picture begins that ``plan`` is of.
+    ``corner``: row and column at which the part of the picture begins that ``plan`` is of. Whatever differs from tile
+    to tile is opaque to the compiler, so that all tiles run the same kernel.
     """
     lanes = tile.rows * plan.width * plan.channels * run.count
     per_channel, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))

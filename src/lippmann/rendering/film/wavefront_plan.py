@@ -82,7 +82,7 @@ class Plan:
         return ((tile, run) for tile in self.tiles for run in self.passes)
 
 
-def make_plan(
+def cut_wavefronts(
     width: int,
     height: int,
     samples: int,

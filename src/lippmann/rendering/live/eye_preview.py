@@ -12,7 +12,7 @@ from lippmann.display import Display
 from lippmann.options.choices import LIGHT, POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import denoise, load_denoiser
-from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.live.develop import arrange
 from lippmann.rendering.live.seen_pixels import EyeMap, Vector
 from lippmann.rendering.picture import placed_options
@@ -75,7 +75,7 @@ def render_eye_preview(
     source = SinglePixelRays(whole, seen.column, seen.row, seen.channel)
     samples = _choose_samples(request, resolved, source.width)
     integrator = session.integrator(whole, placement.display_from_world, placement.exposure)
-    plan = make_plan(source.width, 1, samples, memory=session.memory)
+    plan = cut_wavefronts(source.width, 1, samples, memory=session.memory)
     frame = trace_frame(integrator, source, plan, seed=resolved.seed, box_filter=resolved.box_filter, progress=progress)
     picture = arrange(frame.pixels[0], seen)
     # Where lenses are larger than the picture's pixels, it is made of blocks, which the denoiser has never seen.
@@ -87,7 +87,7 @@ def render_eye_preview(
         guides = trace_guides(
             session.built,
             source,
-            make_plan(source.width, 1, 1, memory=session.memory),
+            cut_wavefronts(source.width, 1, 1, memory=session.memory),
             placement.display_from_world,
             seed=resolved.seed + 1,
             box_filter=resolved.box_filter,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.rendering.film.wavefront import trace_frame
-from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.preparation.scattered_rays import ScatteredRays
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.transport.integrator import Integrator
@@ -48,7 +48,7 @@ def measure_exposure(integrator: Integrator, source: RaySource, background: Colo
         What rays see that meet nothing, which is not counted; None for an environment, which is.
     """
     few = ScatteredRays(source, TUNING.exposure_side)
-    plan = make_plan(
+    plan = cut_wavefronts(
         few.width, few.height, TUNING.exposure_samples, channels=few.channels, memory=TUNING.exposure_memory
     )
 

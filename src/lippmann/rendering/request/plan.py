@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypeVar
 
 from lippmann.display import Display
 from lippmann.errors import UsageError
 from lippmann.options.choices import (
+    ASKED,
     LIGHT,
     POOLED_LIGHT,
     REUSING,
@@ -27,12 +28,12 @@ from lippmann.options.choices import (
 )
 from lippmann.options.forms import Form
 from lippmann.options.light import LightOptions
-from lippmann.rendering.request.off_surface_request import check_off_surfaces
-from lippmann.rendering.request.preconditions import check
+from lippmann.rendering.request.preconditions import check, check_off_surfaces
 from lippmann.rendering.request.render_plan import Choice, RenderPlan
 from lippmann.rendering.request.render_request import DEFAULT_DEPTH, DEFAULT_SPP, RenderRequest
 from lippmann.scene.scene import Scene
-from lippmann.scene.values.description import SceneDescription
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -229,25 +230,19 @@ class _Facts:
         return self.shows_own_colors and self.scene.fills_panel and is_plain
 
     @property
-    def off_surfaces_alone(self) -> bool:
-        """Whether splats or a volume are all there is: their light has no noise."""
-        description = self.scene.description
-        is_alone = isinstance(description, SceneDescription) and not description.placements
-        return self.scene.lies_off_surfaces and is_alone
-
-    @property
     def is_one_ray(self) -> bool:
         """Whether one ray through each pixel's middle shows the scene."""
         request = self.request
-        is_exact = self.is_photograph or self.off_surfaces_alone
+        is_exact = self.is_photograph or self.scene.is_off_surfaces_alone
         return is_exact and (request.spp in (None, 1) or self.is_draft) and not request.is_open_ended
 
 
+def _first(*rules: tuple[bool, T, str]) -> Choice[T]:
+    """The choice of the first rule that holds: whether it does, the value, and the reason."""
+    return next(Choice(value, reason) for holds, value, reason in rules if holds)
+
+
 def _integrator(request: RenderRequest, scene: Scene) -> Choice[Integrator]:
-    if request.integrator == "auto":
-        if scene.is_classic:
-            return Choice("classic", "the scene was made for the classic light models")
-        return Choice("path", "all light")
     if request.integrator == "classic" and scene.classic is None:
         raise UsageError(
             f"'{scene.name}' has no form for the classic light models",
@@ -255,7 +250,11 @@ def _integrator(request: RenderRequest, scene: Scene) -> Choice[Integrator]:
             rule="classic is for Tachyon (.dat) and NFF files and the bundled scenes",
             fix='use integrator="path"',
         )
-    return Choice(request.integrator)
+    return _first(
+        (request.integrator != "auto", request.integrator, ASKED),
+        (scene.is_classic, "classic", "the scene was made for the classic light models"),
+        (True, "path", "all light"),
+    )
 
 
 def _depth(request: RenderRequest, scene: Scene, integrator: Integrator) -> Choice[int]:
@@ -274,139 +273,132 @@ def _depth(request: RenderRequest, scene: Scene, integrator: Integrator) -> Choi
 
 
 def _method(facts: _Facts) -> Choice[Method]:
-    request, scene = facts.request, facts.scene
-    if scene.lies_off_surfaces and request.method == "auto":
-        if facts.off_surfaces_alone:
-            return Choice("full", f"{'splats' if scene.has_splats else 'volumes'} have no noise")
-        return Choice("full", f"{'splats' if scene.has_splats else 'a volume'}, whose light lies on no surface")
-    if request.method != "auto":
-        return Choice(request.method)
-    if facts.is_photograph:
-        return Choice("full", "a photograph has no noise")
-    if facts.is_denoised_draft:
-        return Choice("full", "a draft, denoised")  # sharing takes a while for 0.4 dB
-    if request.denoise != "auto":
-        kind = "without denoising" if request.denoise == "none" else f"with denoise {request.denoise}"
-        return Choice("full", f"{kind}, as asked for")
-    if facts.integrator not in LIGHT:
-        return Choice("full", f"{facts.integrator} has no noise")
-    if not facts.is_pooled_light:
-        return Choice("full", f"the light of {facts.integrator} is not pooled")
-    if facts.form == "preview":
-        return Choice("full", "a plain picture has no micro-images to share light")
-    return Choice("pooled", "light shared between micro-images")
+    request, scene, name = facts.request, facts.scene, facts.integrator
+    kind, kinds = ("splats", "splats") if scene.has_splats else ("a volume", "volumes")
+    denoising = "without denoising" if request.denoise == "none" else f"with denoise {request.denoise}"
+    return _first(
+        (request.method != "auto", request.method, ASKED),
+        (scene.is_off_surfaces_alone, "full", f"{kinds} have no noise"),
+        (scene.lies_off_surfaces, "full", f"{kind}, whose light lies on no surface"),
+        (facts.is_photograph, "full", "a photograph has no noise"),
+        (facts.is_denoised_draft, "full", "a draft, denoised"),  # sharing takes a while for 0.4 dB
+        (request.denoise != "auto", "full", f"{denoising}, as asked for"),
+        (name not in LIGHT, "full", f"{name} has no noise"),
+        (not facts.is_pooled_light, "full", f"the light of {name} is not pooled"),
+        (facts.form == "preview", "full", "a plain picture has no micro-images to share light"),
+        (True, "pooled", "light shared between micro-images"),
+    )
 
 
 def _denoise(facts: _Facts, method: Choice[Method]) -> Choice[Denoiser]:
     request = facts.request
-    if facts.scene.lies_off_surfaces:
-        return Choice("none", "light that lies on no surface is not denoised")
-    if request.denoise != "auto":
-        return Choice(request.denoise)
-    if facts.is_denoised_draft and request.method in ("auto", "pooled"):
-        return Choice("oidn-fast", "a draft")
-    if method.value == "pooled":
-        return Choice("oidn", "pooled light is denoised, with the effort that its rays are worth")
-    return Choice("none", "full rendering for references" if request.method == "full" else method.reason)
+    is_draft = facts.is_denoised_draft and request.method in ("auto", "pooled")
+    return _first(
+        (facts.scene.lies_off_surfaces, "none", "light that lies on no surface is not denoised"),
+        (request.denoise != "auto", request.denoise, ASKED),
+        (is_draft, "oidn-fast", "a draft"),
+        (method.value == "pooled", "oidn", "pooled light is denoised, with the effort that its rays are worth"),
+        (request.method == "full", "none", "full rendering for references"),
+        (True, "none", method.reason),
+    )
 
 
 def _subpixels(facts: _Facts, method: Method, display: Display | None) -> Choice[bool]:
-    if facts.request.subpixels is not None:
-        return Choice(facts.request.subpixels)
-    if display is None or not display.has_slanted_stripes:
-        return Choice(False, "sub-pixels of a pixel see the same direction")
-    if facts.integrator not in LIGHT or method in REUSING:
-        return Choice(False, "whole pixels are traced")
-    return Choice(True, "behind a slanted sheet each sub-pixel has a direction of its own")
+    asked = facts.request.subpixels
+    is_slanted = display is not None and display.has_slanted_stripes
+    is_whole = facts.integrator not in LIGHT or method in REUSING
+    return _first(
+        (asked is not None, bool(asked), ASKED),
+        (not is_slanted, False, "sub-pixels of a pixel see the same direction"),
+        (is_whole, False, "whole pixels are traced"),
+        (True, True, "behind a slanted sheet each sub-pixel has a direction of its own"),
+    )
 
 
 def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None) -> Choice[int | None]:
     request, classic = facts.request, facts.scene.classic
-    if facts.is_draft:
-        return Choice(1, "a draft")
-    if request.spp is not None:
-        return Choice(request.spp)
-    if request.is_open_ended:
-        return Choice(None, "as many as the goal takes")
-    if facts.is_one_ray:
-        return Choice(1, "one ray through each pixel's middle shows it")
-    if facts.is_final(method):
-        return Choice(FINAL.most, "a final picture, at most")
-    if request.effort == "final":
-        return Choice(FINAL.samples, "a final picture, where no quality can be worked for")
-    if facts.integrator == "classic" and classic is not None:
-        more = classic.camera.antialiasing if facts.form == "preview" else 0
-        return Choice(1 + more, "as the scene's file says")
-    if method != "pooled" or values is None:
-        return Choice(DEFAULT_SPP, "the usual number where light is not pooled")
-    fewest = BUDGET.fewest_of_many if subpixels and values > BUDGET.many else BUDGET.fewest
-    allowed = BUDGET.values / values
-    samples = min(max(1 << max(round(math.log2(allowed)), 0), fewest), BUDGET.most)
-    return Choice(samples, f"about a million for the picture, but {fewest} to {BUDGET.most} of each pixel")
+    of_file = 1 + (classic.camera.antialiasing if classic is not None and facts.form == "preview" else 0)
+    is_classic = facts.integrator == "classic" and classic is not None
+    fewest = BUDGET.fewest_of_many if subpixels and (values or 0) > BUDGET.many else BUDGET.fewest
+    of_budget = 1 << max(round(math.log2(BUDGET.values / (values or BUDGET.values))), 0)
+    pooled = f"about a million for the picture, but {fewest} to {BUDGET.most} of each pixel"
+    is_final = request.effort == "final"
+    return _first(
+        (facts.is_draft, 1, "a draft"),
+        (request.spp is not None, request.spp, ASKED),
+        (request.is_open_ended, None, "as many as the goal takes"),
+        (facts.is_one_ray, 1, "one ray through each pixel's middle shows it"),
+        (facts.is_final(method), FINAL.most, "a final picture, at most"),
+        (is_final, FINAL.samples, "a final picture, where no quality can be worked for"),
+        (is_classic, of_file, "as the scene's file says"),
+        (method != "pooled" or values is None, DEFAULT_SPP, "the usual number where light is not pooled"),
+        (True, min(max(of_budget, fewest), BUDGET.most), pooled),
+    )
 
 
 def _quality(facts: _Facts, method: Method) -> Choice[float | None]:
-    if facts.is_final(method):
-        return Choice(FINAL.quality, "a final picture")
-    if facts.request.quality is not None:
-        return Choice(facts.request.quality)
-    return Choice(None, "none was asked for")
+    return _first(
+        (facts.is_final(method), FINAL.quality, "a final picture"),
+        (facts.request.quality is not None, facts.request.quality, ASKED),
+        (True, None, "none was asked for"),
+    )
 
 
 def _reserve(facts: _Facts, method: Method, samples: int | None, values: int | None) -> Choice[int | None]:
-    if facts.request.spp is not None or facts.request.effort != "normal" or samples is None:
-        return Choice(None, "the number of samples, or the goal, was asked for")
-    if facts.form not in ("picture", "forecast") or method != "pooled" or values is None:
-        return Choice(None, "a pooled picture in one piece has one")
-    factor = next((factor for most, factor in BUDGET.reserve if values <= most), None)
-    if factor is None:
-        return Choice(None, "the picture is too large")
-    return Choice(factor * samples, "up to so many if it is not clean by its own estimate")
+    is_given = facts.request.spp is not None or facts.request.effort != "normal" or samples is None
+    is_other = facts.form not in ("picture", "forecast") or method != "pooled" or values is None
+    factor = next((factor for most, factor in BUDGET.reserve if (values or 0) <= most), None)
+    return _first(
+        (is_given, None, "the number of samples, or the goal, was asked for"),
+        (is_other, None, "a pooled picture in one piece has one"),
+        (factor is None, None, "the picture is too large"),
+        (True, (factor or 1) * (samples or 1), "up to so many if it is not clean by its own estimate"),
+    )
 
 
 def _pixel_filter(facts: _Facts, samples: int | None) -> Choice[PixelFilter]:
-    if facts.request.pixel_filter != "auto":
-        return Choice(facts.request.pixel_filter)
-    if facts.is_one_ray or (facts.integrator == "classic" and samples == 1):
-        return Choice("point", "one ray through each pixel's middle")
-    return Choice("box", "samples are spread over the pixel")
+    asked = facts.request.pixel_filter
+    is_one_ray = facts.is_one_ray or (facts.integrator == "classic" and samples == 1)
+    return _first(
+        (asked != "auto", asked, ASKED),
+        (is_one_ray, "point", "one ray through each pixel's middle"),
+        (True, "box", "samples are spread over the pixel"),
+    )
 
 
 def _exposure(facts: _Facts) -> Choice[float | Literal["auto"]]:
-    exposure = facts.request.exposure
-    if exposure == "auto":
-        if facts.shows_own_colors:
-            return Choice(0.0, "colours made for displays")
-        if facts.is_pooled_light and facts.scene.has_physical_lights:
-            return Choice("auto", "physical light sources: a pilot measures it")
-        return Choice(0.0, "no physical light sources")
-    if exposure and not facts.is_pooled_light:
+    asked = facts.request.exposure
+    if asked not in ("auto", 0.0) and not facts.is_pooled_light:
         raise _no_light(facts.integrator, "exposure")
-    return Choice(exposure)
+    is_physical = facts.is_pooled_light and facts.scene.has_physical_lights
+    return _first(
+        (asked != "auto", asked, ASKED),
+        (facts.shows_own_colors, 0.0, "colours made for displays"),
+        (is_physical, "auto", "physical light sources: a pilot measures it"),
+        (True, 0.0, "no physical light sources"),
+    )
 
 
 def _tone_map(facts: _Facts) -> Choice[ToneMap]:
-    tone_map, scene = facts.request.tone_map, facts.scene
-    if tone_map == "auto":
-        if scene.lies_off_surfaces or facts.shows_own_colors:
-            return Choice("none", "colours made for displays")
-        if not facts.is_pooled_light:
-            return Choice("none", f"the values of {facts.integrator} are no amounts of light")
-        if scene.has_chosen_background:
-            return Choice("none", "the background's colour, which was asked for, is to stay")
-        return Choice("pbr-neutral", "physically based light: highlights are compressed instead of clipped")
-    if tone_map != "none" and not facts.is_pooled_light:
-        raise _no_light(facts.integrator, "tone_map")
-    return Choice(tone_map)
+    asked, scene, name = facts.request.tone_map, facts.scene, facts.integrator
+    if asked not in ("auto", "none") and not facts.is_pooled_light:
+        raise _no_light(name, "tone_map")
+    return _first(
+        (asked != "auto", asked, ASKED),
+        (scene.lies_off_surfaces or facts.shows_own_colors, "none", "colours made for displays"),
+        (not facts.is_pooled_light, "none", f"the values of {name} are no amounts of light"),
+        (scene.has_chosen_background, "none", "the background's colour, which was asked for, is to stay"),
+        (True, "pbr-neutral", "physically based light: highlights are compressed instead of clipped"),
+    )
 
 
 def _caustics(facts: _Facts) -> Choice[Caustics]:
-    caustics = facts.request.caustics
-    if caustics != "auto":
-        return Choice(caustics)
-    if facts.scene.lies_off_surfaces:
-        return Choice("paths", "photons land on surfaces")
-    return Choice("auto", "a pilot finds whether photons are worth their cost")
+    asked = facts.request.caustics
+    return _first(
+        (asked != "auto", asked, ASKED),
+        (facts.scene.lies_off_surfaces, "paths", "photons land on surfaces"),
+        (True, "auto", "a pilot finds whether photons are worth their cost"),
+    )
 
 
 def _no_light(integrator: Integrator, parameter: str) -> UsageError:

@@ -1,4 +1,4 @@
-"""What can be honoured: options that belong together, and what each form of a picture allows."""
+"""What can be honoured: options that belong together, and what each form of a picture and each scene allows."""
 
 from __future__ import annotations
 
@@ -6,10 +6,26 @@ from lippmann.display import Display
 from lippmann.errors import PictureError, UsageError
 from lippmann.options.choices import LIGHT, POOLED_LIGHT, REUSING
 from lippmann.options.forms import LEFT_OUT, Form
+from lippmann.rendering.request.render_plan import shown_value
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.scene.scene import Scene
 
 #: Pictures number their sub-pixels in 32 bits.
 MOST_SUBPIXELS = 1 << 32
+
+#: Why a form has not all options.
+_WHY: dict[Form, str] = {
+    "tiles": "with resume=True, to Zarr and beyond the memory pictures are rendered in tiles",
+    "quilt": "every pixel of a quilt is traced, for all colours",
+    "forecast": "a forecast is of a number of samples, each of a traced ray",
+    "preview": "it is for pictures on a display",
+}
+
+#: Whether a request is refused, what of it, by which parameter, by which rule, and how it is mended.
+_Refusal = tuple[bool, str, str, str, str]
+
+_LEAVE = "leave it out"
+_FULL = 'use method="full"'
 
 
 def check(request: RenderRequest, form: Form, display: Display | None) -> None:
@@ -22,20 +38,49 @@ def check(request: RenderRequest, form: Form, display: Display | None) -> None:
     PictureError
         The display's lenses have no quilt.
     """
-    plain = type(request)()
-    for name in LEFT_OUT[form]:
-        if getattr(request, name) not in (getattr(plain, name), False, "full"):
-            raise _refuse(name, request, form)
-    if form in ("quilt", "forecast") and request.method in REUSING:
-        raise _refuse("method", request, form)
-    if form == "tiles":
-        _check_tiles(request, display)
-    if form == "quilt":
-        _check_quilt(request, display)
-    _check_denoiser(request)
-    _check_caustics(request)
-    _check_reuse(request)
-    _check_goal(request)
+    if form == "quilt" and display is not None and display.lens_array.layout != "lenticular":
+        raise PictureError(
+            f"the display {display.name} has {display.lens_array.layout} lenses",
+            rule="a quilt's views lie side by side, for cylindrical lenses",
+        )
+    _refuse(
+        [
+            *_of_form(request, form),
+            *_of_size(request, display, form),
+            *_of_denoiser(request),
+            *_of_caustics(request),
+            *_of_reuse(request),
+            *_of_goal(request),
+        ]
+    )
+
+
+def check_off_surfaces(request: RenderRequest, scene: Scene) -> None:
+    """Refuse what scenes do not have whose light lies on no surface: Gaussian splats, volumes.
+
+    Raises
+    ------
+    UsageError
+        It asks for a surface, light to be shared or denoised, or an exposure.
+    """
+    what = "Gaussian splats" if scene.has_splats else "a volume"
+    rule = f"this scene has {what}, and light that lies on none"
+    exposed = scene.is_off_surfaces_alone and request.exposure not in ("auto", 0.0)
+    no_light = f"must be 0: the colours of {what} are made for displays, and are no amounts of light"
+    shares = f"{request.method} shares the light of surfaces"
+    is_property = request.integrator not in ("auto", *POOLED_LIGHT)
+    denoises = request.denoise not in ("auto", "none")
+    _refuse(
+        [
+            (request.method not in ("auto", "full"), shares, "method", rule, _FULL),
+            (is_property, f"{request.integrator} is told of surfaces", "integrator", rule, _LEAVE),
+            (request.layers, "are told of surfaces", "layers", rule, _LEAVE),
+            (denoises, f"{request.denoise} goes by the edges of surfaces", "denoise", rule, _LEAVE),
+            (request.caustics == "photons", "photons land on surfaces", "caustics", rule, _LEAVE),
+            (exposed, shown_value(request.exposure), "exposure", no_light, _LEAVE),
+        ],
+        where=scene.name,
+    )
 
 
 def why_no_estimate(request: RenderRequest) -> str | None:
@@ -47,133 +92,87 @@ def why_no_estimate(request: RenderRequest) -> str | None:
     return None
 
 
-def _check_denoiser(request: RenderRequest) -> None:
-    if request.method == "pooled" and request.integrator not in POOLED_LIGHT:
-        raise UsageError(
-            f"the light of {request.integrator} cannot be pooled",
-            parameter="integrator",
-            rule=f'method="pooled" works with {" and ".join(POOLED_LIGHT)}',
-            fix='use method="full"',
-        )
-    if request.denoises and request.integrator not in LIGHT:
-        raise UsageError(
-            f"{request.integrator} has no noise",
-            parameter="denoise",
-            rule=f"it is for {', '.join(LIGHT)}",
-            fix="leave it out",
-        )
-    if request.method == "pooled" and request.denoise == "none":
-        raise UsageError(
+def _refuse(refusals: list[_Refusal], where: str = "") -> None:
+    for is_refused, what, parameter, rule, fix in refusals:
+        if is_refused:
+            raise UsageError(what, where=where, parameter=parameter, rule=rule, fix=fix)
+
+
+def _of_denoiser(request: RenderRequest) -> list[_Refusal]:
+    name, is_pooled = request.integrator, request.method == "pooled"
+    pooled, light = f'method="pooled" works with {" and ".join(POOLED_LIGHT)}', f"it is for {', '.join(LIGHT)}"
+    no_network = f"{_FULL}, or leave denoise out"
+    return [
+        (is_pooled and name not in POOLED_LIGHT, f"the light of {name} cannot be pooled", "integrator", pooled, _FULL),
+        (request.denoises and name not in LIGHT, f"{name} has no noise", "denoise", light, _LEAVE),
+        (
+            is_pooled and request.denoise == "none",
             "pooled needs the denoiser",
-            parameter="denoise",
-            rule="pooled shares denoised light",
-            fix='use method="full", or leave denoise out',
-        )
+            "denoise",
+            "pooled shares denoised light",
+            no_network,
+        ),
+    ]
 
 
-def _check_caustics(request: RenderRequest) -> None:
-    if request.clamp_indirect is not None and request.integrator != "path":
-        raise UsageError(
-            f"{request.integrator} has no indirect light that is sampled",
-            parameter="clamp_indirect",
-            rule='it is for integrator="path"',
-            fix="leave it out",
-        )
-    if request.caustics not in ("auto", "paths") and request.integrator != "path":
-        raise UsageError(
-            f"{request.integrator} has no caustics",
-            parameter="caustics",
-            rule="'photons' and 'none' are for integrator=\"path\"",
-            fix="leave it out",
-        )
+def _of_caustics(request: RenderRequest) -> list[_Refusal]:
+    name, clamps = request.integrator, request.clamp_indirect is not None
+    no_indirect, no_caustics = f"{name} has no indirect light that is sampled", f"{name} has no caustics"
+    of_path, of_some = 'it is for integrator="path"', "'photons' and 'none' are for integrator=\"path\""
+    is_asked = request.caustics not in ("auto", "paths")
+    return [
+        (name != "path" and clamps, no_indirect, "clamp_indirect", of_path, _LEAVE),
+        (name != "path" and is_asked, no_caustics, "caustics", of_some, _LEAVE),
+    ]
 
 
-def _check_reuse(request: RenderRequest) -> None:
-    if request.method not in REUSING:
-        for name in ("order", "respect_gloss"):
-            if getattr(request, name) is not None:
-                raise UsageError(
-                    f"{request.method} reuses no points",
-                    parameter=name,
-                    rule=f"it is for {' and '.join(REUSING)}",
-                    fix="leave it out",
-                )
-        return
-    if request.order == "paper" and request.respect_gloss:
-        raise UsageError(
-            "the paper's order takes every colour as it is",
-            parameter="respect_gloss",
-            rule='it is for order="default"',
-            fix="leave one of the two out",
-        )
-    if request.subpixels:
-        raise UsageError(
-            f"{request.method} reuses whole pixels",
-            parameter="subpixels",
-            rule="a sub-pixel has rays of its own",
-            fix='use method="full"',
-        )
-    if request.integrator not in LIGHT:
-        raise UsageError(
-            f"{request.method} reuses light, and {request.integrator} gathers none",
-            parameter="integrator",
-            rule=f"it works with {', '.join(LIGHT)}",
-            fix='use method="full"',
-        )
+def _of_reuse(request: RenderRequest) -> list[_Refusal]:
+    method, name = request.method, request.integrator
+    if method not in REUSING:
+        what, rule = f"{method} reuses no points", f"it is for {' and '.join(REUSING)}"
+        return [(getattr(request, each) is not None, what, each, rule, _LEAVE) for each in ("order", "respect_gloss")]
+    is_both, one = request.order == "paper" and bool(request.respect_gloss), "leave one of the two out"
+    as_it_is, by_default = "the paper's order takes every colour as it is", 'it is for order="default"'
+    whole, own_rays = f"{method} reuses whole pixels", "a sub-pixel has rays of its own"
+    gathers, works_with = f"{method} reuses light, and {name} gathers none", f"it works with {', '.join(LIGHT)}"
+    return [
+        (is_both, as_it_is, "respect_gloss", by_default, one),
+        (bool(request.subpixels), whole, "subpixels", own_rays, _FULL),
+        (name not in LIGHT, gathers, "integrator", works_with, _FULL),
+    ]
 
 
-def _check_goal(request: RenderRequest) -> None:
+def _of_goal(request: RenderRequest) -> list[_Refusal]:
     """A quality or a time needs samples that tell their error."""
-    if not request.is_open_ended:
-        return
-    name = "max_time" if request.max_time is not None else "quality" if request.quality is not None else "quality_worst"
-    if request.spp == 1:
-        raise UsageError("1", parameter="spp", rule="must be 2 or more, which tell their error")
-    if request.method in REUSING:
-        raise UsageError(
-            f"{request.method} does not know its own error",
-            parameter=name,
-            rule="full and pooled do",
-            fix='use method="full"',
-        )
-    why = why_no_estimate(request)
-    if why is not None:
-        raise UsageError(why, parameter=name, fix="leave it out")
+    goals = [name for name in ("max_time", "quality", "quality_worst") if getattr(request, name) is not None]
+    if not goals:
+        return []
+    unknown, why = f"{request.method} does not know its own error", why_no_estimate(request)
+    return [
+        (request.spp == 1, "1", "spp", "must be 2 or more, which tell their error", ""),
+        (request.method in REUSING, unknown, goals[0], "full and pooled do", _FULL),
+        (why is not None, str(why), goals[0], "", _LEAVE),
+    ]
 
 
-def _check_tiles(request: RenderRequest, display: Display | None) -> None:
-    if request.method in REUSING:
-        raise _refuse("method", request, "tiles", fix='use method="full" or method="pooled"')
-    if display is None:
-        return
-    panel = display.panel
-    if panel.width * panel.height * request.channels >= MOST_SUBPIXELS:
-        raise UsageError(
-            f"the display {display.name} has {panel.width} x {panel.height} pixels",
-            parameter="display",
-            rule=f"pictures of fewer than {MOST_SUBPIXELS} (sub-)pixels are rendered",
-            fix="render it in parts",
-        )
-
-
-def _check_quilt(request: RenderRequest, display: Display | None) -> None:
-    if display is not None and display.lens_array.layout != "lenticular":
-        raise PictureError(
-            f"the display {display.name} has {display.lens_array.layout} lenses",
-            rule="a quilt's views lie side by side, for cylindrical lenses",
-        )
-
-
-#: Why a form has not all options.
-_WHY: dict[Form, str] = {
-    "tiles": "with resume=True, to Zarr and beyond the memory pictures are rendered in tiles",
-    "quilt": "every pixel of a quilt is traced, for all colours",
-    "forecast": "a forecast is of a number of samples, each of a traced ray",
-    "preview": "it is for pictures on a display",
-}
-
-
-def _refuse(name: str, request: RenderRequest, form: Form, fix: str = "leave it out") -> UsageError:
-    value = getattr(request, name)
+def _of_form(request: RenderRequest, form: Form) -> list[_Refusal]:
+    plain = type(request)()
     needs = "needs the whole picture" if form == "tiles" else f"is not possible in a {form}"
-    return UsageError(f"{'it' if value is True else value} {needs}", parameter=name, rule=_WHY[form], fix=fix)
+    given = [name for name in LEFT_OUT[form] if getattr(request, name) not in (getattr(plain, name), False, "full")]
+    values = {name: "it" if getattr(request, name) is True else getattr(request, name) for name in given}
+    reuses = request.method in REUSING and form in ("tiles", "quilt", "forecast")
+    instead = 'use method="full" or method="pooled"' if form == "tiles" else _LEAVE
+    return [
+        *((True, f"{value} {needs}", name, _WHY[form], _LEAVE) for name, value in values.items()),
+        (reuses, f"{request.method} {needs}", "method", _WHY.get(form, ""), instead),
+    ]
+
+
+def _of_size(request: RenderRequest, display: Display | None, form: Form) -> list[_Refusal]:
+    if form != "tiles" or display is None:
+        return []
+    panel = display.panel
+    is_large = panel.width * panel.height * request.channels >= MOST_SUBPIXELS
+    what = f"the display {display.name} has {panel.width} x {panel.height} pixels"
+    rule = f"pictures of fewer than {MOST_SUBPIXELS} (sub-)pixels are rendered"
+    return [(is_large, what, "display", rule, "render it in parts")]
