@@ -39,13 +39,6 @@ if TYPE_CHECKING:
 #: Seconds that the probe traces for, compiling aside.
 PROBE_SECONDS = 2.0
 
-#: Pixels of the probe, and how many lie side by side in a run.
-_PIXELS, _RUN = 1 << 14, 16
-#: Samples per pixel after which each takes as many rays as the one before; the first sample more light.
-_STEADY_SAMPLES = 16
-#: Lanes beyond which a wavefront gets no faster.
-_ENOUGH_LANES = 1 << 20
-
 
 @dataclass(frozen=True)
 class Forecast:
@@ -250,8 +243,8 @@ class _Probe:
 
         self._source = source
         self.channels = source.channels
-        run = min(_RUN, source.width)
-        count = max(1, min(_PIXELS, source.width * source.height) // run)
+        run = min(16, source.width)
+        count = max(1, min(1 << 14, source.width * source.height) // run)
         random = np.random.default_rng(seed)
         first = random.integers(0, source.width - run + 1, count)
         columns = first[:, None] + np.arange(run)
@@ -293,7 +286,8 @@ class _Probe:
                 counts.append((samples, getattr(batches.rays, kind)))
 
         count_rays()
-        while spent < PROBE_SECONDS or samples < min(request.samples, _STEADY_SAMPLES):
+        # From 16 samples on each takes as many rays as the one before; the first samples more light.
+        while spent < PROBE_SECONDS or samples < min(request.samples, 16):
             started = time.perf_counter()
             batches.add(count)
             last = (time.perf_counter() - started) / (count * pixels)
@@ -302,7 +296,7 @@ class _Probe:
             done += count
             count_rays()
             progress(Progress("probe", min(spent, PROBE_SECONDS), PROBE_SECONDS))
-            if 2 * count * pixels <= _ENOUGH_LANES:
+            if 2 * count * pixels <= memory_model.PREFERRED_LANES:
                 count *= 2
         number = request.samples * pixels
         shares = {kind: _count_at(request.samples, counts) / number for kind, counts in rays.items()}

@@ -51,8 +51,6 @@ if TYPE_CHECKING:
 #: Share of the free memory that is used where no limit is given.
 DEFAULT_MEMORY_SHARE = 0.6
 
-#: Views whose depth is kept.
-_MOST_DEPTHS = 64
 
 T = TypeVar("T")
 
@@ -184,7 +182,7 @@ class Session:
             [*np.ravel(view.world_from_camera), view.half_width, view.half_height, view.is_parallel]
         ).tobytes()
         if key not in self.depths:
-            if len(self.depths) >= _MOST_DEPTHS:
+            if len(self.depths) >= 64:
                 self.depths.clear()
             self.depths[key] = self.watch.stage("build", lambda: probe_depth(self.built, view))
         return self.depths[key]

@@ -26,6 +26,6 @@ def extra_samples(estimate: Estimate, samples: int, most: int | None) -> int:
     if most is None or (estimate.psnr >= TUNING.clean and estimate.worst >= TUNING.clean_worst):
         return 0
     step = min(TUNING.step, samples)
-    missing = max(TUNING.aim - estimate.psnr, TUNING.clean_worst - estimate.worst)
+    missing = max(TUNING.clean - estimate.psnr, TUNING.clean_worst - estimate.worst)
     needed = max(samples * 10 ** (missing / (10 * TUNING.denoised_slope)), samples + step)
     return max(0, min(most, step * math.ceil(needed / step)) - samples)

@@ -57,7 +57,7 @@ class Costs:
     """
 
     first: int
-    slope: float = TUNING.plain_slope
+    slope: float = 1.0
     assessment: float = 0.0
 
 

@@ -22,9 +22,9 @@ class AdaptiveTuning:
     surer_growth:
         The most where the quality is likely there and only the interval is too wide: intervals narrow faster than
         pictures converge (``goals.py``).
-    plain_slope, denoised_slope:
-        Powers of the sample count by which squared errors fall: of Monte Carlo noise by theory, of denoised pictures
-        0.5 to 0.8 where it was measured (``equal_error.py``).
+    denoised_slope:
+        Power of the sample count by which squared errors of denoised pictures fall: 0.5 to 0.8 where it was measured
+        (``equal_error.py``); that of Monte Carlo noise is 1.
     slope_range:
         Powers that are believed of two noisy estimates.
     tolerance:
@@ -36,8 +36,8 @@ class AdaptiveTuning:
         Share of the time left that a round is planned to take: rates vary from round to round.
     modest_quality:
         PSNR in dB that a default picture has anyway (``defaults.py``).
-    clean, aim:
-        Estimated PSNR in dB from which on a default picture gets no more samples, and that for which they are reckoned.
+    clean:
+        Estimated PSNR in dB from which on a default picture gets no more samples, and for which they are reckoned.
         The estimate is of light before tone mapping, which brings out the noise of highlights by up to 1.5 dB
         (``docs/research/equal-time.md``).
     clean_worst:
@@ -50,15 +50,13 @@ class AdaptiveTuning:
     least_growth: float = 1.2
     most_growth: float = 4.0
     surer_growth: float = 2.0
-    plain_slope: float = 1.0
     denoised_slope: float = 0.6
     slope_range: tuple[float, float] = (0.3, 1.2)
     tolerance: float = 1.0
     most_below: float = 12.0
     time_share: float = 0.9
     modest_quality: float = 34.0
-    clean: float = 35.5
-    aim: float = 35.0
+    clean: float = 35.0
     clean_worst: float = 25.0
 
 

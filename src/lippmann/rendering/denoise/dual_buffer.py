@@ -58,8 +58,6 @@ DROWNED = 8.0
 MANY = 16
 #: Share of the samples' error that is taken to rest on outliers where too few batches tell them.
 UNTOLD_OUTLIERS = 0.25
-#: Linear steps below this are as good as a slope, and hold rounding.
-_LEAST_STEP = 1e-4
 #: A clean picture from a noisy one; and whether that is to be turned, see
 #: :func:`~lippmann.rendering.denoise.oidn.denoise`.
 Denoise = Callable[[Floats, bool], Floats]
@@ -250,7 +248,7 @@ class Denoised:
         nearby = mean_around(scatter, 1, bands)[..., None]
         apart = shown + np.float32(FAR_ABOVE) * nearby
         truth = np.where(picture > 1, np.minimum(shown, 1), apart)
-        far = picture - truth > _LEAST_STEP
+        far = picture - truth > 1e-4  # smaller steps are as good as a slope, and hold rounding
         low, high = truth[far], picture[far]
         slope[far] = (encode(high, transfer) - encode(low, transfer)) / (high - low)
         return slope

@@ -22,12 +22,6 @@ from lippmann.rendering.transport.ray_source import DisplayRays
 
 #: Pixels looked at along each side of the picture, and samples of each.
 SIDE, SAMPLES = 128, 8
-#: Pixels looked at whose mean counts as one brightness, along each side.
-BIN = 4
-#: The brightness (geometric mean) that the network is shown, and what counts as black: Open Image Denoise's own.
-KEY, BLACK = 0.18, 1e-8
-#: Bytes that the look may take.
-MEMORY = 1 << 28
 
 
 @dataclass(frozen=True)
@@ -42,7 +36,7 @@ def survey(integrator: Integrator, source: DisplayRays, request: RenderRequest) 
     """What suits the picture as a whole: the same for the same picture, whoever looks."""
     few, box = ScatteredRays(source, SIDE), request.box_filter
     samples = min(request.samples, SAMPLES) if box else 1
-    plan = cut_wavefronts(few.width, few.height, samples, channels=few.channels, memory=MEMORY)
+    plan = cut_wavefronts(few.width, few.height, samples, channels=few.channels, memory=1 << 28)
     frame = trace_frame(integrator, few, plan, seed=request.seed, box_filter=box)
     rays = traced_work(frame.rays.primary, frame.rays.shadow, frame.rays.secondary)
     # What is denoised: pixels, or sub-pixels.
@@ -52,12 +46,12 @@ def survey(integrator: Integrator, source: DisplayRays, request: RenderRequest) 
 
 
 def exposure_of(picture: NDArray[np.float32]) -> float:
-    """By what linear RGB ``(H, W, 3)`` is multiplied for the network: ``KEY`` over the geometric mean of its luminance.
+    """By what linear RGB ``(H, W, 3)`` is multiplied for the network: 0.18 over the geometric mean of its luminance.
 
-    As Open Image Denoise does itself for a picture that it sees whole.
+    As Open Image Denoise does itself for a picture that it sees whole, by the means of 4 x 4 pixels that are not black.
     """
     luminance = picture.astype(np.float64) @ (0.212671, 0.715160, 0.072169)
-    rows, columns = (range(0, side, BIN) for side in luminance.shape)
-    bins = np.array([luminance[r : r + BIN, c : c + BIN].mean() for r in rows for c in columns])
-    bright = bins[bins > BLACK]
-    return float(KEY / np.exp2(np.log2(bright).mean())) if bright.size else 1.0
+    rows, columns = (range(0, side, 4) for side in luminance.shape)
+    bins = np.array([luminance[r : r + 4, c : c + 4].mean() for r in rows for c in columns])
+    bright = bins[bins > 1e-8]
+    return float(0.18 / np.exp2(np.log2(bright).mean())) if bright.size else 1.0

@@ -26,11 +26,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float32]
 
-#: What the seed of the guides is more than the picture's.
-GUIDE_SEED_STEP = 0x85EBCA6B
-#: Width and height of the picture by which the time of denoising is measured.
-_PROBE_SIDE = 128
-
 
 class GuidedDenoiser:
     """Takes the noise out of pictures; called with ``(H, W, 3)`` linear pixels, one for each of ``source``.
@@ -149,12 +144,13 @@ class GuidedDenoiser:
 
     def probe(self) -> float:
         """Seconds that a picture cleaned by halves takes, guides included, by a small one."""
-        small = np.zeros((_PROBE_SIDE, _PROBE_SIDE, 3), dtype=np.float32)
+        side = 128
+        small = np.zeros((side, side, 3), dtype=np.float32)
         denoise(small, small, small, clean_guides=True, effort="fast", threads=self._threads)  # starts its threads
         started = time.perf_counter()
         denoise(small, small, small, clean_guides=True, effort="fast", threads=self._threads)
         spent = (time.perf_counter() - started) / RUN_COST["fast"] * denoising_cost(self._effort())
-        return spent * self._source.width * self._source.height / _PROBE_SIDE**2
+        return spent * self._source.width * self._source.height / side**2
 
     def _cleaned(self, pixels: Floats, guides: Guides, turned: bool) -> Floats:
         source = self._source
@@ -188,7 +184,7 @@ class GuidedDenoiser:
                 self._display_from_world,
                 # Samples of their own: with those of one half of the picture the guides would show its noise, and the
                 # denoised other half would agree with it.
-                seed=(self._seed + GUIDE_SEED_STEP) % 2**32,
+                seed=(self._seed + 0x85EBCA6B) % 2**32,
                 box_filter=self._box_filter,
                 progress=self._progress,
             )

@@ -29,10 +29,6 @@ Floats = NDArray[np.float32]
 
 #: How far the two neighbourhoods reach, in pixels to each side.
 NEAR, FAR = 2, 8
-#: Standard deviations that the error of clean pixels must exceed.
-_DEVIATIONS = 1.0
-#: No noise and no error: then there is nothing to choose.
-_NOTHING = 1e-12
 
 
 def own_share(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int) -> Floats:
@@ -53,8 +49,8 @@ def own_share(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int)
     share = np.ones_like(noise)
     for reach in (NEAR, FAR):
         of_noise = np.maximum(mean_around(noise, reach, bands), 0)
-        known = leave_one_out_mean(error, reach, _DEVIATIONS, bands)
-        share *= known / (known + of_noise + np.float32(_NOTHING))
+        known = leave_one_out_mean(error, reach, 1.0, bands)
+        share *= known / (known + of_noise + np.float32(1e-12))  # 0 where there is neither noise nor error
     return np.sqrt(share)[..., None]
 
 

@@ -29,9 +29,6 @@ FloatArray = NDArray[np.float32]
 #: Views with fewer pixels on a side are no pictures that the network knows: see ``docs/background/denoising.md``.
 SMALLEST_VIEW = 48
 
-#: Weight of a difference of normals (components in [-1, 1]) against one of albedo.
-_NORMAL_WEIGHT = 0.5
-
 
 def denoise_views(
     pixels: NDArray[np.generic],
@@ -93,7 +90,7 @@ def neighbour_differences(display: Display, guides: Guides) -> tuple[float, floa
     """
     axes = (1,) if display.lens_array.layout == "lenticular" else (0, 1)
     on_panel, in_view = 0.0, 0.0
-    for guide, weight in ((guides.albedo, 1.0), (guides.normal, _NORMAL_WEIGHT)):
+    for guide, weight in ((guides.albedo, 1.0), (guides.normal, 0.5)):  # components in [0, 1], in [-1, 1]
         micro_images = Permutation(display).split(guide)
         for axis in axes:
             on_panel += weight * _mean_step(guide, axis)

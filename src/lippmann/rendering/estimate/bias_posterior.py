@@ -27,18 +27,12 @@ Real = NDArray[np.float64]
 
 #: The usual ratio where no hit is an outlier, and where all are.
 USUAL_RATIO, OUTLIER_RATIO = 3.0, 10.0
-#: The prior of its logarithm, a t distribution, has this scale and so many degrees of freedom.
-SCALE, FREEDOM = 0.6, 4.0
-#: Degrees of freedom of the measurement: single hits decide what it says and how uncertain it seems.
-MEASURED_FREEDOM = 4.0
-#: As a part of D: no measurement of C is better than that.
-LEAST_DEVIATION = 1e-3
+#: The prior of its logarithm is a t distribution of this scale.
+SCALE = 0.6
+#: Degrees of freedom of the prior, and of the measurement: single hits decide what it says and how uncertain it seems.
+FREEDOM = 4.0
 _LOGARITHMS = np.linspace(math.log(1e-2), math.log(1e4), 600)
 _RATIOS = np.exp(_LOGARITHMS)
-#: D is taken to be this part of a C that is measured beyond all the ratios above.
-_BEYOND = 1e-3
-#: A picture without any error still has this mean squared one, so that its logarithm exists.
-_FLOOR = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,15 +63,16 @@ def likely_error(by_chance: float, common: float, deviation: float, outliers: fl
     outliers:
         The share of the samples' error that rests on outliers, 0 to 1.
     """
-    by_chance = max(by_chance, _BEYOND * (common - 3 * deviation), _FLOOR)
+    # A thousandth of a C that is measured beyond all ratios; and something, so that its logarithm exists.
+    by_chance = max(by_chance, 1e-3 * (common - 3 * deviation), 1e-12)
     middle = (1 - outliers) * math.log(USUAL_RATIO) + outliers * math.log(OUTLIER_RATIO)
-    prior = _log_t((_LOGARITHMS - middle) / SCALE, FREEDOM)
-    off = (common - _RATIOS * by_chance) / max(deviation, LEAST_DEVIATION * by_chance)
-    weights = prior + _log_t(off, MEASURED_FREEDOM)
+    prior = _log_t((_LOGARITHMS - middle) / SCALE)
+    off = (common - _RATIOS * by_chance) / max(deviation, 1e-3 * by_chance)  # no measurement is better than that
+    weights = prior + _log_t(off)
     weights = np.exp(weights - weights.max())
     return LikelyError(by_chance, weights / weights.sum())
 
 
-def _log_t(deviations: Real, freedom: float) -> Real:
+def _log_t(deviations: Real) -> Real:
     """The logarithm of the density of Student's t distribution, but for a constant."""
-    return np.asarray(-0.5 * (freedom + 1) * np.log1p(np.square(deviations) / freedom))
+    return np.asarray(-0.5 * (FREEDOM + 1) * np.log1p(np.square(deviations) / FREEDOM))

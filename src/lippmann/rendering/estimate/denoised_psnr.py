@@ -52,10 +52,6 @@ SPREAD = 0.5
 WORSE_FROM = 2.0
 #: ... so many times the squares of its samples' errors: hits that are rare and strong show in these, too.
 EXPLAINED = 400.0
-#: As parts of what is expected, and of the mean: no micro-image is taken to be better.
-LEAST_EXPECTED, LEAST_OF_MEAN = 0.2, 1e-3
-#: Halves that differ by less than this part of their samples' errors do so for another reason than that noise is gone.
-LEAST_OF_SAMPLES = 1e-4
 #: Pixels that one micro-image has fewer than the usual one count so many times, for its error to be another one.
 FEW = 40.0
 #: By how much more than what outliers of seen light show the error may be: on heaps of mirror balls under small
@@ -63,9 +59,6 @@ FEW = 40.0
 SEEN_DOUBT = 1.5
 #: As parts of the error stated for all and for the worst: pictures that are hard to judge are often better by that.
 OFTEN_BETTER, WORST_OFTEN_BETTER = 0.8, 0.6
-#: Of the draws of the worst error: what is stated, and the ends of its interval.
-_OF_WORST = (0.5, 0.975, 0.025)
-_NOTHING = 1e-30
 
 
 class DenoisedEstimator(PictureEstimator):
@@ -95,11 +88,10 @@ def estimate_denoised(judged: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     pixels = float(judged.pixels.sum())
     by_chance, error = float(judged.apart.sum()) / pixels, float(judged.values.sum()) / pixels
     deviation = math.sqrt(CROSS_NOISE.estimate * float(judged.squares.sum())) / pixels
-    of_samples = max(float(samples.values.sum()), _NOTHING)
+    of_samples = max(float(samples.values.sum()), 1e-30)
     outliers = min(1.0, float(samples.outliers.sum()) / of_samples)
-    likely = likely_error(
-        max(by_chance, LEAST_OF_SAMPLES * of_samples / pixels), error - by_chance, deviation, outliers
-    )
+    # Halves that differ by less than a 10 000th of their samples' errors do so for another reason than vanished noise.
+    likely = likely_error(max(by_chance, 1e-4 * of_samples / pixels), error - by_chance, deviation, outliers)
     middle = float(likely.quantiles(0.5))
     model = math.exp(NORMAL_95 * MODEL_UNCERTAINTY)
     # What no half has met is in no difference between them.
@@ -108,7 +100,8 @@ def estimate_denoised(judged: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     worse, better = likely.quantiles(np.array([0.975, 0.025])) * (model * doubt, often_better / model)
 
     parts = _parts(judged, samples.squares, index, grid, middle)
-    worst = np.quantile(_worst_drawn(parts, likely.quantiles((np.arange(DRAWS) + 0.5) / DRAWS) / middle), _OF_WORST)
+    drawn = _worst_drawn(parts, likely.quantiles((np.arange(DRAWS) + 0.5) / DRAWS) / middle)
+    worst = np.quantile(drawn, (0.5, 0.975, 0.025))  # what is stated, and the ends of its interval
     row, column = divmod(int(index[np.argmax(parts.expected)]), grid[1])
     psnr, psnr_low, psnr_high = (float(value) for value in psnr_of(np.array([middle, worse, better])))
     of_worst, worst_low, worst_high = (float(value) for value in psnr_of(worst * (1, 1, WORST_OFTEN_BETTER)))
@@ -133,7 +126,7 @@ def _parts(
     count = judged.pixels
     measured, apart = judged.values / count, judged.apart / count
     (near,), _ = neighbourhood(apart[None], index, grid)
-    least = LEAST_OF_MEAN * float(judged.apart.sum() / count.sum()) + _NOTHING
+    least = 1e-3 * float(judged.apart.sum() / count.sum()) + 1e-30
     around = np.maximum(apart, least) ** (1 - TOWARDS_NEIGHBOURS) * np.maximum(near, least) ** TOWARDS_NEIGHBOURS
     around *= mean / float((around * count).sum() / count.sum())
     # The mean square of one part is noisy itself: it leans on what all have, in proportion.
@@ -144,7 +137,7 @@ def _parts(
     other = np.where(measured > around, np.square(measured - around) - explained, 0.0)
     between = np.maximum(SPREAD * np.square(around), other)
     trust = between / (between + noise)
-    expected = np.maximum(around + trust * (measured - around), LEAST_EXPECTED * around)
+    expected = np.maximum(around + trust * (measured - around), 0.2 * around)
     variance = np.log1p(trust * noise / np.square(expected))
     fewer = np.maximum(1 / count - 1 / np.median(count), 0)
     doubted = expected + SEEN_DOUBT * np.clip(judged.outliers / count, 0, expected)

@@ -30,8 +30,6 @@ from lippmann.device.types import Bool, Color3f, Float
 
 Floats = NDArray[np.float32]
 
-#: Pixels worked on at a time.
-_CHUNK = 1 << 18
 #: A hit is an outlier if it makes up this part of the largest share of what the batches differ by that one can have,
 #: ``(batches - 1) / batches``, and moves the code by as much as ...
 OUTLIER_SHARE = 0.8 * 8 / 7
@@ -63,8 +61,9 @@ def error_of_batches(sums: Floats, taken: Sequence[int], transfer: Transfer) -> 
     # Opaque to the compiler, so that every round runs the same kernel.
     counts = [dr.opaque(mi.Float, number) for number in taken]
     error, outliers = np.empty(pixels, dtype=np.float32), np.empty(pixels, dtype=np.float32)
-    for first in range(0, pixels, _CHUNK):
-        part = slice(first, min(first + _CHUNK, pixels))
+    step = 1 << 18  # pixels worked on at a time
+    for first in range(0, pixels, step):
+        part = slice(first, min(first + step, pixels))
         values = [mi.Color3f(np.ascontiguousarray(batch[part].T)) for batch in sums]
         of_part = _Batches(values, counts, transfer)
         jackknife, alone = of_part.jackknife()

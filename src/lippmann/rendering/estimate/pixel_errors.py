@@ -19,7 +19,6 @@ OUTLIERS_CERTAIN = 0.7
 #: The share by which the blur of caustics is told too high where light is smooth, see
 #: :mod:`lippmann.rendering.film.caustic_blur`; and that by which no error is less than stated.
 BLUR_TOO_MUCH, MOST_LESS = 8 / 9, 0.9
-_NOTHING = 1e-30
 
 
 @dataclass(frozen=True)
@@ -129,7 +128,7 @@ class ErrorSums:
 
     def shares_less(self) -> Real:
         """``(parts,)``: the same of each part's own sum."""
-        return np.asarray(_share_less(self.blur, np.maximum(self.values, self.blur + _NOTHING)))
+        return np.asarray(_share_less(self.blur, np.maximum(self.values, self.blur + 1e-30)))
 
     def _sum(self, owner: NDArray[np.integer], values: Real) -> Real:
         return np.asarray(np.bincount(owner, weights=values, minlength=len(self.pixels)), dtype=np.float64)

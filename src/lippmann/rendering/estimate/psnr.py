@@ -97,13 +97,9 @@ MARGIN_OF_HALF = 4.0
 FIRST_AMONG_MIRRORS, FEWEST_AMONG_MIRRORS, WORST_AMONG_MIRRORS = 8, 16, 8.0
 #: Micro-images that may be the worst are drawn this many times.
 DRAWS = 2000
-#: Of very many micro-images only so many can be the worst.
-_CANDIDATES = 1024
 #: Pixels' worth of belief that a lens is as noisy as its neighbours.
 LEAN = 64.0
 NORMAL_95 = 1.96
-#: Of the draws of the worst error: lenses that are worse pull their neighbours, so the better side goes farther.
-LOW_QUANTILE = 0.01
 _FLOOR = 10 ** (-CEILING / 10)
 
 
@@ -232,7 +228,8 @@ def estimate_of_sums(sums: ErrorSums, grid: tuple[int, int], noise: NoiseShares)
     draws = lenses.draws()
     less = draws * (1 - parts_with_pixels(sums)[1].shares_less()[lenses.candidates, None])
     likely, worse = np.quantile(draws.max(axis=0), (0.5, 0.975))
-    worst = psnr_of(np.array([likely, worse, np.quantile(less.max(axis=0), LOW_QUANTILE)]))
+    # Lenses that are worse pull their neighbours, so the better side goes farther than 0.025.
+    worst = psnr_of(np.array([likely, worse, np.quantile(less.max(axis=0), 0.01)]))
     model = 10 * math.log10(1 + MODEL_UNCERTAINTY)
     row, column = divmod(int(lenses.index[np.argmax(lenses.expected)]), grid[1])
     return Estimate(
@@ -261,7 +258,7 @@ class PartErrors:
     def candidates(self) -> NDArray[np.intp]:
         """The places of those that may be the worst."""
         reach = np.log(self.doubted) + 2.5 * np.sqrt(self.variance + self.fluctuation)
-        return np.argsort(-reach)[:_CANDIDATES]
+        return np.argsort(-reach)[:1024]  # of very many only so many can be the worst
 
     def draws(self) -> Real:
         """``(candidates, draws)``: true squared errors of the :attr:`candidates`."""

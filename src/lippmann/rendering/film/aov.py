@@ -31,9 +31,6 @@ FloatArray = NDArray[np.float32]
 #: Layers and their channels.
 LAYERS = {"depth": 1, "normal": 3, "albedo": 3, "shape": 1, "position": 3}
 
-#: The sub-pixel in the middle, whose place is the pixel's.
-_MIDDLE_CHANNEL = 1
-
 
 def plan_layers(source: RaySource, memory: int) -> Plan:
     """Tiles for the layers of a picture within ``memory`` bytes, those of the layers themselves included.
@@ -99,7 +96,7 @@ def _trace_tile(
     row, column = divide(dr.arange(mi.UInt32, lanes), width)
     # Opaque, so that one kernel serves all tiles.
     row += dr.opaque(mi.UInt32, tile.first_row)
-    ray = source.rays(column, row, mi.UInt32(_MIDDLE_CHANNEL), mi.Point2f(0.5))
+    ray = source.rays(column, row, mi.UInt32(1), mi.Point2f(0.5))  # the sub-pixel in the middle
     seen = surfaces.first_hit(ray)
     position = to_frame(display_from_world, seen.p) + mi.Vector3f(*display_from_world[:3, 3].tolist())
     position = dr.select(seen.hit, position, dr.nan)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
 from lippmann.display.pixel_window import PixelWindow
+from lippmann.rendering.film.memory_model import PREFERRED_LANES
 from lippmann.rendering.film.wavefront import shown_colors
 from lippmann.rendering.transport.caustic_photons import CausticPhotons
 from lippmann.rendering.transport.integrator import Integrator
@@ -32,8 +33,6 @@ Floats = NDArray[np.float32]
 #: Of a picture of fewer samples only some pixels are looked at, one for each in this many samples; and so many of the
 #: whole picture, at least.
 SAMPLES_OF_LOOK, FEWEST_LOOKED_AT = 64, 1 << 14
-_LOOK_SEED = 0x2545F491
-_LANES = 1 << 20
 
 
 class SquaredBlur:
@@ -79,7 +78,7 @@ class SquaredBlur:
         blur = ShownCaustics(self._integrator, photons, blur=True)
         looked = _looked_at(self._source, self._window, self._seed, share)
         found = np.zeros((self._window.pixels, 3), np.float32)
-        step = max(1, _LANES // (2 * self._source.channels))
+        step = max(1, PREFERRED_LANES // (2 * self._source.channels))
         for first in range(0, len(looked), step):
             part = looked[first : first + step]
             found[part] = _products(blur, self._source, self._window, part, self._seed) / np.float32(share)
@@ -117,7 +116,7 @@ def _products(
     row, column = divide(pixel, dr.opaque(mi.UInt32, window.width))
     row += dr.opaque(mi.UInt32, window.top)
     column += dr.opaque(mi.UInt32, window.left)
-    stream_seed = dr.opaque(mi.UInt32, seed ^ _LOOK_SEED) + half * SEED_STEP
+    stream_seed = dr.opaque(mi.UInt32, seed ^ 0x2545F491) + half * SEED_STEP
     number = pixel_number(source, column, row) * channels + channel
     stream = SampleStream.of_pixels(number, dr.zeros(mi.UInt32, lanes), stream_seed)
     stream.half = half

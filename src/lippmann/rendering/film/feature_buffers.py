@@ -28,9 +28,6 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float32]
 
-#: Heights beyond this many millimetres count as lying there: light lines of all lenses are parallel for them.
-_FARTHEST = 1e5
-
 
 @dataclass(frozen=True, eq=False)
 class Guides:
@@ -138,7 +135,8 @@ def _trace_tile(
     albedo, normal, distance, covered = surfaces.features(ray)
     x, y, z = mi.Point3f(ray.o) + mi.Vector3f(ray.d) * distance
     weights = [dr.opaque(mi.Float, float(weight)) for weight in z_from_world]
-    height = dr.clip(x * weights[0] + y * weights[1] + z * weights[2] + weights[3], -_FARTHEST, _FARTHEST)
+    # For what lies farther than 100 m the light lines of all lenses are parallel.
+    height = dr.clip(x * weights[0] + y * weights[1] + z * weights[2] + weights[3], -1e5, 1e5)
     is_first = stream.index < dr.opaque(mi.UInt32, plan.samples // 2)
     hits = [dr.select(covered & of_half, mi.Float(1), mi.Float(0)) for of_half in (is_first, ~is_first)]
     values = [mi.Float(part) + dr.zeros(mi.Float, lanes) for part in (*albedo, *normal, height, *hits)]

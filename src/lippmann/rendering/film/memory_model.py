@@ -16,18 +16,17 @@ PREFERRED_LANES, PREFERRED_LANES_OF_GPU = 1 << 20, 1 << 22
 #: Fewer lanes than this leave the threads idle while kernels start.
 SMALLEST_LANES = 1 << 14
 
-#: The picture: float32 RGB, and the copy that a file writer makes of it.
-PICTURE = 24
-#: The squared error of each pixel, its outliers' share and its blur, where a picture is judged band by band.
-ERROR_MAPS = 12
-#: The sums of one batch of samples, float32 RGB.
-BATCH = 12
-#: The errors that are made from batches.
-BATCH_ERRORS = 12
+#: A float32 number, and one for each colour.
+_FLOAT = 4
+_RGB = 3 * _FLOAT
+#: The picture, and the copy that a file writer makes of it.
+PICTURE = 2 * _RGB
+#: The squared error of each pixel, its outliers' share and its blur.
+ERROR_MAPS = 3 * _FLOAT
 #: Seen light of two halves, and what of it is excess, apart from the batches.
-SEEN = 3 * BATCH
+SEEN = 3 * _RGB
 #: Coverage of two halves, of each channel.
-COVERAGE = 8
+COVERAGE = 2 * _FLOAT
 #: One emission of photons, which lands about once, with what sorting takes, in bytes.
 PHOTON = 128
 #: One ray from an emitter to a light vertex, with what it takes to trace it, in bytes.
@@ -36,7 +35,7 @@ LIGHT_VERTEX = 256
 #: the most: 6 for points, 4 for lenses, 8 for places beside centres, 12 for the sorted list.
 POINT_IMAGE = 32
 #: Depth, normal, albedo, shape and position, and the copies that a file writer makes of them.
-AOVS = 2 * 4 * (1 + 3 + 3 + 1 + 3)
+AOVS = 2 * 11 * _FLOAT
 #: Albedo, normal, height and coverage for the denoiser, and what a tile adds to them.
 FEATURE_BUFFERS = 80
 #: Open Image Denoise with its feature buffers, up to the most that the library lets itself have, in bytes.
@@ -48,11 +47,12 @@ WHOLE, WHOLE_WITH_NEIGHBOURS = 48, 256
 
 def batches(number: int) -> int:
     """Bytes per pixel of a picture kept in so many batches: their sums, the picture and its errors."""
-    return number * BATCH + PICTURE + BATCH_ERRORS
+    return number * _RGB + PICTURE + ERROR_MAPS
 
 
 #: A pixel of a tile: eight batches and a wavefront; with what denoising adds, a pixel of a tile with its margin.
-TILE, DENOISED_TILE = batches(8) + BYTES_PER_LANE, 832
+TILE = batches(8) + BYTES_PER_LANE
+DENOISED_TILE = 832
 
 
 def preferred_lanes() -> int:

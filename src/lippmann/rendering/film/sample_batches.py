@@ -45,11 +45,6 @@ Floats = NDArray[np.float32]
 
 #: Batches where the memory allows: their number limits how well rare bright light is told from steady noise.
 MOST_BATCHES = 8
-#: Samples of a first look at how long they take, spread over the picture; enough are those that take as long as this in
-#: seconds, a launch's own time left out.
-_PROBE_SIZES, _PROBE_SECONDS = (1 << 14, 1 << 16, 1 << 18), 0.05
-#: Samples of a launch that takes hardly more than launches do; a single one would have a kernel of its own.
-_LAUNCH_SIZE = 64
 
 
 class FullInBatches(BatchedPicture):
@@ -148,7 +143,7 @@ class FullInBatches(BatchedPicture):
         started = time.perf_counter()
         try:
             with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
-                self._seconds_of(_LAUNCH_SIZE)
+                self._seconds_of(64)  # a single sample would have a kernel of its own
                 compiled = compile_seconds()
             seconds = self._probed()
         finally:
@@ -158,12 +153,9 @@ class FullInBatches(BatchedPicture):
         return seconds
 
     def _probed(self) -> float:
-        launch = min(self._seconds_of(_LAUNCH_SIZE) for _ in range(3))
-        most = min(self._sums.shape[1], max(1, self._lanes // self._source.channels))
-        for pixels in (min(size, most) for size in _PROBE_SIZES):
-            spent = self._seconds_of(pixels)
-            if spent >= launch + _PROBE_SECONDS:
-                break
+        launch = min(self._seconds_of(64) for _ in range(3))
+        pixels = min(1 << 16, self._sums.shape[1], max(1, self._lanes // self._source.channels))
+        spent = self._seconds_of(pixels)
         # However it is measured, the launch takes its part of a small picture's time.
         return max(spent - launch, 0.1 * spent) * self._sums.shape[1] / pixels
 

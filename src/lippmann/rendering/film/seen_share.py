@@ -10,8 +10,6 @@ from lippmann.scene.values.description import Color
 
 #: Pictures that show less than this share of anything carry a warning.
 LEAST_SHARE = 0.01
-#: Difference in linear radiance from which a pixel shows something else than the background.
-_DIFFERENCE = 1e-3
 
 
 def seen_share(pixels: NDArray[np.float32] | None, background: Color | None, rays: RayTotals, samples: int) -> float:
@@ -36,7 +34,7 @@ def seen_share(pixels: NDArray[np.float32] | None, background: Color | None, ray
     """
     if pixels is not None and background is not None:
         step = max(1, len(pixels) // 1024)  # some rows of large pictures tell as much
-        unlike = np.abs(pixels[::step] - np.asarray(background, dtype=np.float32)) > _DIFFERENCE
+        unlike = np.abs(pixels[::step] - np.asarray(background, dtype=np.float32)) > 1e-3
         return float(unlike.any(axis=-1).mean())
     return min(1.0, (rays.shadow + rays.secondary) / samples)
 

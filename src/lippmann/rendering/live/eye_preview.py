@@ -17,7 +17,7 @@ from lippmann.rendering.live.develop import arrange
 from lippmann.rendering.live.seen_pixels import EyeMap, Vector
 from lippmann.rendering.picture import placed_options
 from lippmann.rendering.preview import Preview
-from lippmann.rendering.request.plan import resolve
+from lippmann.rendering.request.plan import BUDGET, resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session
 from lippmann.runtime.engine_lock import exclusive
@@ -25,10 +25,6 @@ from lippmann.scene.scene import Scene
 
 #: Pixels along the longer side of the picture, where nothing is said.
 LONGER_SIDE = 512
-#: Samples that a picture is made of where no number is given, and the most of one (sub-)pixel.
-_SAMPLE_BUDGET, _MOST_SAMPLES = 1 << 20, 64
-#: With so many samples, noise is not worth taking out.
-_CLEAN_FROM = 32
 
 
 @exclusive()
@@ -80,7 +76,8 @@ def render_eye_preview(
     picture = arrange(frame.pixels[0], seen)
     # Where lenses are larger than the picture's pixels, it is made of blocks, which the denoiser has never seen.
     is_fine = 2 * source.width > width * height * whole.channels
-    denoises = samples < _CLEAN_FROM and is_fine and request.denoise != "none" and resolved.integrator in LIGHT
+    # With 32 samples noise is not worth taking out.
+    denoises = samples < 32 and is_fine and request.denoise != "none" and resolved.integrator in LIGHT
     denoises &= not (scene.lies_off_surfaces or scene.fills_panel)
     if denoises:
         load_denoiser()
@@ -114,4 +111,4 @@ def render_eye_preview(
 def _choose_samples(asked: RenderRequest, resolved: RenderRequest, pixels: int) -> int:
     if asked.spp is not None or resolved.spp == 1 or resolved.integrator not in POOLED_LIGHT:
         return resolved.samples
-    return min(max(1, _SAMPLE_BUDGET // max(1, pixels)), _MOST_SAMPLES)
+    return min(max(1, BUDGET.values // max(1, pixels)), 64)

@@ -38,8 +38,6 @@ _LIGHT = ("path", "direct")
 
 #: Lanes of a step of a frame: on two cores about as long as a whole frame of an eye, so that such frames come between.
 STEP_LANES = 1 << 18
-#: Maps and sets of pixels that are kept: of the eyes of some pages, and of a whole panel that moves and that rests.
-_EYES, _WINDOWS = 4, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +95,10 @@ class LiveRenderer:
         self._machine = machine or RenderRequest()
         self._progress = progress
         self._display = display
-        self._map = lru_cache(_EYES)(EyeMap)
-        self._seen = lru_cache(_EYES)(lambda map, eye: map.seen_by(eye))
-        self._window = lru_cache(_WINDOWS)(window_pixels)
+        # Of the eyes of some pages, and of a whole panel that moves and that rests.
+        self._map = lru_cache(4)(EyeMap)
+        self._seen = lru_cache(4)(lambda map, eye: map.seen_by(eye))
+        self._window = lru_cache(2)(window_pixels)
         self._shown: _Stand | None = None
         self._height: Floats = np.zeros(0, np.float32)
         self.set_scene(scene)

@@ -11,7 +11,7 @@ import numpy as np
 
 from lippmann.display import Display
 from lippmann.options.light import LightOptions
-from lippmann.rendering.film.memory_model import BYTES_PER_LANE
+from lippmann.rendering.film.memory_model import BYTES_PER_LANE, PREFERRED_LANES, SMALLEST_LANES
 from lippmann.rendering.live.emitter_updates import EmitterUpdates
 from lippmann.rendering.live.hull_bounds import bounds_by_hull
 from lippmann.rendering.live.live_tracer import FeatureTracer, LiveIntegrator, LiveTracer
@@ -29,8 +29,6 @@ from lippmann.scene.placement import Placement
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
 
-#: Most lanes of a wavefront: larger ones are no faster, and longer to wait for.
-_MOST_LANES = 1 << 20
 #: Most kernels of a kind that are kept: pages of a studio may show a scene on several displays.
 _MOST_KERNELS = 8
 
@@ -70,7 +68,7 @@ class SceneKernels:
     @property
     def most_lanes(self) -> int:
         """Lanes of the largest wavefront that fits the memory."""
-        return max(1 << 14, min(_MOST_LANES, self.session.memory // BYTES_PER_LANE))
+        return max(SMALLEST_LANES, min(PREFERRED_LANES, self.session.memory // BYTES_PER_LANE))
 
     def place(self, display: Display, request: RenderRequest) -> Placement:
         """Where a display stands by a resolved request."""

@@ -15,10 +15,6 @@ from lippmann.runtime.numba_jit import uncounted
 #: where it always lay: were it moved to the pixel's centre, points would drift from lens to lens.
 Beside = NDArray[np.float32]
 
-#: A place this near to the border of two pixels counts as lying on it, in pixels, and belongs to the pixel after it:
-#: rounding must not decide.
-ON_BORDER = 1e-5
-
 
 @uncounted
 def carry(points: PointImage, beside: Beside, field: LensField, numbers: IntArray, step: int) -> None:
@@ -44,7 +40,8 @@ def carry(points: PointImage, beside: Beside, field: LensField, numbers: IntArra
         # Points near to the lens plane are seen by no other lens; whole numbers do not reach as far as their places.
         if not (x > -1.0 and x < width and y > -1.0 and y < height):
             continue
-        c, r = int(np.floor(x + (0.5 + ON_BORDER))), int(np.floor(y + (0.5 + ON_BORDER)))
+        # What lies on the border of two pixels belongs to the pixel after it: rounding must not decide.
+        c, r = int(np.floor(x + (0.5 + 1e-5))), int(np.floor(y + (0.5 + 1e-5)))
         if c < 0 or c >= width or r < 0 or r >= height or field.lens[r, c] != target:
             continue
         taken = points.status[r, c] == REPROJECTED and not nearer(s, np.float64(points.disparity[r, c]))

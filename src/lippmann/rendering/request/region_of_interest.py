@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 _SHOW_BACKGROUND = ("path", "direct")
 #: Pixels about the scene's outline, so that a denoiser sees what the scene stands before.
 _MARGIN = 8
-#: A window of more than this share of the view saves nothing.
-_WORTH = 0.9
 
 
 def even_background(built: BuiltScene | BuiltClassic, request: RenderRequest) -> Color | None:
@@ -98,7 +96,7 @@ def _window(
     left, right = _span(columns, size[0], margin)
     top, bottom = _span(rows, size[1], margin)
     window = PixelWindow(left, top, right - left, bottom - top)
-    return window if window.pixels < _WORTH * size[0] * size[1] else None
+    return window if window.pixels < 0.9 * size[0] * size[1] else None  # a larger one saves nothing
 
 
 def _span(places: NDArray[np.float64], count: int, margin: int) -> tuple[int, int]:

@@ -29,8 +29,6 @@ Floats = NDArray[np.float32]
 
 #: How far light is fetched, in lenses to either side: of a lenticular sheet, and of an array in each direction.
 REACH, REACH_OF_ARRAYS = 4, 3
-#: Rows whose lenses are found at a time.
-_BLOCK = 64
 
 
 def share_light(
@@ -84,8 +82,8 @@ def lens_numbers(display: Display, window: PixelWindow | None = None, *, subpixe
     panel, grid = display.panel, display.lens_grid
     window = window or PixelWindow(0, 0, panel.width, panel.height)
     result = np.empty((3 if subpixels else 1, *window.shape), dtype=np.int32)
-    for first in range(0, window.height, _BLOCK):
-        last = min(first + _BLOCK, window.height)
+    for first in range(0, window.height, 64):
+        last = min(first + 64, window.height)
         band = slice(window.top + first, window.top + last)
         v, u = (index + 0.5 for index in np.mgrid[band, window.columns].astype(np.float64))
         for channel, part in enumerate(result):

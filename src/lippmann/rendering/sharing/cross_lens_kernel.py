@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lippmann.device.kernel_ops import divide
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Array, Float, UInt32
+from lippmann.rendering.film.memory_model import PREFERRED_LANES
 
 #: Sums of squared differences from which on nothing is shared: weights are ``(1 - sum / 10)^8``, which is nearly
 #: ``exp(-0.8 sum)`` and takes a fraction of its time.
@@ -21,14 +22,8 @@ _FADED = 10.0
 _NORMAL = 10.0
 #: Heights count as alike within this share of the height and of the gap.
 _OF_HEIGHT, _OF_GAP = 0.02, 0.5
-#: Weights of a squared distance in pixels across the lenses, and along cylindrical ones.
-_ACROSS, _ALONG = 1.0, 0.3
-#: Heights nearer to the lens plane than this share of the gap are seen by one lens alone.
-_FLAT = 1e-3
-#: What keeps relative differences of light finite in the dark.
-_DARK = 1e-3
-#: Pixels at a time: more take memory, fewer time for each start of the kernel.
-_PIXELS = 2**20
+#: Weight of a squared distance in pixels along cylindrical lenses, across which it is 1.
+_ALONG = 0.3
 
 
 def share(
@@ -53,8 +48,8 @@ def share(
     pixels, channels = height.size, light.shape[2]
     picture = _Picture(light, normal, height, lens, centers, gap, reach, cylindrical, stop)
     shared = np.empty((pixels, channels), dtype=np.float32)
-    for first in range(0, pixels, _PIXELS):
-        last = min(first + _PIXELS, pixels)
+    for first in range(0, pixels, PREFERRED_LANES):
+        last = min(first + PREFERRED_LANES, pixels)
         pixel = dr.arange(mi.UInt32, last - first) + dr.opaque(mi.UInt32, first)
         shared[first:last] = np.array(picture.mean_light(pixel)).T
     return shared.reshape(light.shape)
@@ -89,7 +84,7 @@ class _Picture:
         self._size = opaque(mi.Int32, *height.shape)
         self._lenses = opaque(mi.Int32, *centers.shape[:2])
         self._reach = opaque(mi.Int32, *reach)
-        self._gap, self._down, self._stop = opaque(mi.Float, gap, _ALONG if cylindrical else _ACROSS, stop)
+        self._gap, self._down, self._stop = opaque(mi.Float, gap, _ALONG if cylindrical else 1.0, stop)
 
     @syntax
     def mean_light(self, pixel: UInt32) -> Array:
@@ -105,10 +100,10 @@ class _Picture:
         light = dr.gather(self._light_type, self._light, pixel)
         z = dr.gather(mi.Float, self._height, pixel)
         is_surface = (normal != 0).x | (normal != 0).y | (normal != 0).z
-        is_flat = dr.abs(z) < _FLAT * self._gap
+        is_flat = dr.abs(z) < 1e-3 * self._gap  # seen by one lens alone
         shift = dr.select(is_flat, 1, 1 + self._gap / z)
         per_height = 1 / (dr.abs(z) * _OF_HEIGHT + self._gap * _OF_GAP)
-        per_light = self._stop / (_DARK + dr.squared_norm(light))
+        per_light = self._stop / (1e-3 + dr.squared_norm(light))  # finite in the dark
         # Lenses to either side that see the point, at most.
         seen_by = dr.select(is_flat, 0, mi.Int32(dr.minimum(dr.abs(z) / self._gap + 2, 1e6)))
         reach_i, reach_j = dr.minimum(reach_i, seen_by), dr.minimum(reach_j, seen_by)
@@ -131,7 +126,7 @@ class _Picture:
                     inside &= dr.gather(mi.Int32, self._lens, there, inside) == other
                     du, dv = rx + 0.5 - u, ry + 0.5 - v
                     dz = (dr.gather(mi.Float, self._height, there, inside) - z) * per_height
-                    fade = _ACROSS * du * du + self._down * dv * dv + dz * dz
+                    fade = du * du + self._down * dv * dv + dz * dz
                     if inside & (fade < _FADED):
                         fade += _NORMAL * dr.squared_norm(dr.gather(mi.Vector3f, self._normal, there) - normal)
                         here = dr.gather(self._light_type, self._light, there)

@@ -130,7 +130,7 @@ def _enter(
     excess = s - place.disparity
     low, high = front, back
     low_excess, high_excess = np.nan, excess
-    for _ in range(TUNING.most_halvings):
+    for _ in range(8):
         if abs(excess) * pixels <= TUNING.close:
             break
         s = 0.5 * (low + high)

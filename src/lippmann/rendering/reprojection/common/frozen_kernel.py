@@ -17,19 +17,16 @@ from lippmann.device.array_parts import arrays_of
 from lippmann.device.types import Array
 from lippmann.runtime.collector import no_collection
 
-#: Bytes: the widest vector of a processor.
-_ALIGNMENT = 64
-
 Numbers = NDArray[np.uint32]
 
 
 def aligned(numbers: Numbers) -> Numbers:
-    """A copy that begins at a whole number of :data:`_ALIGNMENT` bytes.
+    """A copy that begins at a whole number of 64 bytes, the widest vector of a processor.
 
     The device reads host memory in place and would record the kernel anew for every new alignment.
     """
-    raw = np.empty(numbers.nbytes + _ALIGNMENT, dtype=np.uint8)
-    start = -raw.ctypes.data % _ALIGNMENT
+    raw = np.empty(numbers.nbytes + 64, dtype=np.uint8)
+    start = -raw.ctypes.data % 64
     copy = raw[start : start + numbers.nbytes].view(np.uint32)
     copy[:] = numbers
     return copy

@@ -22,7 +22,7 @@ from lippmann.runtime.numba_jit import inlined, uncounted
 
 #: What :func:`bridge` does with gaps between different surfaces or colours: want all of their pixels, want the middle
 #: one, or give every pixel the colour of the nearest one that is known.
-TRACE_ALL, TRACE_MIDDLE, TAKE_NEAREST = 0, 1, 2
+TRACE_ALL, TRACE_MIDDLE, TAKE_NEAREST = range(3)
 
 
 @uncounted

@@ -16,7 +16,7 @@ from lippmann.rendering.film.batched_picture import STREAMS
 from lippmann.rendering.film.wavefront import RayTotals, compile_seconds
 from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray, RealArray
 from lippmann.rendering.reprojection.common.frozen_kernel import Frozen, aligned
-from lippmann.rendering.reprojection.common.point_image import BACKGROUND, SMALLEST_HEIGHT, TRACED, PointImage
+from lippmann.rendering.reprojection.common.point_image import BACKGROUND, TRACED, PointImage
 from lippmann.rendering.reprojection.common.thresholds import alike, nearer
 from lippmann.rendering.reprojection.common.tuning import TUNING
 from lippmann.rendering.transport.integrator import ReusableIntegrator
@@ -115,7 +115,7 @@ class PixelTracer:
         p = ray(dr.select(hit, distance, 0))
         a, b, c, d = self._height_row
         z = a * p.x + b * p.y + c * p.z + d
-        z = dr.copysign(dr.maximum(dr.abs(z), SMALLEST_HEIGHT), z)
+        z = dr.copysign(dr.maximum(dr.abs(z), 1e-6), z)  # nothing is nearer to the lens plane than a nanometre
         return dr.select(hit, self._source.display.gap / z, BACKGROUND)
 
 

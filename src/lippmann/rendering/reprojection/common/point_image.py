@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 #: Status of a pixel, as the paper keeps it: -1 is missed, 0 filled. What was filled without tracing keeps marks of its
 #: own, so that maps and counts can tell them apart.
-MISSED, TRACED, REPROJECTED, INTERPOLATED = -1, 0, 1, 2
+MISSED, TRACED, REPROJECTED, INTERPOLATED = range(-1, 3)
 #: A missed pixel that is about to be traced.
-WANTED = -2
+WANTED = MISSED - 1
 
 #: The layer of a picture that holds the status of its pixels.
 STATUS_LAYER = "status"
@@ -19,8 +19,6 @@ STATUS_LAYER = "status"
 #: Disparity of what a ray meets that meets nothing: infinitely far away, behind everything else. Not zero, because the
 #: sign says on which side of the lens plane a point lies; and just as single precision keeps it, to be known again.
 BACKGROUND = float(np.float32(-1e-30))
-#: Heights nearer to the lens plane than this count as this, in mm.
-SMALLEST_HEIGHT = 1e-6
 
 
 class PointImage(NamedTuple):

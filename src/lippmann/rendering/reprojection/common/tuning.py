@@ -41,8 +41,6 @@ class Tuning(NamedTuple):
     close, too_far:
         Pixels. A line of sight enters a surface where the two are this close; farther apart than ``too_far`` it does
         not.
-    most_halvings:
-        Steps at most to find that place.
     averaged_tolerance:
         A careful mean takes neighbours that agree to this part of the tolerance: nothing is known of what lies between
         them, and the two may be wrong in the same sense.
@@ -50,8 +48,6 @@ class Tuning(NamedTuple):
         Part of the tolerance by which a traced pixel must differ from its predicted colour for the search to go on.
     around:
         Pixels to either side of such a pixel that are all traced.
-    most_rounds:
-        Rounds of the search at most. They die out by themselves; what is left then is a handful of pixels.
     """
 
     strides: tuple[int, int, int] = (16, 4, 1)
@@ -66,11 +62,9 @@ class Tuning(NamedTuple):
     rim_tolerance: float = 0.4
     close: float = 0.02
     too_far: float = 0.2
-    most_halvings: int = 8
     averaged_tolerance: float = 0.5
     deviation: float = 0.7
     around: int = 3
-    most_rounds: int = 16
 
 
 TUNING = Tuning()

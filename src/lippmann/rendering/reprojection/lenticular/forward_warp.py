@@ -26,10 +26,6 @@ from lippmann.rendering.reprojection.common.tuning import TUNING
 from lippmann.runtime.numba_jit import compiled, inlined, uncounted
 from lippmann.runtime.row_threads import Bands
 
-#: Column of a row's first probe in eighths of a micro-image; the second lies half a micro-image on. Four rows of probes
-#: visit all eight places, so that no upright line escapes them.
-PROBE_PLACES = (0, 2, 1, 3)
-
 
 class Rows(NamedTuple):
     """The columns of the micro-images in every row, lens by lens from the left.
@@ -63,7 +59,7 @@ class ForwardWarp:
         if row % self._rules.probe_rows:
             return np.empty(0, np.int64)
         first, count = self._rows.first[:-1], np.diff(self._rows.first)
-        place = count * (PROBE_PLACES[row // self._rules.probe_rows % 4] + np.array([[0], [4]])) // 8
+        place = count * (first_place(row // self._rules.probe_rows) + np.array([[0], [4]])) // 8
         return np.unique((first + place)[place < count])
 
     def receive(self, step: Step, unsettled: BoolArray) -> None:
@@ -205,11 +201,20 @@ def draw(
 
 
 @inlined
+def first_place(number: int) -> int:
+    """Column of the first probe in a row, the ``number``-th that has some, in eighths of a micro-image.
+
+    The second lies half a micro-image on. Four rows of probes visit all eight places, so that no upright line escapes.
+    """
+    return 2 * (number & 1) + (number >> 1 & 1)
+
+
+@inlined
 def probe_column(rows: Rows, row: int, lens: int, number: int, probe_rows: int) -> int:
     """Column of probe ``number`` (0, 1) of a lens in ``row``, one of the rows that have probes."""
     begin = rows.first[lens]
     count = rows.first[lens + 1] - begin
-    return int(begin + (count * (PROBE_PLACES[(row // probe_rows) % 4] + 4 * number)) // 8)
+    return int(begin + (count * (first_place(row // probe_rows) + 4 * number)) // 8)
 
 
 @inlined
@@ -260,7 +265,7 @@ def settle(
     s, piece, part, hidden = scratch.disparity, scratch.piece, scratch.part, scratch.hidden
     begin = rows.first[lens]
     count = rows.first[lens + 1] - begin
-    first_probe = (count * PROBE_PLACES[(row // rules.probe_rows) % 4]) // 8
+    first_probe = (count * first_place(row // rules.probe_rows)) // 8
     second_probe = first_probe + count // 2
     missed = 0
     for place in range(count):

@@ -12,7 +12,6 @@ from lippmann.rendering.reprojection.common.lens_map import LensField
 from lippmann.rendering.reprojection.common.pixel_tracer import PixelTracer
 from lippmann.rendering.reprojection.common.point_image import TRACED, PointImage
 from lippmann.rendering.reprojection.common.thresholds import Rules
-from lippmann.rendering.reprojection.common.tuning import TUNING
 from lippmann.rendering.reprojection.retrace import region_growing
 from lippmann.runtime.row_threads import Bands
 
@@ -55,7 +54,8 @@ def search(
 
     ``settled`` is called with the number of pixels that have just been traced.
     """
-    reach, beside = field.reach, np.stack([field.lens_beside(*step) for step in _STEPS], axis=1)
+    sides = ((0, -1), (0, 1), (-1, 0), (1, 0))
+    reach, beside = field.reach, np.stack([field.lens_beside(*side) for side in sides], axis=1)
     wanted = np.zeros(points.status.shape, dtype=np.bool_)
     kernel = region_growing.mark_edges
     bands.lines(kernel, len(wanted), points, field.lens, rules.tolerance, rules.coded, wanted)
@@ -66,7 +66,7 @@ def search(
     traced = np.flatnonzero(points.status == TRACED).astype(np.uint32)
     region_growing.follow_points(points, field, beside, traced, rules, wanted)
     colors = points.color.reshape(-1, 3)
-    for _ in range(TUNING.most_rounds):
+    for _ in range(16):  # rounds die out by themselves; what is left then is a handful of pixels
         numbers = np.flatnonzero(wanted).astype(np.uint32)
         if not len(numbers):
             return
@@ -79,7 +79,3 @@ def search(
         for each in neighborhoods.of_wrong:
             region_growing.mark_surroundings(points, reach, *each, wrong, wanted)
         region_growing.follow_points(points, field, beside, wrong, rules, wanted)
-
-
-#: Lenses down and to the right: the four beside a lens.
-_STEPS = ((0, -1), (0, 1), (-1, 0), (1, 0))
