@@ -19,7 +19,7 @@ def test_clean_pictures_and_asked_numbers_stay():
     assert extra_samples(of(20.0), 8, None) == 0
 
 
-@pytest.mark.parametrize(("psnr", "total"), [(CLEAN - 0.1, 16), (CLEAN - 3.0, 24), (CLEAN - 20.0, 32)])
+@pytest.mark.parametrize(("psnr", "total"), [(CLEAN - 0.1, 16), (CLEAN - 2.5, 24), (CLEAN - 20.0, 32)])
 def test_as_many_as_the_estimate_suggests_but_no_more_than_there_may_be(psnr, total):
     assert extra_samples(of(psnr), 8, 32) == total - 8
 

@@ -153,18 +153,3 @@ def test_what_no_sample_changes_has_no_error():
     found, outliers = errors(np.full((8, 100), 0.3))
     assert np.abs(found).max() < 1e-10
     assert outliers.max() == 0
-
-
-def test_pixels_with_further_samples_are_as_if_all_had_them():
-    from lippmann.rendering.estimate.jackknife import error_of_batches
-
-    random = np.random.default_rng(5)
-    taken, further = [2, 2, 2, 1, 2, 2, 2, 1], random.integers(0, 3, 500) * 4
-    counts = np.asarray(taken)[:, None] + further
-    sums = random.exponential(0.3, (8, 500, 3)) * counts[..., None]
-    found = error_of_batches(sums.astype(np.float32), taken, "srgb", further.astype(np.float32))
-    for more in np.unique(further):
-        some = further == more
-        expected = error_of_batches(sums[:, some].astype(np.float32), [n + int(more) for n in taken], "srgb")
-        for values, others in zip(found, expected, strict=True):
-            assert values[some] == pytest.approx(others, rel=1e-4, abs=1e-7)
