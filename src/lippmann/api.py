@@ -88,6 +88,13 @@ def render(
     ------
     LippmannError
         Of the kind that says what was wrong; see ``lippmann.errors``.
+
+    Examples
+    --------
+    >>> small = lippmann.load_display("seed-lenticular").resized(16, 8)
+    >>> image = lippmann.render("teapot", small, integrator="normal", spp=1)
+    >>> image.pixels.shape
+    (8, 16, 3)
     """
     from lippmann.rendering.picture import render_picture
 
@@ -138,6 +145,12 @@ def render_to_file(
     ------
     LippmannError
         Of the kind that says what was wrong.
+
+    Examples
+    --------
+    >>> small = lippmann.load_display("seed-lenticular").resized(16, 8)
+    >>> lippmann.render_to_file("teapot", "teapot.png", small, integrator="normal", spp=1).provenance.spp
+    1
     """
     from lippmann.tiles.tiled_render import render_to_file as rendered
 
@@ -186,6 +199,11 @@ def preview(
     ------
     LippmannError
         Of the kind that says what was wrong.
+
+    Examples
+    --------
+    >>> lippmann.preview("teapot", (16, 8), integrator="normal").pixels.shape
+    (8, 16, 3)
     """
     from lippmann.rendering.preview import render_preview
 
@@ -229,6 +247,11 @@ def render_quilt(
     ------
     LippmannError
         Of the kind that says what was wrong.
+
+    Examples
+    --------
+    >>> lippmann.render_quilt("teapot", views=(2, 1), size=(256, 256), integrator="normal", spp=1).layout.columns
+    2
     """
     from lippmann.quilts.quilt import Quilt, quilt_of_display
     from lippmann.rendering.quilt import render_quilt as rendered
@@ -287,6 +310,13 @@ def render_turntable(
     ------
     LippmannError
         Of the kind that says what was wrong; before the first frame for what can be told then.
+
+    Examples
+    --------
+    >>> small = lippmann.load_display("seed-lenticular").resized(16, 8)
+    >>> frames = lippmann.render_turntable("teapot", small, 2, integrator="normal", spp=1)
+    >>> [frame.pixels.shape for frame in frames]
+    [(8, 16, 3), (8, 16, 3)]
     """
     from lippmann.sequences.frames import render_sequence
     from lippmann.sequences.turntable import open_turntable
@@ -328,6 +358,12 @@ def plan(
     ------
     LippmannError
         Of the kind that says what was wrong, as :func:`render` would find it before its first ray.
+
+    Examples
+    --------
+    >>> small = lippmann.load_display("seed-lenticular").resized(16, 8)
+    >>> lippmann.plan("teapot", small, spp=2).rays["primary"]
+    256
     """
     from lippmann.rendering.forecast import forecast
 
@@ -384,6 +420,11 @@ def studio(
     ------
     LippmannError
         Of the kind that says what was wrong.
+
+    Examples
+    --------
+    >>> with lippmann.studio("teapot") as page:  # doctest: +SKIP
+    ...     print(page.address)
     """
     from lippmann.studio_app.notebook import NotebookStudio, state_of_settings
 

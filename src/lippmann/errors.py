@@ -36,6 +36,14 @@ class LippmannError(Exception):
         What would have been right.
     fix:
         What the user can do about it.
+
+    Examples
+    --------
+    >>> try:
+    ...     lippmann.render("teapot", spp=0)
+    ... except lippmann.LippmannError as error:
+    ...     print(error.parameter)
+    spp
     """
 
     exit_code = 2

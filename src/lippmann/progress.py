@@ -8,7 +8,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Progress:
-    """One report: ``done`` of ``total`` units of work of one stage (``load``, ``build``, ``trace``, ``write``, ...)."""
+    """One report: ``done`` of ``total`` units of work of one stage (``load``, ``build``, ``trace``, ``write``, ...).
+
+    Examples
+    --------
+    >>> report = lippmann.Progress("trace", done=3, total=4)
+    >>> f"{report.stage}: {report.done / report.total:.0%}"
+    'trace: 75%'
+    """
 
     stage: str
     done: float

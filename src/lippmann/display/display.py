@@ -96,6 +96,12 @@ class Display:
     ------
     DisplayError
         If a value is out of range, or a lens has more pixels than the panel, or less than one.
+
+    Examples
+    --------
+    >>> panel, lenses = lippmann.Panel(60, 40, pixel_pitch=0.1), lippmann.LensArray("square", pitch=1.0)
+    >>> lippmann.Display("mine", panel, lenses, gap=3.0).panel.width
+    60
     """
 
     name: str

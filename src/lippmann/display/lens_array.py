@@ -39,6 +39,11 @@ class LensArray:
     ------
     DisplayError
         If a value is out of its range or does not belong to the layout.
+
+    Examples
+    --------
+    >>> lippmann.LensArray("lenticular", pitch=0.5, slant=10.0).layout
+    'lenticular'
     """
 
     layout: Layout

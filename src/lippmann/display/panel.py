@@ -43,6 +43,11 @@ class Panel:
     ------
     DisplayError
         If a count is not a whole number of at least 1, or a length is not finite and positive.
+
+    Examples
+    --------
+    >>> lippmann.Panel(1536, 2048, pixel_pitch=0.0785).width
+    1536
     """
 
     width: int

@@ -66,6 +66,14 @@ class IntegralImage(Picture):
     ------
     PictureError
         If a shape, type or value is another.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> display = lippmann.load_display("mla-square")
+    >>> image = lippmann.IntegralImage(np.zeros((510, 510, 3), dtype=np.float32), display)
+    >>> image.replay((0.0, 0.0, 300.0), size=(34, 34)).shape
+    (34, 34, 3)
     """
 
     pixels: FloatArray

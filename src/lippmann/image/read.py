@@ -176,6 +176,14 @@ def read_picture(path: str | Path, *, display: Display | str | PathLike[str] | N
     ------
     PictureError
         If the file is missing, empty, foreign or damaged, has no display, or a size other than the display's.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> black = np.zeros((510, 510, 3), dtype=np.float32)
+    >>> lippmann.IntegralImage(black, lippmann.load_display("mla-square")).save("black.png")
+    >>> lippmann.read_picture("black.png").display.name
+    'mla-square'
     """
     return open_file(path).picture(display)
 

@@ -39,6 +39,11 @@ class LightOptions(Options):
     ------
     UsageError
         A value is out of its range.
+
+    Examples
+    --------
+    >>> light = lippmann.LightOptions(light_turn=(30.0, 10.0), light_strength=2.0)
+    >>> scene = lippmann.load_scene("teapot", light=light)
     """
 
     noun = "light"

@@ -55,6 +55,12 @@ class PlacementOptions(Options):
     ------
     UsageError
         A value is out of its range, or two options contradict each other.
+
+    Examples
+    --------
+    >>> placement = lippmann.PlacementOptions(turn=(30.0, 0.0, 0.0), pop_out=0.5)
+    >>> placement.pop_out
+    0.5
     """
 
     noun = "placement"

@@ -63,6 +63,11 @@ class Scene:
 
     A scene from Mitsuba knows its ``bounds``, ``cameras``, ``lights`` and hence ``environment``, ``background`` and
     ``notes`` only once the engine has started: asked before, they start it.
+
+    Examples
+    --------
+    >>> lippmann.load_scene("teapot").name
+    'teapot'
     """
 
     name: str

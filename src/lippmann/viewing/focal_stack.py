@@ -52,6 +52,14 @@ def focal_stack(
     ------
     UsageError
         If a plane is not finite or not below the viewing distance, or the size is out of range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> display = lippmann.load_display("mla-square")
+    >>> image = lippmann.IntegralImage(np.zeros((510, 510, 3), dtype=np.float32), display)
+    >>> lippmann.focal_stack(image, [-10.0, 0.0, 10.0], size=(34, 34)).shape
+    (3, 34, 34, 3)
     """
     return np.stack(list(_reported(focal_planes(image, planes, size=size), len(planes), progress)))
 

@@ -91,6 +91,14 @@ def replay_stereo(
     ------
     UsageError
         If a value is out of range, or ``stereo`` is unknown.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> display = lippmann.load_display("mla-square")
+    >>> image = lippmann.IntegralImage(np.zeros((510, 510, 3), dtype=np.float32), display)
+    >>> lippmann.replay_stereo(image, (0.0, 0.0, 300.0), stereo="full", size=(34, 34)).shape
+    (34, 68, 3)
     """
     head = default_eye(image.display) if head is None else head
     return stereo_pair(lambda eye: replay(image, eye, size=size, filter=filter), head, stereo, eyes)

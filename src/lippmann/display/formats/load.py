@@ -78,6 +78,11 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
     DisplayError
         If there is neither, or the file cannot be read or does not describe a possible display; several devices are
         called so.
+
+    Examples
+    --------
+    >>> lippmann.load_display("Looking Glass Go").name
+    'looking-glass-go'
     """
     presets = _preset_texts()
     name = os.fspath(name_or_path)
@@ -102,7 +107,13 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
 
 
 def list_displays() -> list[Display]:
-    """All presets, by name."""
+    """All presets, by name.
+
+    Examples
+    --------
+    >>> [display.name for display in lippmann.list_displays()][-1]
+    'seed-lenticular'
+    """
     return [_from_toml(text, where=f"{name}.toml", stem=name) for name, text in _preset_texts().items()]
 
 

@@ -46,6 +46,11 @@ class RenderRequest(MachineOptions, QualityOptions):
     ------
     UsageError
         A value is unknown or out of its range.
+
+    Examples
+    --------
+    >>> lippmann.RenderRequest(method="full", spp=4).spp
+    4
     """
 
     placement: PlacementOptions | Placement = field(default_factory=PlacementOptions)

@@ -176,6 +176,12 @@ def load_scene(
         The scene or something it needs is missing, damaged, foreign, or has nothing to see.
     UsageError
         An option is out of its range or not for such a scene, or ``source`` is an object that is not understood.
+
+    Examples
+    --------
+    >>> scene = lippmann.load_scene("teapot", background=(0.0, 0.0, 0.1))
+    >>> len(scene.cameras)
+    1
     """
     allow_outside = options.pop("allow_outside", False)
     if isinstance(light, Mapping):
