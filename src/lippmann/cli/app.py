@@ -32,6 +32,11 @@ GROUPS: Mapping[str, Mapping[str, tuple[str, str, str]]] = {
             "plan",
             "Say what 'render' will show and take, without rendering: depth, blur, rays, memory and time.",
         ),
+        "proof": (
+            "proof",
+            "proof",
+            "Prove a display: directions, crosstalk, depth, field, viewing zone and moire of its lenses and pixels.",
+        ),
         "quilt": ("quilt", "quilt", "Quilts: all views side by side in one picture."),
     },
     "Look": {

@@ -61,12 +61,18 @@ def kernel(shape: Trapezoid, blur: float, step: float) -> Real:
     """
     half = math.ceil((0.5 * shape.base) / step + 0.5)
     lit = shape.shares((np.arange(2.0 * half + 2.0) - half - 0.5) * step)
+    return np.convolve(lit, ink_kernel(blur, step))
+
+
+def ink_kernel(blur: float, step: float) -> Real:
+    """Shares of a point's light on places ``step`` wide around it, as ink blurs it; an odd number of them."""
     if blur <= 0.0:
-        return lit
+        return np.ones(1)
     half = math.ceil(_TAIL * blur / step + 0.5)
     edges = (np.arange(2 * half + 2) - half - 0.5) * step
     ink = np.diff([0.5 * math.erf(edge / (blur * math.sqrt(2.0))) for edge in edges])
-    return np.convolve(lit, ink / ink.sum())
+    shares: Real = ink / ink.sum()
+    return shares
 
 
 def width_at_half_height(values: Real, step: float) -> float:

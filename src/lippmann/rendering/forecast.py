@@ -7,7 +7,7 @@ the picture's own settings in ever larger wavefronts for about two seconds. What
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ from lippmann.device.types import Point2f, Ray3f, UInt32
 from lippmann.display import Display
 from lippmann.display.view_cone import FUSED_CONE, depth_gain_of_fused_cone, view_cone
 from lippmann.optics.lens import lens_notes
+from lippmann.optics.proof import Proof, prove
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
@@ -75,6 +76,8 @@ class Forecast:
         picture, ``wavefronts`` how many there are.
     probe:
         ``samples`` that were traced, and ``seconds`` that they took.
+    proof:
+        What the display's lenses will show, see :func:`lippmann.optics.proof.prove`; None where it gives none.
     notes:
         One line each: what will be blurred, cut or outside, and what reader and builder had to say.
     """
@@ -98,6 +101,7 @@ class Forecast:
     plan: dict[str, dict[str, object]]
     probe: dict[str, float]
     device: str
+    proof: Proof | None
     notes: tuple[str, ...]
 
     def in_words(self) -> dict[str, str]:
@@ -111,12 +115,14 @@ class Forecast:
         stages = ", ".join(f"{stage} {duration_in_words(s)}" for stage, s in self.seconds.items() if stage != "total")
         others = self.rays["shadow"] + self.rays["secondary"]
         resolved = depths_in_words(*self.resolvable_range)
+        proof = {} if self.proof is None else self.proof.in_words()
         return {
             "picture": f"{self.scene} for {self.display}, {width}x{height} pixels{of_frames}{of_subpixels}",
             "scene": depths_in_words(*self.depth_range),
             "resolved": f"{resolved}, in a view cone of {self.view_cone:.0f} degrees{gain}",
             "blur": f"{100 * self.blurred_share:.0f} % of the pixels see what lies beyond; "
             f"a pixel's light spreads over {back:.1f} lenses at the back, {front:.1f} at the front",
+            **{name: proof[name] for name in ("crosstalk", "advice") if name in proof},
             "rays": f"{self.rays['primary'] / 1e6:.1f} M from pixels ({samples_in_words(self.spp, 'each')}), "
             f"about {others / 1e6:.1f} M more",
             "memory": f"about {self.memory['expected'] / 2**30:.1f} GiB, "
@@ -132,7 +138,9 @@ class Forecast:
 
     def to_dict(self) -> dict[str, object]:
         """All of it as plain values for JSON."""
-        return {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(self).items()}
+        values = asdict(replace(self, proof=None))
+        proof = None if self.proof is None else self.proof.to_dict()
+        return {**{name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}, "proof": proof}
 
 
 @exclusive()
@@ -198,6 +206,7 @@ def forecast(
         plan=_plan(session, source, window),
         probe={"samples": found.samples, "seconds": found.seconds},
         device=session.engine.gpu_name or f"cpu, {session.engine.threads} threads",
+        proof=None if display.lens is None else prove(display),
         notes=(*session.notes, *placement.warnings, *lens_notes(display)),
     )
 

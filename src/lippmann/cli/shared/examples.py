@@ -12,6 +12,10 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "lippmann render teapot --display print --lpi 60 --ppi 720 --size 8x10in -o teapot.tif",
     ),
     "preview": ("lippmann preview model.glb --turn 30", "lippmann preview model.glb --display panel-4k -o seen.png"),
+    "proof": (
+        "lippmann proof print:lpi=60,ppi=720,size=8x10in,thickness=26mil -o proof.pdf",
+        "lippmann proof panel-4k --json",
+    ),
     "plan": ("lippmann plan model.glb --display panel-8k", "lippmann plan teapot --spp 64 --memory 4G"),
     "worker": (
         "lippmann worker tcp://10.0.0.1:8786",
