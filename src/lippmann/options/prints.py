@@ -24,7 +24,9 @@ class PrintOptions(Options):
     )
     thickness: str | None = _print(help="Thickness of the sheet, such as 0.66mm or 26mil.")
     index: str | None = _print(help="Refractive index of the sheet. Default: 1.57.")
-    field: str | None = _print(help="Field of view in degrees. Default: that of the best focus with `thickness`, else 54.")
+    field: str | None = _print(
+        help="Field of view in degrees. Default: that of the best focus with `thickness`, else 54."
+    )
 
 
 @dataclass(frozen=True)
