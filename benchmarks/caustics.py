@@ -71,7 +71,9 @@ def measure(name: str, file: Path | None, reference_samples: int) -> dict[str, A
 
 def _by_paths(stage: Stage) -> None:
     """All light by paths."""
-    stage.integrator = stage.integrator.lit_with(photons=None, photon_passes=None, chains=None)
+    stage.integrator = stage.integrator.lit_by(
+        replace(stage.integrator.light, photons=None, photon_passes=None, chains=None)
+    )
 
 
 def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:

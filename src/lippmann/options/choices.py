@@ -16,7 +16,7 @@ Device = Literal["auto", "cpu", "gpu"]
 #: files for data.
 ToneMap = Literal["auto", "none", "pbr-neutral"]
 Denoiser = Literal["auto", "none", "oidn", "oidn-fast", "oidn-high"]
-#: ``auto``: photons where a few find that there are caustics.
+#: ``auto``: photons where a few of them land in the picture.
 Caustics = Literal["auto", "photons", "paths", "none"]
 
 #: The methods that reuse points of one micro-image in others.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,7 +57,7 @@ def matt_plane(passes):
     scene = mi.load_dict({"type": "scene", "plane": plane})
     integrator = PathIntegrator(scene, make_scene_features(scene, has_null=False), 2)
     if passes is not None:
-        integrator = integrator.lit_with(photons=passes.of_pass(0), photon_passes=passes)
+        integrator = integrator.lit_by(replace(integrator.light, photons=passes.of_pass(0), photon_passes=passes))
     pose = np.eye(4)
     pose[2, 3] = 5.0
     return integrator, CameraRays(Camera("test", pose, height=1.0), SIZE, SIZE)
@@ -139,7 +141,7 @@ def test_the_estimate_of_a_picture_counts_it():
     errors = batches.squared_error()
     counted = errors.values.copy()
     np.testing.assert_array_equal(errors.blur, blur)
-    without = integrator.lit_with(photon_passes=None)
+    without = integrator.lit_by(replace(integrator.light, photon_passes=None))
     plain = FullInBatches(without, source, seed=3, memory=1 << 28)
     plain.add(8)
     assert plain.squared_blur() is None

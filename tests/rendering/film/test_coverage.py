@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -120,7 +122,8 @@ def test_it_is_told_with_chains_and_left_out_elsewhere(session):
     from lippmann.rendering.film.sample_batches import FullInBatches
 
     plain = batches(session, rays(), 4).coverage_halves()
-    integrator = session.integrator(rays(), np.eye(4)).lit_with(chains=dr.opaque(mi.UInt32, 2))
+    integrator = session.integrator(rays(), np.eye(4))
+    integrator = integrator.lit_by(replace(integrator.light, chains=dr.opaque(mi.UInt32, 2)))
     chained = FullInBatches(integrator, rays(), seed=3, memory=1 << 28, for_denoiser=True)
     chained.add(4)
     for a, b in zip(plain, chained.coverage_halves(), strict=True):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -218,7 +219,7 @@ def test_samples_of_one_pass_are_taken_together():
     scene = mi.load_dict({"type": "scene", "sky": {"type": "constant"}})
     integrator = PathIntegrator(scene, make_scene_features(scene, has_null=False), 3)
     assert list(_stretches(integrator, 7, 100)) == [(integrator, 100)]
-    integrator = integrator.lit_with(photon_passes=Passes())
+    integrator = integrator.lit_by(replace(integrator.light, photon_passes=Passes()))
     found = [(count, each.light.photons) for each, count in _stretches(integrator, 20, 50)]
     assert found == [(12, "photons 0"), (32, "photons 1"), (6, "photons 2")]
     assert [count for _, count in _stretches(integrator, 64, 32)] == [32]

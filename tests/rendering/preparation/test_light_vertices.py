@@ -61,13 +61,14 @@ def stage(scene):
 
 def given(integrator, source, /, *, gain=1.0, memory=1 << 30, **options):
     from lippmann.rendering.preparation.light_vertices import trace_light_vertices
+    from lippmann.rendering.preparation.pilot import trace_pilot
     from lippmann.rendering.request.render_request import RenderRequest
 
     request = RenderRequest(**({"integrator": "path", "spp": 16} | options))
-    passes = trace_light_vertices(integrator, request, source, memory, gain)
+    passes = trace_light_vertices(integrator, request, trace_pilot(integrator, source), memory, gain)
     if passes is None:
         return None
-    return integrator.lit_with(light_vertices=passes.of_pass(0), vertex_passes=passes)
+    return integrator.lit_by(replace(integrator.light, light_vertices=passes.of_pass(0), vertex_passes=passes))
 
 
 def batches(integrator, source, memory=1 << 30, spp=16, seed=5):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -166,7 +168,7 @@ def traced(scene_dict, view, *, photons, size=24, spp=64, seed=0, depth=6, sampl
     integrator = PathIntegrator(scene, features, depth)
     if photons:
         photons = CausticPhotons(scene, features, find_casters(scene), samples=samples, seed=seed)
-        integrator = integrator.lit_with(photons=photons.of_pass(0))
+        integrator = integrator.lit_by(replace(integrator.light, photons=photons.of_pass(0)))
     plan = cut_wavefronts(size, size, spp, memory=2**31)
     return trace_frame(integrator, CameraRays(view, size, size), plan, seed=seed).pixels
 

@@ -60,16 +60,29 @@ def picture(integrator, source, samples, seed):
     return trace_frame(integrator, source, cut_wavefronts(SIZE, SIZE, samples, memory=2**31), seed=seed).pixels
 
 
+def estimated_weights(integrator, source):
+    from lippmann.rendering.preparation.emitter_weights import emitter_weights
+    from lippmann.rendering.preparation.pilot import trace_pilot
+
+    return emitter_weights(trace_pilot(integrator, source))
+
+
+def pilot_sampler(integrator, source):
+    from lippmann.rendering.preparation.emitter_weights import make_light_sampler
+    from lippmann.rendering.preparation.pilot import trace_pilot
+
+    return make_light_sampler(integrator.scene, trace_pilot(integrator, source))
+
+
 def sampling_weights(scene):
     return [float(emitter.sampling_weight()) for emitter in scene.emitters()]
 
 
 @pytest.mark.parametrize("order", [("sky", "bright", "faint"), ("faint", "sky", "bright"), ("bright", "faint", "sky")])
 def test_emitters_are_sampled_by_their_contribution(order):
-    from lippmann.rendering.preparation.emitter_weights import estimate_emitter_weights
     from lippmann.rendering.preparation.tuning import TUNING
 
-    weights = estimate_emitter_weights(*stage(room(order)))
+    weights = estimated_weights(*stage(room(order)))
     by_name = dict(zip(order, weights, strict=True))
     assert weights.sum() == pytest.approx(1)
     assert by_name["sky"] == pytest.approx(TUNING.uniform_share / 3)
@@ -80,25 +93,23 @@ def test_emitters_of_a_scene_with_another_sky_are_told_apart():
     """The new sky comes first among a scene's objects."""
     import mitsuba as mi
 
-    from lippmann.rendering.preparation.emitter_weights import estimate_emitter_weights
     from lippmann.rendering.preparation.tuning import TUNING
     from lippmann.scene.mitsuba_source import with_sky
 
     sky = mi.load_dict({"type": "constant", "radiance": 3.0})
     integrator, source = stage(with_sky(mi.load_dict(room(("bright", "faint"))), sky))
-    weights = estimate_emitter_weights(integrator, source)
+    weights = estimated_weights(integrator, source)
     unseen = [number for number, emitter in enumerate(integrator.scene.emitters()) if emitter.is_environment()]
     assert weights[unseen] == pytest.approx(TUNING.uniform_share / 3)
 
 
 def test_the_scene_stays_as_it_was():
-    from lippmann.rendering.preparation.emitter_weights import estimate_emitter_weights, make_light_sampler
 
     integrator, source = stage(room())
-    first = estimate_emitter_weights(integrator, source)
-    make_light_sampler(integrator, source)
+    first = estimated_weights(integrator, source)
+    pilot_sampler(integrator, source)
     assert sampling_weights(integrator.scene) == [1.0, 1.0, 1.0]
-    assert np.array_equal(estimate_emitter_weights(integrator, source), first)
+    assert np.array_equal(estimated_weights(integrator, source), first)
 
 
 @pytest.mark.slow
@@ -170,7 +181,7 @@ def test_white_furnace_is_one_by_any_weights(weights):
         }
     )
     integrator, source = stage(scene, depth=8)
-    integrator = integrator.lit_with(sampler=WeightedLightSampler(scene, np.array(weights)))
+    integrator = integrator.lit_by(replace(integrator.light, sampler=WeightedLightSampler(scene, np.array(weights))))
     pixels = picture(integrator, source, 512, 1)
     blocks = pixels.reshape(4, 6, 4, 6, 3).mean(axis=(1, 3, 4))
     assert blocks == pytest.approx(1.0, abs=0.02)
@@ -182,7 +193,6 @@ def test_delta_emitters_give_the_same_picture_by_any_weights():
     """A point light, a spot light and a sun above a floor: no scattered ray hits them, and their pdf has no angle."""
     import mitsuba as mi
 
-    from lippmann.rendering.preparation.emitter_weights import make_light_sampler
     from lippmann.rendering.transport.light_sampling import WeightedLightSampler
 
     transform = mi.ScalarTransform4f
@@ -203,10 +213,10 @@ def test_delta_emitters_give_the_same_picture_by_any_weights():
     # Cutting the samples of a pixel into the emitters' shares is stratified, so that little noise is left.
     uniform = picture(integrator, source, samples, 3)
     for lights in (
-        make_light_sampler(integrator, source),
+        pilot_sampler(integrator, source),
         WeightedLightSampler(integrator.scene, np.array([0.15, 0.6, 0.25])),
     ):
-        weighted = picture(integrator.lit_with(sampler=lights), source, samples, 4)
+        weighted = picture(integrator.lit_by(replace(integrator.light, sampler=lights)), source, samples, 4)
         assert np.abs(weighted - uniform).max() < 0.02 * uniform.max()
         assert weighted.mean() == pytest.approx(uniform.mean(), rel=1e-3)
 
@@ -214,7 +224,6 @@ def test_delta_emitters_give_the_same_picture_by_any_weights():
 @pytest.mark.slow
 def test_more_emitters_than_are_weighed_have_a_picture():
     """Beyond the most emitters the scene's own sampling is used, and each light still arrives."""
-    from lippmann.rendering.preparation.emitter_weights import make_light_sampler
     from lippmann.rendering.preparation.tuning import TUNING
     from lippmann.rendering.transport.light_sampling import SceneLightSampler
 
@@ -224,19 +233,18 @@ def test_more_emitters_than_are_weighed_have_a_picture():
     }
     floor = {"type": "rectangle", "bsdf": {"type": "diffuse", "reflectance": 0.5}}
     integrator, source = stage({"type": "scene", "floor": floor} | lights, depth=1)
-    assert isinstance(make_light_sampler(integrator, source), SceneLightSampler)
+    assert isinstance(pilot_sampler(integrator, source), SceneLightSampler)
     one, _ = stage({"type": "scene", "floor": floor, "light": lights["light0"] | {"intensity": 1.0}}, depth=1)
     assert picture(integrator, source, 1, 0) == pytest.approx(picture(one, source, 1, 0), rel=1e-3)
 
 
 @pytest.mark.slow
 def test_the_picture_stays_and_its_noise_falls():
-    from lippmann.rendering.preparation.emitter_weights import make_light_sampler
 
     integrator, source = stage(room())
     runs, samples = 12, 16
     even = np.stack([picture(integrator, source, samples, seed) for seed in range(runs)])
-    integrator = integrator.lit_with(sampler=make_light_sampler(integrator, source))
+    integrator = integrator.lit_by(replace(integrator.light, sampler=pilot_sampler(integrator, source)))
     weighted = np.stack([picture(integrator, source, samples, 100 + seed) for seed in range(runs)])
     assert weighted.var(axis=0, ddof=1).mean() < 0.5 * even.var(axis=0, ddof=1).mean()
     blocks = [x.reshape(runs, 4, 6, 4, 6, 3).mean(axis=(2, 4)) for x in (even, weighted)]
@@ -247,7 +255,6 @@ def test_the_picture_stays_and_its_noise_falls():
 
 def test_emitters_without_contribution_are_sampled_uniformly():
     """A camera that sees no surface."""
-    from lippmann.rendering.preparation.emitter_weights import estimate_emitter_weights, make_light_sampler
     from lippmann.rendering.transport.light_sampling import SceneLightSampler
     from lippmann.rendering.transport.ray_source import CameraRays
     from lippmann.scene.values.description import Camera
@@ -258,39 +265,39 @@ def test_emitters_without_contribution_are_sampled_uniformly():
     pose = np.diag([-1.0, 1.0, -1.0, 1.0])  # looks away from the emitters
     pose[2, 3] = 5.0
     source = CameraRays(Camera("away", pose, fov_y=0.5), SIZE, SIZE)
-    assert estimate_emitter_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
-    assert isinstance(make_light_sampler(integrator, source), SceneLightSampler)
+    assert estimated_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
+    assert isinstance(pilot_sampler(integrator, source), SceneLightSampler)
 
 
 def test_invalid_contributions_do_not_count(monkeypatch):
-    from lippmann.rendering.preparation import emitter_weights
+    from lippmann.rendering.preparation import pilot
 
     integrator, source = stage(room())
-    whole = emitter_weights.estimate_emitter_weights(integrator, source)
-    along = emitter_weights._squared_contributions
+    whole = estimated_weights(integrator, source)
+    along = pilot._contributions
 
     def some_lost(*given):
         import drjit as dr
         import mitsuba as mi
 
-        squares = along(*given)
-        return dr.select(dr.arange(mi.UInt32, dr.width(squares)) % 64 == 0, dr.nan, squares)
+        squares, *others = along(*given)
+        return dr.select(dr.arange(mi.UInt32, dr.width(squares)) % 64 == 0, dr.nan, squares), *others
 
-    monkeypatch.setattr(emitter_weights, "_squared_contributions", some_lost)
-    assert emitter_weights.estimate_emitter_weights(integrator, source) == pytest.approx(whole, rel=0.05)
+    monkeypatch.setattr(pilot, "_contributions", some_lost)
+    assert estimated_weights(integrator, source) == pytest.approx(whole, rel=0.05)
 
 
 def test_no_emitter_one_or_very_many_keep_the_weights_of_the_scene(monkeypatch):
-    from lippmann.rendering.preparation import emitter_weights
+    from lippmann.rendering.preparation import pilot
     from lippmann.rendering.transport.light_sampling import SceneLightSampler
 
     for order in ((), ("bright",)):
         integrator, source = stage(room(order))
-        assert emitter_weights.estimate_emitter_weights(integrator, source).tolist() == [1.0] * len(order)
-        assert isinstance(emitter_weights.make_light_sampler(integrator, source), SceneLightSampler)
-    monkeypatch.setattr(emitter_weights, "TUNING", replace(emitter_weights.TUNING, most_weighed_emitters=2))
+        assert estimated_weights(integrator, source) == pytest.approx([1.0] * len(order))
+        assert isinstance(pilot_sampler(integrator, source), SceneLightSampler)
+    monkeypatch.setattr(pilot, "TUNING", replace(pilot.TUNING, most_weighed_emitters=2))
     integrator, source = stage(room())
-    assert emitter_weights.estimate_emitter_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
+    assert estimated_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
 
 
 @pytest.mark.slow

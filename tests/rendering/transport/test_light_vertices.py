@@ -6,6 +6,7 @@ Pictures with and without are compared by blocks of pixels and as a whole, each 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -124,7 +125,9 @@ def pictures(integrator, source, joined, *, seeds, spp=8):
     plan = cut_wavefronts(SIDE, SIDE, spp, memory=2**30)
     found = []
     for seed in seeds:
-        lit = integrator.lit_with(light_vertices=passes(integrator, seed).of_pass(0) if joined else None)
+        lit = integrator.lit_by(
+            replace(integrator.light, light_vertices=passes(integrator, seed).of_pass(0) if joined else None)
+        )
         found.append(trace_frame(lit, source, plan, seed=seed).pixels)
     return np.stack(found).astype(np.float64)
 
@@ -169,7 +172,9 @@ def test_weights_are_those_of_the_light_sampler_in_use():
     from lippmann.rendering.transport.light_sampling import WeightedLightSampler
 
     integrator, source = prepared(room("sphere", "point"))
-    integrator = integrator.lit_with(sampler=WeightedLightSampler(integrator.scene, np.array([0.7, 0.05, 0.25])))
+    integrator = integrator.lit_by(
+        replace(integrator.light, sampler=WeightedLightSampler(integrator.scene, np.array([0.7, 0.05, 0.25])))
+    )
     plain, joined = (pictures(integrator, source, way, seeds=range(24)) for way in (False, True))
     agree(plain, joined)
 
@@ -189,7 +194,9 @@ def test_a_limit_on_indirect_light_holds_for_joins():
 
     integrator, source = prepared(room("point"), depth=2)
     limited, none = (
-        pictures(integrator.lit_with(most_indirect=mi.Float(most)), source, True, seeds=range(4))
+        pictures(
+            integrator.lit_by(replace(integrator.light, most_indirect=mi.Float(most))), source, True, seeds=range(4)
+        )
         for most in (0.02, 0.0)
     )
     direct = pictures(prepared(room("point"), depth=1)[0], source, False, seeds=range(4))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -69,10 +71,57 @@ def test_one_photon_stands_for_all_in_proportion_to_its_power():
 
 
 @pytest.mark.slow
+def irradiance_of_cell(photons, position, normal, side):
+    """The irradiance of :meth:`PhotonMap.gather` at a surface that is not seen, point by point: ``(m, 3)``.
+
+    The plane's area in a cell is that of the polygon of its meetings with the cell's edges.
+    """
+    from scipy.spatial import ConvexHull
+
+    from lippmann.rendering.transport.photon_map import _LEAST_AREA
+    from lippmann.rendering.transport.tuning import TUNING
+
+    found = np.zeros((len(position), 3), np.float32)
+    corners = np.array(list(itertools.product((0, 1), repeat=3)), np.float64)
+    edges = [(a, b) for a in range(8) for b in range(a) if np.abs(corners[a] - corners[b]).sum() == 1]
+    for number, (point, n) in enumerate(zip(position.astype(np.float64), normal.astype(np.float64), strict=True)):
+        cell = np.floor(point / side)
+        height = ((cell + corners) * side - point) @ n
+        meetings = np.array(
+            [
+                corners[a] + height[a] / (height[a] - height[b]) * (corners[b] - corners[a])
+                for a, b in edges
+                if height[a] * height[b] < 0
+            ]
+        )
+        flat = np.linalg.svd(n[None])[2][1:]  # two directions in the plane
+        area = max(ConvexHull(meetings * side @ flat.T).volume, _LEAST_AREA * side**2)
+        fits = (np.floor(photons.position / side) == cell).all(axis=1)
+        fits &= (photons.normal @ n > TUNING.least_agreement) & (photons.toward @ n > 0)
+        fits &= np.abs((photons.position - point) @ n) < TUNING.farthest_from_plane * side
+        found[number] = photons.power[fits].sum(axis=0) / area
+    return found
+
+
+def irradiance_by_all(photons, position, normal, radius, surfaces):
+    """The irradiance of :meth:`PhotonMap.gather`, photon by photon: ``(m, 3)`` at ``(m, 3)`` points without a lobe."""
+    from lippmann.rendering.transport.tuning import TUNING
+
+    apart = photons.position[None] - position[:, None]
+    distance2 = (apart**2).sum(axis=2)
+    fits = distance2 < radius**2
+    fits &= np.einsum("nk,mk->mn", photons.normal, normal) > TUNING.least_agreement
+    fits &= np.einsum("nk,mk->mn", photons.toward, normal) > 0
+    fits &= np.abs(np.einsum("mnk,mk->mn", apart, normal)) < TUNING.farthest_from_plane * radius
+    fits &= photons.surfaces[None] <= surfaces
+    weight = np.where(fits, 1 - distance2 / radius**2, 0)
+    return np.asarray(weight @ photons.power * 2 / (np.pi * radius**2), dtype=np.float32)
+
+
 @pytest.mark.parametrize("radius", [0.004, 0.05, 0.3, 2.0])
 @pytest.mark.parametrize("flat", [True, False])
 def test_a_look_up_is_the_sum_over_all_photons(radius, flat):
-    from lippmann.rendering.transport.photon_map import PhotonMap, irradiance_by_all
+    from lippmann.rendering.transport.photon_map import PhotonMap
 
     halves = scattered(3000, 1, flat=flat), scattered(500, 2, flat=flat)
     photon_map = PhotonMap(halves, radius)
@@ -175,7 +224,7 @@ NORMALS = [(0.0, 0.0, 1.0), (0.6, 0.0, -0.8), (-0.48, 0.6, 0.64), (0.01, -0.02, 
 @pytest.mark.slow
 @pytest.mark.parametrize("normal", NORMALS)
 def test_surfaces_that_are_not_seen_have_the_light_of_their_cell(normal):
-    from lippmann.rendering.transport.photon_map import PhotonMap, irradiance_of_cell
+    from lippmann.rendering.transport.photon_map import PhotonMap
 
     photons, along = tilted(normal, 20_000, 3)
     random = np.random.default_rng(4)

@@ -67,6 +67,7 @@ def described(description):
 
 def prepared(scene, *, has_null):
     from lippmann.rendering.preparation.photons import shoot_photons
+    from lippmann.rendering.preparation.pilot import trace_pilot
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
@@ -78,9 +79,9 @@ def prepared(scene, *, has_null):
     pose[2, 3] = 3.0
     source = CameraRays(Camera("eye", pose, fov_y=0.6), SIDE, SIDE)
     request = RenderRequest(integrator="path", caustics="photons", spp=8)
-    caustics = shoot_photons(integrator, request, source, 1 << 30)
+    caustics = shoot_photons(integrator, request, source, trace_pilot(integrator, source), 1 << 30)
     assert caustics.way == "photons"
-    return integrator.lit_with(photons=caustics.photons, photon_passes=caustics.passes), source
+    return integrator.lit_by(replace(integrator.light, photons=caustics.photons, photon_passes=caustics.passes)), source
 
 
 def chained(integrator, chains):
@@ -88,7 +89,7 @@ def chained(integrator, chains):
     import drjit as dr
     import mitsuba as mi
 
-    return integrator.lit_with(chains=dr.opaque(mi.UInt32, chains) if chains else None)
+    return integrator.lit_by(replace(integrator.light, chains=dr.opaque(mi.UInt32, chains) if chains else None))
 
 
 def pictures(integrator, source, chains, *, seeds, spp=8):
@@ -116,7 +117,7 @@ def test_every_kind_of_surface_shows_as_much_light(all_events):
 def test_so_it_does_without_photons(all_events):
     """Whatever brings the caustics: a path's events are told apart for the chains alone."""
     integrator, source = all_events
-    integrator = integrator.lit_with(photons=None, photon_passes=None)
+    integrator = integrator.lit_by(replace(integrator.light, photons=None, photon_passes=None))
     plain, further = (pictures(integrator, source, chains, seeds=range(40)) for chains in (0, 4))
     agree(plain, further)
 
@@ -344,7 +345,7 @@ def test_of_many_chains_each_counts_as_a_whole(all_events):
     assert 20 < most_of_chain(64.0) < 30
     integrator, source = all_events
     four = chained(integrator, 4)
-    dim = four.lit_with(gain=mi.Float(0.25))
+    dim = four.lit_by(replace(four.light, gain=mi.Float(0.25)))
     few = [FullInBatches(four, source, seed=seed, memory=1 << 30, for_denoiser=True) for seed in range(16)]
     many, limited = (FullInBatches(each, source, seed=5, memory=1 << 30, for_denoiser=True) for each in (four, dim))
     for each in few:

@@ -26,7 +26,7 @@ from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.ray_source import RaySource, pixel_number
-from lippmann.rendering.transport.shown_caustics import ShownCaustics
+from lippmann.rendering.transport.shown_caustics import ShownBlur
 
 Floats = NDArray[np.float32]
 
@@ -75,7 +75,7 @@ class SquaredBlur:
     def _looked(self, photons: PhotonMap, share: float) -> Floats:
         """``(pixels, 3)`` by a look at this share of the pixels, each of which stands for its like."""
         assert isinstance(self._integrator, PathIntegrator)
-        blur = ShownCaustics(self._integrator, photons, blur=True)
+        blur = ShownBlur(self._integrator, photons)
         looked = _looked_at(self._source, self._window, self._seed, share)
         found = np.zeros((self._window.pixels, 3), np.float32)
         step = max(1, PREFERRED_LANES // (2 * self._source.channels))
@@ -104,9 +104,7 @@ def _looked_at(source: RaySource, window: PixelWindow, seed: int, share: float) 
     return np.flatnonzero(mixed < share * 2**32)
 
 
-def _products(
-    blur: ShownCaustics, source: RaySource, window: PixelWindow, pixels: NDArray[np.intp], seed: int
-) -> Floats:
+def _products(blur: ShownBlur, source: RaySource, window: PixelWindow, pixels: NDArray[np.intp], seed: int) -> Floats:
     """``(pixels, 3)``: what the first half's photons say times what the second's do."""
     channels = source.channels
     lanes = len(pixels) * channels * 2

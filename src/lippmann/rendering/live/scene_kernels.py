@@ -17,6 +17,7 @@ from lippmann.rendering.live.hull_bounds import bounds_by_hull
 from lippmann.rendering.live.live_tracer import FeatureTracer, LiveIntegrator, LiveTracer
 from lippmann.rendering.preparation.emitter_weights import make_light_sampler
 from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
+from lippmann.rendering.preparation.pilot import trace_pilot
 from lippmann.rendering.request.region_of_interest import even_background
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Session, make_integrator
@@ -115,7 +116,7 @@ class SceneKernels:
         exposure, sampler = request.exposure, integrator.light.sampler
         source = DisplayRays(display, placement.world_from_display, bool(request.subpixels))
         if (measure or integrator.light.gain is None) and not self.built.borrowed:
-            sampler = make_light_sampler(integrator.lit_by(PreparedLight()), source)
+            sampler = make_light_sampler(integrator.scene, trace_pilot(integrator.lit_by(PreparedLight()), source))
         if exposure == "auto":
             if measure or self._exposure is None:
                 plain = integrator.lit_by(PreparedLight(sampler, gain=dr.opaque(mi.Float, 1.0)))

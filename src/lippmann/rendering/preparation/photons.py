@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lippmann.rendering.film.memory_model import PHOTON, too_small
-from lippmann.rendering.preparation.exposure import gain_of
-from lippmann.rendering.preparation.photon_worth import are_worth_photons, shown_light
-from lippmann.rendering.preparation.seen_region import region_about, seen_points
-from lippmann.rendering.preparation.tuning import TUNING
+from lippmann.rendering.preparation.pilot import Pilot
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import find_casters, hides_caustics
 from lippmann.rendering.transport.caustic_photons import (
@@ -45,26 +38,19 @@ class Caustics:
         ``photons``, ``paths`` or ``none``; None where there are none.
     photons, passes:
         See :class:`~lippmann.rendering.transport.prepared_light.PreparedLight`.
-    light, radiance, share, samples:
-        Of the caustics, their emitters and the picture, without an exposure, see
-        :func:`~lippmann.rendering.preparation.photon_worth.are_worth_photons`; infinite where they were not asked for.
     """
 
     way: Literal["photons", "paths", "none"] | None
     photons: PhotonMap | None = None
     passes: CausticPhotons | None = None
-    light: NDArray[np.float64] = field(default_factory=lambda: np.full(1, np.inf))
-    radiance: float = math.inf
-    share: float = 1.0
-    samples: int = 1
-
-    def are_worth_photons(self, gain: float) -> bool:
-        """Whether paths alone would miss them, or show their noise."""
-        return are_worth_photons(self.light, self.radiance, self.share, self.samples, gain)
 
 
-def shoot_photons(integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int) -> Caustics:
+def shoot_photons(
+    integrator: PathIntegrator, request: RenderRequest, source: RaySource, pilot: Pilot, memory: int
+) -> Caustics:
     """How the caustics come in the picture of ``source``, with their photons.
+
+    By photons wherever an emitter and a caster form a pair, and a few photons land in what the picture shows.
 
     Raises
     ------
@@ -82,28 +68,15 @@ def shoot_photons(integrator: PathIntegrator, request: RenderRequest, source: Ra
         return Caustics(None)
     pixels = source.width * source.height * source.channels
     schedule = _schedule(pixels, request.is_open_ended)
-    samples = TUNING.open_ended_samples if request.is_open_ended else request.samples
-    passes = 1 if request.is_open_ended else -(-samples // schedule.most)
     # A single pass is for no more samples than there are.
-    most = min(schedule.most, samples)
+    most = schedule.most if request.is_open_ended else min(schedule.most, request.samples)
+    passes = 1 if request.is_open_ended else -(-request.samples // schedule.most)
     # No fewer where memory is short: it does not change a picture.
     required = 2 * emissions(pixels * most) * PHOTON
     if required > memory:
         if request.caustics == "auto":
             return _left_to_paths(integrator)
         raise too_small(memory, "photons of caustics", required)
-    seen = seen_points(integrator, source)
-    found = Caustics("photons")
-
-    def are_worth(pilot: PhotonMap, radiance: float, share: float) -> bool:
-        nonlocal found
-        if request.caustics != "auto":
-            return True
-        light = shown_light(integrator, source, pilot, request.seed)
-        found = Caustics("photons", light=light, radiance=radiance, share=share, samples=samples)
-        # Where there is no exposure yet, no light is known to be bright.
-        return request.exposure == "auto" or found.are_worth_photons(gain_of(request.exposure))
-
     photons = CausticPhotons(
         integrator.scene,
         integrator.features,
@@ -111,11 +84,10 @@ def shoot_photons(integrator: PathIntegrator, request: RenderRequest, source: Ra
         samples=pixels * min(schedule.first, most),
         schedule=schedule,
         seed=request.seed,
-        region=region_about(seen),
+        region=pilot.region,
         kept=max(1, min(passes, int(KEPT_SHARE * memory) // required)),
-        are_worth=are_worth,
     )
-    return Caustics(None) if photons.are_none else replace(found, photons=photons.of_pass(0), passes=photons)
+    return Caustics(None) if photons.are_none else Caustics("photons", photons.of_pass(0), photons)
 
 
 def _schedule(pixels: int, is_open_ended: bool) -> PassSchedule:

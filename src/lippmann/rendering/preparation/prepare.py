@@ -7,16 +7,20 @@ from dataclasses import replace
 import drjit as dr
 import mitsuba as mi
 
-from lippmann.rendering.preparation.chains import count_chains
+from lippmann.device.types import MitsubaScene
+from lippmann.options.choices import REUSING
 from lippmann.rendering.preparation.emitter_weights import make_light_sampler
 from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
 from lippmann.rendering.preparation.light_vertices import trace_light_vertices
 from lippmann.rendering.preparation.photons import shoot_photons
+from lippmann.rendering.preparation.pilot import trace_pilot
+from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.transport.casters import has_sharp_surfaces
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.prepared_light import PreparedLight
 from lippmann.rendering.transport.ray_source import RaySource
-from lippmann.rendering.transport.tuning import TUNING
+from lippmann.rendering.transport.tuning import TUNING as TRANSPORT
 from lippmann.scene.values.description import Color
 
 
@@ -57,31 +61,30 @@ def prepare_light(
         ``memory`` bytes do not hold the photons that were asked for.
     """
     light, choices = PreparedLight(), dict[str, object]()
+    pilot = trace_pilot(paths.lit_by(light), source)
     if weighs_emitters:
-        light = replace(light, sampler=make_light_sampler(paths.lit_by(light), source))
+        light = replace(light, sampler=make_light_sampler(paths.scene, pilot))
     if own_exposure:
         choices["camera_exposure"] = own_exposure
     if request.exposure != "auto":
         request = replace(request, exposure=request.exposure + own_exposure)
 
-    caustics = shoot_photons(paths.lit_by(light), request, source, memory)
+    caustics = shoot_photons(paths.lit_by(light), request, source, pilot, memory)
     light = replace(light, photons=caustics.photons, photon_passes=caustics.passes)
     exposure = request.exposure
     if exposure == "auto":
         exposure = measure_exposure(paths.lit_by(light), source, background, request.seed)
     gain = gain_of(exposure) if exposure else 1.0
-    if not caustics.are_worth_photons(gain):
-        light = replace(light, photons=None, photon_passes=None)
-    elif caustics.way is not None:
+    if caustics.way is not None:
         choices["caustics"] = caustics.way
     if exposure:
         light = replace(light, gain=mi.Float(gain))
         choices["exposure"] = exposure
 
-    passes = trace_light_vertices(paths.lit_by(light), request, source, memory, gain)
+    passes = trace_light_vertices(paths.lit_by(light), request, pilot, memory, gain)
     if passes is not None:
         light = replace(light, light_vertices=passes.of_pass(0), vertex_passes=passes)
-        choices["light_vertices"] = TUNING.light_vertices
+        choices["light_vertices"] = TRANSPORT.light_vertices
     if request.clamp_indirect is not None:
         light = replace(light, most_indirect=mi.Float(request.clamp_indirect / gain))
     chains = count_chains(paths.scene, request) if stands_alone else 0
@@ -89,3 +92,14 @@ def prepare_light(
         light = replace(light, chains=dr.opaque(mi.UInt32, chains))
         choices["seen_chains"] = chains
     return replace(light, choices=choices)
+
+
+def count_chains(scene: MitsubaScene, request: RenderRequest) -> int:
+    """Chains of sharp events of each path (:mod:`~lippmann.rendering.transport.seen_light`): a fixed number, or none.
+
+    A denoiser takes highlights for noise, so a denoised picture shows seen light by chains wherever the scene has
+    mirrors, clear glass or smooth gloss (docs/research/seen-light.md). None where all rays of a pixel are one, or its
+    points are taken from others: further chains show nothing then.
+    """
+    is_denoised = request.denoise != "none" and request.box_filter and request.method not in REUSING
+    return TUNING.chains if is_denoised and has_sharp_surfaces(scene) else 0

@@ -15,10 +15,8 @@ class PreparationTuning:
         Chains of seen light with each path of a denoised picture. With 2, pictures of one sample lose 0.4 dB in the
         mean of ten scenes and clear coat 2.6 dB; with 8 they gain 0.3 dB and tracing takes a quarter longer
         (docs/research/seen-light.md).
-    open_ended_samples:
-        Samples per pixel that a picture is taken to need where something else says when to stop.
     pilot_paths, pilot_paths_of_emitter:
-        Paths by which emitters are weighed, in all, and of each emitter at least.
+        Paths of the pilot, in all, and of each emitter at least.
     pilot_surfaces:
         Surfaces along such a path at which emitters are sampled.
     most_weighed_emitters:
@@ -36,24 +34,21 @@ class PreparationTuning:
         scenes), and less than the share ``alike`` of a block's light is in both of two looks.
     exposure_steps:
         Exposures are rounded to this part of a stop, so that all machines that render a picture choose the same.
-    least_saved:
-        Mean variance in exposed radiance that light vertices must take from a sample: a path has four times as much
-        as a rule, and joins take a fifth to a half of its time (``light_vertices.py``).
+    bright_indirect, most_indirect:
+        Second moment of what of the pilot's exposed indirect radiance is brighter than white, from which on paths are
+        joined to light vertices, and what one path counts for in it at most. Scenes where joins gain have 0.0035 to
+        0.15, others at most 0.0004: half and double choose the same (docs/background/light-vertices.md).
     fewest_joined_samples:
         Samples per pixel below which paths bring more in the time of the joins: with one, joins gain 0.8 dB in `room`
         and take a third of the time, which is worth 1.5 dB (``light_vertices.py``).
     vertex_pass_samples:
         Samples per pixel that one set of light vertices serves.
-    vertex_side, vertex_paths, vertex_most:
-        Pixels to the side of the look that decides on light vertices, paths in each, and the exposed radiance that one
-        of them counts for at most.
-    seen_side, apart, wider:
-        Rays that tell what is seen, to the side of a square; the share of their ends that may lie apart from the
-        others, to either side; and by how much of its size the box about the others is widened.
+    apart, wider:
+        Share of the first hits of the pilot's rays that may lie apart from the others, to either side; and by how much
+        of its size the box about the others is widened.
     """
 
     chains: int = 4
-    open_ended_samples: int = 128
     pilot_paths: int = 1 << 14
     pilot_paths_of_emitter: int = 1 << 8
     pilot_surfaces: int = 3
@@ -68,13 +63,10 @@ class PreparationTuning:
     noisy: float = 2.0
     alike: float = 0.5
     exposure_steps: int = 100
-    least_saved: float = 2e-3
+    bright_indirect: float = 1e-3
+    most_indirect: float = 4.0
     fewest_joined_samples: int = 2
     vertex_pass_samples: int = 32
-    vertex_side: int = 64
-    vertex_paths: int = 4
-    vertex_most: float = 4.0
-    seen_side: int = 64
     apart: float = 0.002
     wider: float = 0.25
 

@@ -94,8 +94,8 @@ class RenderPlan:
 PILOT_REASONS = {
     "exposure": "the pilot's median of what is lit comes to mid-grey",
     "camera_exposure": "the camera's own, from the scene",
-    "caustics": "photons where a few of them find light that mirrors, glass or gloss throw",
-    "light_vertices": "a small emitter beside a surface makes indirect light noisy",
+    "caustics": "an emitter shines on mirrors, glass or smooth gloss, and photons of it land in the picture",
+    "light_vertices": "the pilot met indirect light brighter than white, as of a small emitter beside a surface",
     "seen_chains": "chains of seen light with each path: a denoised scene with mirrors, glass or smooth gloss",
 }
 

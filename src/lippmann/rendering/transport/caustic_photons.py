@@ -13,7 +13,6 @@ wide enough to be told from photons.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,14 +34,11 @@ _UNIFORM_SHARE = 0.1
 SAMPLES_OF_EMISSION, FEWEST, MOST = 8, 1 << 16, 1 << 21
 #: Photons within the radius of a look-up, as a rule, where there are so many emissions.
 NEIGHBOURS, EMISSIONS_OF_NEIGHBOURS = 50, 1 << 18
-#: Photons within the radius of a look-up in those of the pilot.
-_NEIGHBOURS_OF_PILOT = 8
 #: Photons by which the radius is found.
 _PROBED = 2000
 _SEED_STEPS = (0xB5297A4D, 0x68E31DA4)
 _PILOT_STEP, _PASS_STEP = 0x1B56C4E9, 0x632BE5AB
 _NONE = Photons.dark(0)
-AreWorth = Callable[[PhotonMap, float, float], bool]
 
 
 def no_photons() -> PhotonMap:
@@ -75,9 +71,6 @@ class CausticPhotons:
         Corners ``(2, 3)`` of the box that is seen: emitters and casters are given photons by what they bring there.
     kept:
         Passes whose photons are kept for others that ask, at least 1.
-    are_worth:
-        Asked of the pilot's photons in the region, the mean radiance of their emitters of some size, and the share of
-        the light that comes from such: whether a picture is worth more of them.
     """
 
     def __init__(
@@ -91,7 +84,6 @@ class CausticPhotons:
         schedule: PassSchedule | None = None,
         region: NDArray[np.float64] | None = None,
         kept: int = 1,
-        are_worth: AreWorth | None = None,
     ) -> None:
         self._shooter = PhotonShooter(scene, features, casters)
         self.schedule = schedule or PassSchedule(1 << 32, 1 << 32)
@@ -101,7 +93,7 @@ class CausticPhotons:
         self._kept = kept
         self._maps: dict[int, PhotonMap] = {}
         self._radius = 0.0
-        self._chances = self._pilot(casters, are_worth)
+        self._chances = self._pilot(casters)
 
     @property
     def are_none(self) -> bool:
@@ -135,7 +127,7 @@ class CausticPhotons:
             self._maps[number] = PhotonMap((first, second), self._radius * self.relative_radius(number))
         return self._maps[number]
 
-    def _pilot(self, casters: Casters, are_worth: AreWorth | None) -> NDArray[np.float64] | None:
+    def _pilot(self, casters: Casters) -> NDArray[np.float64] | None:
         """Shares of the emissions of each emitter and caster: as the roots of the second moments of what they bring."""
         if casters.pairs == 0:
             return None
@@ -146,13 +138,6 @@ class CausticPhotons:
         if not seen.any():
             return None
         power = photons.power[seen].astype(np.float64)
-        if are_worth is not None:
-            radiance = self._shooter.radiances((self._seed + _PILOT_STEP) % 2**32)[pair[seen] % len(casters.emitters)]
-            few, flux, has_size = photons.chosen(seen), power.sum(axis=1), np.isfinite(radiance)
-            share = float(flux[has_size].sum() / flux.sum())
-            mean = float(np.average(radiance[has_size], weights=flux[has_size])) if share else 0.0
-            if not are_worth(PhotonMap((few, few), _radius(few, _NEIGHBOURS_OF_PILOT)), mean, share):
-                return None
         roots = np.sqrt(np.bincount(pair[seen], np.square(power).sum(axis=1), minlength=casters.pairs))
         return np.asarray(_UNIFORM_SHARE * even + (1 - _UNIFORM_SHARE) * roots / roots.sum())
 

@@ -11,7 +11,6 @@ Ray depth counts surfaces, the primary ray's hit being 1: at depth 1 a surface s
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import drjit as dr
@@ -118,10 +117,6 @@ class PathIntegrator:
     def lit_by(self, light: PreparedLight) -> PathIntegrator:
         """The same paths with other light."""
         return PathIntegrator(self.scene, self.features, self.depth, self.name, light, self.shadow_rays)
-
-    def lit_with(self, **changes: Any) -> PathIntegrator:
-        """The same paths with some of the light changed."""
-        return self.lit_by(replace(self.light, **changes))
 
     def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Spectrum, RayCounts]:
         """Radiance along ``ray``, and the rays traced for it."""

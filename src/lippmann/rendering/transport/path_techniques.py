@@ -23,13 +23,13 @@ from lippmann.device.types import (
     SurfaceInteraction3f,
     UInt32,
 )
-from lippmann.rendering.transport.caustic_light import caustic_light
 from lippmann.rendering.transport.light_vertices import Arrival, JointLight, LightVertices, reach_of
 from lippmann.rendering.transport.path_vertex import Scattering, Vertex
 from lippmann.rendering.transport.path_weights import Clamp
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.scene_features import SceneFeatures
-from lippmann.rendering.transport.sharp_events import MOST_EVENTS, is_sharp, lambertian_share
+from lippmann.rendering.transport.sharp_events import MOST_EVENTS, facing_normal, is_sharp, lambertian_share
+from lippmann.rendering.transport.tuning import TUNING
 
 #: Sample dimension, from a vertex's first, of the photon chosen there, and of the light vertex that it is joined to.
 GATHER_DIMENSION, JOIN_DIMENSION = 1 << 24, 1 << 25
@@ -140,21 +140,31 @@ class PhotonGathering(Technique):
         return dr.select(is_caustic, emission * (1 - state.by_photons), emission)
 
     def arrive(self, state: _Caustics, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
+        """Adds the photons about the vertex.
+
+        All of them as the Lambertian part of the surface scatters them; as the rest of its scattering does, one in the
+        place of all, where its lobes are wide enough for that.
+        """
+        si, stream = vertex.si, vertex.stream
         lands = vertex.active & (vertex.has_wide_lobes | (dr.max(vertex.albedo) > 0))
-        choice = vertex.stream.next_1d(vertex.dimension + GATHER_DIMENSION)
-        light = caustic_light(
-            self._photons,
-            vertex.si,
-            vertex.bsdf,
+        parts = dr.select(state.is_seen, mi.UInt32(TUNING.photon_parts), 1)
+        found = self._photons.gather(
+            si,
+            facing_normal(si),
             vertex.lobe,
-            vertex.albedo,
-            vertex.has_wide_lobes,
-            vertex.stream,
+            mi.UInt32(stream.half),
             self._depth - vertex.depth - 1,
-            choice,
+            stream.next_1d(vertex.dimension + GATHER_DIMENSION),
             state.is_seen,
             lands,
+            (stream.key + stream.index) & (parts - 1),
+            parts,
         )
+        light = vertex.albedo * found.irradiance * dr.inv_pi
+        wo = si.to_local(found.toward)
+        wide = lands & vertex.has_wide_lobes & (dr.max(found.flux) > 0) & (wo.z * si.wi.z > 0)
+        rest = vertex.bsdf.eval(mi.BSDFContext(), si, wo, wide) / dr.abs(wo.z) - vertex.albedo * dr.inv_pi
+        light = dr.select(lands, light, 0) + dr.select(wide, rest * found.flux, 0)
         return radiance + vertex.throughput * light, shadow
 
     def sample_emitter(self, state: _Caustics, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:

@@ -38,9 +38,6 @@ from lippmann.rendering.transport.sharp_events import (
 _MOST_CROSSINGS = 4
 #: Emissions of one kernel.
 _LANES = 1 << 18
-_LOOK_STEP = 0x7F4A7C15
-#: Directions to emitters by which their radiance is found: in all, and of one emitter and caster.
-_LOOKS, _MOST_LOOKS_OF_PAIR = 1 << 14, 256
 #: How far a ray goes on behind a straight-through surface, relative to its coordinates.
 _CLEARANCE = 1e-4
 #: Dimensions of the sample stream before the first surface, and at each.
@@ -69,19 +66,6 @@ class PhotonShooter:
             landed.append(photons)
             pairs.append(part[lanes])
         return Photons.joined(landed), np.concatenate(pairs)
-
-    def radiances(self, seed: int) -> NDArray[np.float64]:
-        """The greatest radiance that each emitter is found to show to the casters; infinite for those without size."""
-        pairs = self._casters.pairs
-        pair = np.repeat(np.arange(pairs), min(_MOST_LOOKS_OF_PAIR, max(1, _LOOKS // pairs)))
-        stream = SampleStream.of_pixels(
-            mi.UInt32(0), dr.arange(mi.UInt32, len(pair)), dr.opaque(mi.UInt32, (seed + _LOOK_STEP) % 2**32)
-        )
-        _, ds, light = self._lit_points(pair, stream)
-        shown = dr.select((ds.pdf > 0) & (dr.max(light) > 0), dr.select(ds.delta, dr.inf, dr.max(light) * ds.pdf), 0)
-        greatest = np.zeros(len(self._casters.emitters))
-        np.maximum.at(greatest, pair % len(greatest), np.array(shown, dtype=np.float64))
-        return greatest
 
     def _lit_points(
         self, pair: NDArray[np.int64], stream: SampleStream

@@ -1,4 +1,4 @@
-"""Caustics that a picture shows: what photons bring to the first rough surface along camera rays."""
+"""Blur of the caustics that a picture shows: by the photons about the first rough surface along camera rays."""
 
 from __future__ import annotations
 
@@ -8,32 +8,28 @@ import mitsuba as mi
 from lippmann.device.sobol import SampleStream
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, BSDFPtr, Ray3f, Spectrum, SurfaceInteraction3f, UInt32, Vector3f
-from lippmann.rendering.transport.caustic_light import caustic_light
 from lippmann.rendering.transport.path import DIMENSIONS_PER_VERTEX, PathIntegrator
-from lippmann.rendering.transport.path_techniques import GATHER_DIMENSION
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import (
     facing_normal,
     follows_sharply,
-    has_wide_lobes,
     lambertian,
     sharp_lobe,
 )
 from lippmann.rendering.transport.tuning import TUNING
 
 
-class ShownCaustics:
-    """Radiance of the caustics that rays of ``integrator`` show, by the ``photons``.
+class ShownBlur:
+    """Radiance, of either sign, that look-ups of a wider radius add to the caustics that rays of ``integrator`` show.
 
-    Where it is their ``blur``: what that adds, of either sign, by look-ups of wider radii. It is that of
-    Lambertian lobes; the gloss of the same surfaces is taken to be blurred no more.
+    It is that of Lambertian lobes; the gloss of the same surfaces is taken to be blurred no more.
     """
 
     # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
-    def __init__(self, integrator: PathIntegrator, photons: PhotonMap, blur: bool = False) -> None:
-        self._paths, self._photons = integrator, photons
-        self._wide = PhotonMap(photons.halves, TUNING.wider_look_up * photons.radius) if blur else None
+    def __init__(self, integrator: PathIntegrator, photons: PhotonMap) -> None:
+        self._paths = integrator
+        self._usual, self._wide = photons, PhotonMap(photons.halves, TUNING.wider_look_up * photons.radius)
 
     @syntax
     def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> Spectrum:
@@ -76,16 +72,10 @@ class ShownCaustics:
         stream: SampleStream,
         active: Bool,
     ) -> Spectrum:
-        surfaces, seen, lambert = self._paths.depth - depth - 1, mi.Bool(True), lambertian(si, bsdf, active)
-        if self._wide is None:
-            wide = has_wide_lobes(si, bsdf, active)
-            lands = active & (wide | (dr.max(lambert) > 0))
-            choice = stream.next_1d(GATHER_DIMENSION)
-            photons = self._photons
-            return caustic_light(photons, si, bsdf, lobe, lambert, wide, stream, surfaces, choice, seen, lands)
+        surfaces, lambert = self._paths.depth - depth - 1, lambertian(si, bsdf, active)
         lands, normal, half = active & (dr.max(lambert) > 0), facing_normal(si), mi.UInt32(stream.half)
         wider, usual = (
-            photons.gather(si, normal, lobe, half, surfaces, mi.Float(0), seen, lands).irradiance
-            for photons in (self._wide, self._photons)
+            photons.gather(si, normal, lobe, half, surfaces, mi.Float(0), mi.Bool(True), lands).irradiance
+            for photons in (self._wide, self._usual)
         )
         return dr.select(lands, lambert * (wider - usual) * dr.inv_pi, 0)

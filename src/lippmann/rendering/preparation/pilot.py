@@ -1,0 +1,151 @@
+"""The pilot of a picture: a few paths through all of it, by which every rule of the preparation decides.
+
+All emitters are sampled along the same paths, so that their contributions differ by nothing else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.device.kernel_ops import divide
+from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
+from lippmann.device.syntax import syntax
+from lippmann.device.types import Bool, Float, Point3f, Ray3f, UInt32
+from lippmann.rendering.preparation.tuning import TUNING
+from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.rendering.transport.sharp_events import sharp_lobe
+
+#: Dimensions of the sample stream at one surface.
+DIMENSIONS_PER_SURFACE = 4
+#: Seed of the pilot paths: the picture's own would make its preparation depend on it.
+_SEED = 0x6C616D70
+
+
+@dataclass(frozen=True, eq=False)
+class Pilot:
+    """What the pilot paths of a picture met.
+
+    Attributes
+    ----------
+    moments:
+        ``(emitters,)`` in the order of ``mi.Scene.emitters()``: second moment of the contribution of each emitter to a
+        path, clipped at 1; all 0 in scenes of more emitters than are told apart.
+    indirect:
+        ``(paths,)``: radiance, the mean of its components, that emitters with a place bring to a path by rough surfaces
+        beyond one that scatters evenly.
+    placed:
+        Number of emitters with a place in the scene.
+    region:
+        Corners ``(2, 3)`` of a box about what the picture shows; None where it shows nothing.
+    """
+
+    moments: NDArray[np.float64]
+    indirect: NDArray[np.float64]
+    placed: int
+    region: NDArray[np.float64] | None
+
+    def bright_indirect(self, gain: float) -> float:
+        """Second moment of what of :attr:`indirect` is brighter than white, exposed by ``gain`` and clipped."""
+        exposed = np.minimum(self.indirect * gain, TUNING.most_indirect)
+        return float(np.square(exposed[exposed > 1]).sum() / len(exposed))
+
+
+def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
+    """The pilot of the picture of ``source``; it depends on the scene, the ray depth and the rays alone.
+
+    None is traced in scenes that are lit by their sky alone: no rule asks for it there. ``integrator`` samples all
+    emitters uniformly.
+    """
+    lights = integrator.scene.emitters()
+    count = len(lights)
+    if all(each.is_environment() for each in lights):
+        return Pilot(np.zeros(count), np.zeros(1), 0, None)
+    emitters = count if 0 < count <= TUNING.most_weighed_emitters else 1
+    paths = max(TUNING.pilot_paths // emitters, TUNING.pilot_paths_of_emitter)
+    lane = dr.arange(mi.UInt32, paths * emitters)
+    emitter, path = divide(lane, dr.opaque(mi.UInt32, paths))
+    stream = SampleStream.of_pixels(mi.UInt32(0), path, dr.opaque(mi.UInt32, _SEED))
+    place = stream.next_2d(PIXEL_DIMENSION)
+    x, y = place.x * dr.opaque(mi.Float, source.width), place.y * dr.opaque(mi.Float, source.height)
+    column, row = mi.UInt32(x), mi.UInt32(y)
+    jitter = mi.Point2f(x - mi.Float(column), y - mi.Float(row))
+    ray = source.rays(column, row, mi.UInt32(0), jitter)
+    traced = _contributions(integrator, ray, stream, emitter, dr.opaque(mi.Float, emitters))
+    dr.eval(traced)
+    squares, indirect = (np.array(each, dtype=np.float64).reshape(emitters, -1) for each in traced[:2])
+    hit, point = (np.array(each)[..., :paths] for each in traced[2:])
+    # Invalid values, as from a normal of length 0, count as no contribution.
+    moments = np.nan_to_num(squares).mean(axis=1) if emitters == count else np.zeros(count)
+    placed = _has_place(lights) if emitters == count else np.zeros(emitters, bool)
+    indirect = np.nan_to_num(indirect[placed]).sum(axis=0)
+    return Pilot(moments, indirect, int(placed.sum()), _region_about(point.T[hit != 0].astype(np.float64)))
+
+
+def _has_place(emitters: list[mi.Emitter]) -> NDArray[np.bool_]:
+    """``(emitters,)``: which have a place in the scene."""
+    flags = np.array([int(emitter.flags()) for emitter in emitters], np.uint32)
+    return np.asarray(flags & int(mi.EmitterFlags.Surface | mi.EmitterFlags.DeltaPosition), bool)
+
+
+def _region_about(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Corners ``(2, 3)`` of a box about points ``(n, 3)`` that are seen; None where there are none."""
+    if not len(points):
+        return None
+    corners: NDArray[np.float64] = np.quantile(points, [TUNING.apart, 1 - TUNING.apart], axis=0)
+    middle, size = corners.mean(axis=0), np.ptp(corners, axis=0)
+    reach = (0.5 + TUNING.wider) * size + TUNING.wider * size.max()
+    return np.stack([middle - reach, middle + reach])
+
+
+@syntax
+def _contributions(
+    integrator: PathIntegrator, ray: Ray3f, stream: SampleStream, emitter: UInt32, emitters: Float
+) -> tuple[Float, Float, Bool, Point3f]:
+    """Of a path with each lane, and the light of ``emitter`` alone, one of ``emitters``.
+
+    The sum over its surfaces of the squared contribution, that of the indirect contributions, whether the ray meets a
+    surface, and where.
+    """
+    scene = integrator.scene
+    context = mi.BSDFContext()
+    o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
+    throughput = mi.Spectrum(1)
+    squares, indirect = mi.Float(0), mi.Float(0)
+    is_indirect = mi.Bool(False)  # the surface before scattered evenly
+    hit, point = mi.Bool(False), mi.Point3f(0)
+    surface = mi.UInt32(0)
+    active = mi.Bool(True)
+    # What does not change is no state: else Dr.Jit would record the loop a second time, without it.
+    while dr.hint(active, label="pilot paths", exclude=[integrator, scene, context, stream, emitter, emitters]):
+        toward = mi.Ray3f(o, d)
+        si = scene.ray_intersect(toward, mi.RayFlags.All, False, active)
+        active &= si.is_valid()
+        hit = dr.select(surface == 0, active, hit)
+        point = dr.select((surface == 0) & active, si.p, point)
+        bsdf = si.bsdf(toward)
+        dimension = surface * DIMENSIONS_PER_SURFACE + 1
+        # Under uniform sampling each emitter has an equal part of the unit interval.
+        uniform = stream.next_2d(dimension)
+        uniform.x = (mi.Float(emitter) + uniform.x) / emitters
+        sampling = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        # By MIS as if the emitter were the only one.
+        light, _, _ = integrator.direct_light(si, bsdf, uniform, sampling, emitters)
+        contribution = dr.mean(throughput * light / emitters)
+        squares += dr.square(dr.minimum(contribution, 1))
+        is_rough = dr.squared_norm(sharp_lobe(si, bsdf, sampling)) == 0
+        indirect += dr.select(is_indirect & is_rough, contribution, 0)
+
+        bs, weight = bsdf.sample(context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), active)
+        throughput *= weight
+        is_indirect = mi.has_flag(bs.sampled_type, mi.BSDFFlags.DiffuseReflection)
+        onward = si.spawn_ray(si.to_world(bs.wo))
+        o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
+        surface += 1
+        active &= (dr.max(throughput) > 0) & (surface < min(integrator.depth, TUNING.pilot_surfaces))
+    return squares, indirect, hit, point
