@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.scene.matrices import transform_points
-from lippmann.scene.parsing.points_lines import Width, as_mesh, width_of
+from lippmann.scene.parsing.points_lines import MOST, Width, as_mesh, thinned, width_of
 from lippmann.scene.splat_clouds import bulk_of
-from lippmann.scene.values.description import Instance, Matrix, Mesh, SceneDescription
+from lippmann.scene.values.description import Instance, Material, Matrix, Mesh, SceneDescription
 
 #: How the note of a cloud's width begins.
 _WIDTH_NOTE = width_of(1.0, 1, lines=False).note.split(" of a radius")[0]
@@ -37,6 +37,19 @@ def draw_cloud(clouds: Sequence[Mesh]) -> tuple[list[Mesh], Width]:
                 drawn = as_mesh(_chosen(cloud, chosen), np.eye(4)[None], width.radius, cloud.material)
                 meshes.append(replace(drawn, fitted=fitted))
     return meshes, width
+
+
+def describe_cloud(cloud: Mesh, material: Material, notes: Sequence[str]) -> SceneDescription:
+    """A scene of points alone, whose ``faces`` are ``(m, 1)``; unshaded where they have colours.
+
+    Nearly all such files come from scanners, which record the light with the colour.
+    """
+    step = max(1, -(-len(cloud.faces) // MOST))
+    left_out = [f"of {len(cloud.faces)} points one in {step} is drawn"] if step > 1 else []
+    meshes, width = draw_cloud([thinned(cloud, step)])
+    material = replace(material, unlit=cloud.colors is not None)
+    instances = [Instance(number, np.eye(4)) for number in range(len(meshes))]
+    return SceneDescription(cloud.name, meshes, [material], instances, notes=[*notes, *left_out, width.note])
 
 
 def is_cloud(description: SceneDescription) -> bool:

@@ -223,7 +223,7 @@ def test_a_cloud_of_points_is_drawn_as_balls(read, colored):
 
 
 def test_of_too_many_points_some_are_drawn(read, monkeypatch):
-    monkeypatch.setattr("lippmann.scene.readers.ply.MOST", 2)
+    monkeypatch.setattr("lippmann.scene.point_clouds.MOST", 2)
     scene = read((header("ascii", faces=0) + "".join(f"{x} {y} {z}\n" for x, y, z in VERTICES)).encode())
     assert scene.notes[1] == "of 5 points one in 3 is drawn"
     balls = np.split(scene.meshes[0].positions, 2)

@@ -18,10 +18,9 @@ from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import read_bytes, read_image, resolve
 from lippmann.scene.parsing.ply_body import Columns, Integers, Lists, Numbers, read_body
 from lippmann.scene.parsing.ply_header import Element, read_header
-from lippmann.scene.parsing.points_lines import MOST, thinned
 from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.parsing.vertex_colors import full_brightness
-from lippmann.scene.point_clouds import draw_cloud
+from lippmann.scene.point_clouds import describe_cloud
 from lippmann.scene.readers.splats.ply import holds_splats, read_splat_ply
 from lippmann.scene.values.description import AlphaMode, Instance, Material, Mesh, SceneDescription, Texture
 
@@ -105,7 +104,7 @@ def _material(name: str, texture: Texture | None, mesh: Mesh) -> Material:
 
 
 def _cloud(vertex: Columns, element: Element, name: str, notes: list[str], where: str) -> SceneDescription:
-    """Points as balls; nearly all such files come from scanners, which record the light with the colour."""
+    """Points as balls."""
     positions = np.stack([np.asarray(vertex[axis]) for axis in "xyz"], axis=-1)
     if not len(positions):
         raise SceneError("holds no vertices", where=where)
@@ -113,13 +112,7 @@ def _cloud(vertex: Columns, element: Element, name: str, notes: list[str], where
     colors = _colors(vertex, element)
     points = np.arange(len(positions), dtype=np.uint32)[:, None]
     thin = Mesh(name, positions.astype(np.float32), points, 0, None, (), colors)
-    if (step := -(-len(points) // MOST)) > 1:
-        notes = [*notes, f"of {len(points)} points one in {step} is drawn"]
-        thin = thinned(thin, step)
-    meshes, width = draw_cloud([thin])
-    material = replace(_material(name, None, thin), unlit=colors is not None)
-    instances = [Instance(number, np.eye(4)) for number in range(len(meshes))]
-    return SceneDescription(name, meshes, [material], instances, notes=[*notes, width.note])
+    return describe_cloud(thin, _material(name, None, thin), notes)
 
 
 def _check_finite(positions: Numbers, where: str) -> None:

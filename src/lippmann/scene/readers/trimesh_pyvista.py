@@ -16,10 +16,10 @@ from lippmann.scene.parsing.files import texels_of
 from lippmann.scene.readers.volumes.description import describe_volume
 from lippmann.scene.readers.vtk.data_set import (
     GREY,
+    describe_surface,
     image_of,
     linear_colors,
     material_of,
-    mesh_of,
     surface_of,
     unshown_arrays,
 )
@@ -215,11 +215,10 @@ def from_pyvista(source: pyvista.DataSet | pyvista.MultiBlock) -> SceneDescripti
     if image is not None:
         return describe_volume("pyvista", *image, notes=[f"the scalars '{source.active_scalars_name}'"])
     surface = surface_of(source)
-    mesh = mesh_of(surface, "pyvista", 0)
     notes = [_UP_NOTE, *surface.notes]
     if surface.colors is None and (names := unshown_arrays(source)):
         notes.append(f"none of its arrays is active in all of it, so that none is shown of {names}")
-    return SceneDescription("pyvista", [mesh], [material_of(surface.colors)], [Instance(0, np.eye(4))], notes=notes)
+    return describe_surface(surface, "pyvista", notes)
 
 
 def adapter_for(source: object) -> Callable[[object], SceneDescription] | None:

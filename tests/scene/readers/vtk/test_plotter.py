@@ -218,6 +218,26 @@ def test_lines_and_points_beside_a_surface_are_named_and_take_none_of_its_colour
     assert any(note.endswith(told) for note in load_scene(plotter).notes)
 
 
+def test_clouds_of_points_are_drawn_as_balls(plotter, tmp_path):
+    """From an object, a file and a plotter, in the colours of their scalars."""
+    cloud = pyvista.PolyData(np.array([(0, 0, 0), (1, 0, 0), (0, 2, 0)], np.float32))
+    cloud["heat"] = np.array([0.0, 1.0, 2.0])
+    cloud.save(tmp_path / "a.vtp")
+    plotter.add_mesh(cloud, name="scan", style="points", cmap="viridis")
+    for source in (cloud, tmp_path / "a.vtp", plotter):
+        scene = load_scene(source)
+        (mesh,) = scene.description.meshes
+        assert mesh.points  # of balls
+        assert mesh.positions.reshape(3, -1, 3).mean(axis=1) == pytest.approx(cloud.points, abs=1e-5)
+        assert scene.description.materials[mesh.material].unlit
+        yellow = decode_srgb(np.array([253, 231, 36]) / 255)  # viridis at its end
+        if mesh.colors is not None:  # else by a texture, as the plotter has it
+            assert mesh.colors.reshape(3, -1, mesh.colors.shape[1])[2, 0, :3] == pytest.approx(yellow, abs=0.01)
+        assert (mesh.colors is None) == (len(mesh.uvs) == 1) == (source is plotter)
+        assert any("points are drawn as balls" in note for note in scene.notes)
+        assert not any("lines or points" in note for note in scene.notes)
+
+
 def test_an_array_is_chosen_by_its_name(tmp_path):
     sphere = pyvista.Sphere()
     sphere["height"], sphere.cell_data["number"] = sphere.points[:, 2], np.arange(float(sphere.n_cells))

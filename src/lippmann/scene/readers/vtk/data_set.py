@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
-from lippmann.scene.values.description import Material, Mesh
+from lippmann.scene.point_clouds import describe_cloud
+from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 
 if TYPE_CHECKING:
     import pyvista
@@ -40,10 +41,10 @@ def material_of(colors: ArrayLike | None) -> Material:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Triangles of a data set.
+    """Triangles of a data set, or points alone.
 
-    ``positions`` ``(n, 3)``, ``faces`` ``(m, 3)``, ``normals`` ``(n, 3)`` and ``uvs`` ``(n, 2)`` (v up) or None;
-    ``colors`` ``(n, 4)`` sRGB bytes or None. ``notes`` are remarks, one line each.
+    ``positions`` ``(n, 3)``, ``faces`` ``(m, 3)``, of points ``(n, 1)``, ``normals`` ``(n, 3)`` and ``uvs``
+    ``(n, 2)`` (v up) or None; ``colors`` ``(n, 4)`` sRGB bytes or None. ``notes`` are remarks, one line each.
     """
 
     positions: NDArray[np.float64]
@@ -55,7 +56,7 @@ class Surface:
 
 
 def surface_of(source: pyvista.DataSet | pyvista.MultiBlock) -> Surface:
-    """The outer surface of a data set, cut into triangles.
+    """The outer surface of a data set, cut into triangles; of points alone, these.
 
     Bytes with three or four channels are colours; other scalars are coloured over their range by a table of their own,
     as files of VTK's older kind may have it, or by :data:`COLOR_MAP`, vectors by their length.
@@ -70,6 +71,8 @@ def surface_of(source: pyvista.DataSet | pyvista.MultiBlock) -> Surface:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of defaults to come, whose new names older versions do not know
         surface = source if hasattr(source, "verts") else source.extract_surface()
+        if is_points(surface):
+            return _points(surface)
         surface, notes = _polygons(surface)
         surface, faces, owners = _triangles(surface)
     positions = np.asarray(surface.points, np.float64)
@@ -94,6 +97,22 @@ def surface_of(source: pyvista.DataSet | pyvista.MultiBlock) -> Surface:
         colors,
         notes,
     )
+
+
+def is_points(source: pyvista.DataSet) -> bool:
+    """Whether a data set has cells of single points and no others."""
+    return bool(0 < getattr(source, "n_verts", 0) == source.n_cells)
+
+
+def _points(source: pyvista.PolyData) -> Surface:
+    notes: list[str] = []
+    scalars, count = source.active_scalars, source.n_points
+    colors = None
+    if scalars is not None and len(scalars) == count:
+        colors = _colors(np.asarray(scalars), str(source.active_scalars_name), _own_table(scalars), notes)
+    uvs = source.active_texture_coordinates
+    uvs = None if uvs is None else np.asarray(uvs, np.float32)
+    return Surface(np.asarray(source.points, np.float64), np.arange(count)[:, None], None, uvs, colors, notes)
 
 
 def _polygons(surface: pyvista.PolyData) -> tuple[pyvista.PolyData, list[str]]:
@@ -161,6 +180,14 @@ def mesh_of(surface: Surface, name: str, material: int) -> Mesh:
         uvs=() if uvs is None else ((uvs * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32),),
         colors=None if surface.colors is None else linear_colors(surface.colors),
     )
+
+
+def describe_surface(surface: Surface, name: str, notes: list[str]) -> SceneDescription:
+    """The scene of a surface alone, or of points."""
+    mesh, material = mesh_of(surface, name, 0), material_of(surface.colors)
+    if surface.faces.shape[1] == 1:
+        return describe_cloud(mesh, material, notes)
+    return SceneDescription(name, [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
 
 
 def linear_colors(colors: ArrayLike) -> NDArray[np.float32]:

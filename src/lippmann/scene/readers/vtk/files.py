@@ -15,8 +15,8 @@ from lippmann.runtime.input_memory import check_input, input_memory_left
 from lippmann.runtime.optional_import import check_installed
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.volumes.description import describe_volume
-from lippmann.scene.readers.vtk.data_set import Surface, material_of, mesh_of
-from lippmann.scene.values.description import Instance, SceneDescription
+from lippmann.scene.readers.vtk.data_set import Surface, describe_surface
+from lippmann.scene.values.description import SceneDescription
 
 _MOST_SECONDS = 300.0
 
@@ -70,7 +70,7 @@ def _surface(name: str, arrays: dict[str, NDArray[np.generic]], notes: list[str]
         raise SceneError("a face names a point that is not found", where=where)
     whole = np.asarray(finite[faces].all(axis=1))
     if not whole.all():
-        notes = [*notes, f"{int((~whole).sum())} triangles with points that are not finite are left out"]
+        notes = [*notes, f"{int((~whole).sum())} triangles or points with numbers that are not finite are left out"]
         faces, positions = faces[whole], np.where(finite[:, None], positions, 0.0)
     if not len(faces):
         raise SceneError("has no surface", where=where, rule="there must be at least one face")
@@ -78,5 +78,4 @@ def _surface(name: str, arrays: dict[str, NDArray[np.generic]], notes: list[str]
     if normals is not None and not (np.isfinite(normals).all() and normals.shape == positions.shape):
         normals = None
     surface = Surface(positions, faces, normals, None, arrays.get("colors"))  # type: ignore[arg-type]  # as written
-    mesh = mesh_of(surface, name, 0)
-    return SceneDescription(name, [mesh], [material_of(surface.colors)], [Instance(0, np.eye(4))], notes=notes)
+    return describe_surface(surface, name, notes)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
-from lippmann.scene.readers.vtk.data_set import COLORED, Surface, image_of, mesh_of, surface_of
+from lippmann.scene.point_clouds import draw_cloud
+from lippmann.scene.readers.vtk.data_set import COLORED, Surface, image_of, is_points, mesh_of, surface_of
 from lippmann.scene.values.description import (
     Camera,
     Color,
@@ -84,9 +85,15 @@ def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
             notes += [f"'{block.name[:40]}': {note}" for note in surface.notes]
             if actor.prop.GetInterpolation() == _FLAT:
                 surface = replace(surface, normals=None)
-            meshes.append(mesh_of(surface, block.name, len(materials)))
-            materials.append(_material(actor.prop, block, texture, is_mapped=is_mapped))
-            instances.append(Instance(len(meshes) - 1, _matrix(actor.GetMatrix())))
+            shown = [mesh_of(surface, block.name, len(materials))]
+            material = _material(actor.prop, block, texture, is_mapped=is_mapped)
+            if surface.faces.shape[1] == 1:
+                shown, width = draw_cloud(shown)
+                material = replace(material, unlit=True)
+                notes.append(f"'{block.name[:40]}': {width.note}")
+            materials.append(material)
+            instances += [Instance(len(meshes) + number, _matrix(actor.GetMatrix())) for number in range(len(shown))]
+            meshes += shown
     if ignored:
         notes.append(f"{ignored} annotations and hidden objects of the plotter are not shown")
     if len(volumes) > 1:
@@ -120,7 +127,7 @@ def _left_out(actor: Any, mapper: Any) -> list[str]:
             found.append("its way of blending")
         return found
     look = actor.prop
-    if look.GetRepresentation() != _SURFACE:
+    if look.GetRepresentation() != _SURFACE and not is_points(mapper.dataset):
         found.append("lines or points in place of the surface")
     elif look.GetEdgeVisibility():
         found.append("edges")
