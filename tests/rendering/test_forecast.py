@@ -63,7 +63,7 @@ def test_depth_is_that_of_the_picture():
 
 
 def test_a_notebook_shows_a_table():
-    foreseen = lippmann.plan("teapot", SHEET, placement={"turn": 30, "mode": "fit"}, spp=1)
+    foreseen = lippmann.plan("teapot", SHEET, placement={"turn": 30, "place": "fit"}, spp=1)
     # A pitch of 2 mm over a gap of 3 mm: 36.9 degrees, and tan 18.4 over tan 17.5 times as much in 35.
     assert foreseen.in_words()["resolved"].endswith(
         "in a view cone of 37 degrees (in 35, 1.1 times as much would fuse)"

@@ -176,7 +176,7 @@ def test_a_move_compiles_nothing(teapot):
             SIZE,
             request=RenderRequest(
                 placement=PlacementOptions(
-                    mode="fit", turn=(number, 2.0 * number, 0.0), scale=1.0 + 0.01 * number, depth_scale=0.5
+                    place="fit", turn=(number, 2.0 * number, 0.0), scale=1.0 + 0.01 * number, depth_scale=0.5
                 ),
                 exposure=0.1 * number,
                 seed=number,

@@ -44,7 +44,7 @@ def scene(*quads, cameras=()):
 
 
 def warnings(*quads, cameras=(), **placement):
-    request = RenderRequest(placement=PlacementOptions(**({"mode": "display"} | placement)))
+    request = RenderRequest(placement=PlacementOptions(**({"place": "display"} | placement)))
     placed = open_session(lippmann.load_scene(scene(*quads, cameras=cameras)), request).place(DISPLAY)
     return [line for line in placed.warnings if "panel's edge cuts" in line]
 
