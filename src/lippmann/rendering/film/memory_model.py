@@ -50,6 +50,12 @@ def batches(number: int) -> int:
     return number * _RGB + PICTURE + ERROR_MAPS
 
 
+def photons(emissions: int, passes: int) -> int:
+    """Bytes of the photons of passes of so many emissions in both halves of the samples: one is held while the next is
+    shot."""
+    return 2 * min(passes, 2) * emissions * PHOTON
+
+
 #: A pixel of a tile: eight batches and a wavefront; with what denoising adds, a pixel of a tile with its margin.
 TILE = batches(8) + BYTES_PER_LANE
 DENOISED_TILE = 832

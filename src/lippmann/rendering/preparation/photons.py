@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from lippmann.rendering.film.memory_model import PHOTON, too_small
+from lippmann.rendering.film import memory_model
 from lippmann.rendering.preparation.pilot import Pilot
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import find_casters, hides_caustics
@@ -72,11 +72,12 @@ def shoot_photons(
     most = schedule.most if request.is_open_ended else min(schedule.most, request.samples)
     passes = 1 if request.is_open_ended else -(-request.samples // schedule.most)
     # No fewer where memory is short: it does not change a picture.
-    required = 2 * emissions(pixels * most) * PHOTON
+    of_pass = emissions(pixels * most)
+    required = memory_model.photons(of_pass, 2 if request.is_open_ended else passes)
     if required > memory:
         if request.caustics == "auto":
             return _left_to_paths(integrator)
-        raise too_small(memory, "photons of caustics", required)
+        raise memory_model.too_small(memory, "photons of caustics", required)
     photons = CausticPhotons(
         integrator.scene,
         integrator.features,
