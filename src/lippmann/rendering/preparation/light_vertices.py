@@ -22,11 +22,12 @@ def trace_light_vertices(
     pilot:
         Of the picture.
     memory:
-        Bytes that they may take; where these do not hold them, paths find all light themselves.
+        Bytes that those of two passes may take, in both halves of the samples; where these do not hold them, paths find
+        all light themselves.
     gain:
         Exposure of the picture.
     """
-    if request.integrator != "path" or request.surfaces < 2 or memory < 2 * TRANSPORT.light_vertices * LIGHT_VERTEX:
+    if request.integrator != "path" or request.surfaces < 2 or memory < 4 * TRANSPORT.light_vertices * LIGHT_VERTEX:
         return None
     if not request.is_open_ended and request.samples < TUNING.fewest_joined_samples:
         return None
