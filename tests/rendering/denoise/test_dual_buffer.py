@@ -283,10 +283,10 @@ def test_more_samples_are_cleaned_anew():
     denoised.picture(), denoised.squared_error()
     # Halves that the network sees another way: of itself it gets other things wrong.
     assert calls == [False, True]
-    denoised.add(4)
+    renderer.add(4)
     denoised.picture()
     assert (len(calls), renderer.added) == (4, 4)
-    renderer.add(2)  # past it
+    renderer.add(2)
     denoised.picture()
     assert len(calls) == 6
 

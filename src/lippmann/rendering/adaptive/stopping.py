@@ -12,7 +12,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal
 
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.adaptive.goal import Goal
@@ -20,26 +20,16 @@ from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
 from lippmann.rendering.estimate.psnr import Estimate, PictureEstimator
 
+if TYPE_CHECKING:
+    from lippmann.rendering.denoise.dual_buffer import Denoised
+    from lippmann.rendering.film.sample_batches import FullInBatches
+
 End = Literal["quality", "time", "samples"]
 
 #: The fewest samples that tell an error.
 FEWEST = 2
 #: Samples per pixel at which it is given up: the noise of single precision sums comes near.
 MOST_SAMPLES = 1 << 20
-
-
-class Sampler(Protocol):
-    """Takes samples; see :class:`~lippmann.rendering.film.sample_batches.FullInBatches`."""
-
-    def add(self, samples: int, progress: ProgressCallback = silent) -> None: ...
-
-    def probe(self) -> float: ...
-
-
-class Picture(Protocol):
-    """A picture of the samples, plain or denoised, that estimates the squared error of its pixels."""
-
-    def squared_error(self) -> PixelErrors: ...
 
 
 @dataclass(frozen=True)
@@ -87,8 +77,8 @@ class Outcome:
 
 def reach(
     goal: Goal,
-    sampler: Sampler,
-    picture: Picture,
+    sampler: FullInBatches,
+    picture: FullInBatches | Denoised,
     estimator: PictureEstimator,
     costs: Costs,
     progress: ProgressCallback = silent,
@@ -152,7 +142,7 @@ class _Schedule:
         #: Samples per second.
         self._rate = 0.0
 
-    def first_round(self, sampler: Sampler) -> int:
+    def first_round(self, sampler: FullInBatches) -> int:
         """Samples of the first round; one at least, whatever the time."""
         if self._goal.max_time is None:
             samples = self._first if self._goal.has_quality else self._most

@@ -30,13 +30,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer, coding_slope, encode
-from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.light_apart import clean_light, without_excess
 from lippmann.rendering.denoise.local_statistics import mean_around
 from lippmann.rendering.denoise.noisy_blend import own_share
@@ -47,6 +46,9 @@ from lippmann.rendering.estimate.jackknife import OUTLIERS_TOLD_FROM
 from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, PixelErrors
 from lippmann.rendering.film.coverage import Coverage
 from lippmann.runtime.row_threads import Bands
+
+if TYPE_CHECKING:
+    from lippmann.rendering.film.batched_picture import BatchedPicture
 
 Floats = NDArray[np.float32]
 #: Of the halves' mean difference nearby: a pixel that is brighter than its samples by more is so by no accident.
@@ -64,38 +66,13 @@ Denoise = Callable[[Floats, bool], Floats]
 Share = Callable[[Floats], Floats]
 
 
-class Halved(Protocol):
-    """A renderer whose samples come from two streams that know nothing of each other."""
-
-    @property
-    def samples(self) -> int: ...
-
-    def add(self, samples: int, progress: ProgressCallback = silent) -> None: ...
-
-    def traced_picture(self) -> Floats: ...
-
-    def traced_halves(self) -> tuple[Floats, Floats]: ...
-
-    def coverage_halves(self) -> tuple[Coverage, Coverage] | None: ...
-
-    def shown(self, values: Floats) -> Floats: ...
-
-    def seen(self) -> Floats | None: ...
-
-    def seen_halves(self) -> tuple[Floats, Floats] | None: ...
-
-    def excess(self) -> Floats | None: ...
-
-    def squared_error(self) -> PixelErrors: ...
-
-
 class Denoised:
     """The pictures of ``renderer`` after ``denoise``; see the head of this module.
 
     Parameters
     ----------
     renderer:
-        Gathers the samples.
+        The samples, from two streams that know nothing of each other.
     denoise:
         From a noisy ``(H, W, 3)`` linear picture to a clean one, turned for the second half.
     transfer:
@@ -110,7 +87,7 @@ class Denoised:
 
     def __init__(
         self,
-        renderer: Halved,
+        renderer: BatchedPicture,
         denoise: Denoise,
         transfer: Transfer,
         threads: int = 1,
@@ -127,10 +104,6 @@ class Denoised:
         self._noisy: tuple[Floats, Floats] | None = None
         self._cleaned: tuple[Floats, Floats] | None = None
         self._cleaned_samples = 0
-
-    def add(self, samples: int, progress: ProgressCallback = silent) -> None:
-        """Take ``samples`` more of every pixel."""
-        self._renderer.add(samples, progress)
 
     def picture(self) -> Floats:
         """``(H, W, 3)`` float32 linear RGB."""
@@ -179,7 +152,6 @@ class Denoised:
         return np.minimum(apart, samples.outliers)
 
     def _clean_halves(self) -> tuple[Floats, Floats]:
-        # The samples may have come by another way than through :meth:`add`.
         if self._cleaned is None or self._cleaned_samples != self._renderer.samples:
             self._cleaned_samples = self._renderer.samples
             self._noisy = self._noisy_halves()

@@ -86,7 +86,7 @@ def shoot_photons(
         schedule=schedule,
         seed=request.seed,
         region=pilot.region,
-        kept=max(1, min(passes, int(KEPT_SHARE * memory) // required)),
+        kept=max(1, min(passes, int(KEPT_SHARE * memory) // memory_model.photons(of_pass, 1))),
     )
     return Caustics(None) if photons.are_none else Caustics("photons", photons.of_pass(0), photons)
 

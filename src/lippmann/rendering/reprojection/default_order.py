@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
-from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.rendering.reprojection.arrays.backward_warp import BackwardWarp
-from lippmann.rendering.reprojection.common.array_types import BoolArray
 from lippmann.rendering.reprojection.common.gap_filling import Gaps, Settled
 from lippmann.rendering.reprojection.common.lens_map import LensField
 from lippmann.rendering.reprojection.common.pixel_tracer import PixelTracer
@@ -19,22 +15,6 @@ from lippmann.rendering.reprojection.common.thresholds import Rules
 from lippmann.rendering.reprojection.lenticular.forward_warp import ForwardWarp
 from lippmann.rendering.reprojection.retrace.adaptive_retrace import choose_neighborhoods, search
 from lippmann.runtime.row_threads import Bands
-
-
-class Warp(Protocol):
-    """Makes micro-images from others: the one way of a layout of lenses."""
-
-    def probes(self, row: int) -> NDArray[np.int64]:
-        """Columns of a row that are traced beforehand, so that nothing is reprojected behind what no source sees."""
-        ...
-
-    def receive(self, step: Step, unsettled: BoolArray) -> None:
-        """Reproject the points of the sources into the targets; runs with missed pixels become ``unsettled``."""
-        ...
-
-    def finish(self, lenses: Lenses) -> None:
-        """Lenses whose micro-images are complete, and may be sources."""
-        ...
 
 
 class DefaultOrder:
@@ -63,7 +43,7 @@ class DefaultOrder:
         self._points = points
         self._field = LensField.of(display)
         warp = ForwardWarp if display.lattice.rows_are_alike else BackwardWarp
-        self._warp: Warp = warp(points, self._field, bands, rules)
+        self._warp: ForwardWarp | BackwardWarp = warp(points, self._field, bands, rules)
         self._gaps = Gaps(points, self._field, tracer, bands, rules, settled)
         self._search = (choose_neighborhoods(display, self._field.reach), tracer, bands, rules, settled)
 
