@@ -12,7 +12,7 @@ still something to do.
 *Before*: pixels in the order of rows (:mod:`lippmann.rendering.film.lane_order`), opaque surfaces without an
 acceleration structure of their own where others let rays straight through
 (:mod:`lippmann.rendering.transport.shadow_rays`), look-ups of all photons about a point by every sample
-(``photon_parts`` of :mod:`lippmann.rendering.transport.tuning`), and photons in NumPy's memory, whose rows
+(``photons_of_cell`` of :mod:`lippmann.rendering.transport.tuning`), and photons in NumPy's memory, whose rows
 cannot be fetched at once (:mod:`lippmann.device.kernel_ops`).
 
 python benchmarks/kernel_profile.py [--scenes NAME,...]
@@ -91,7 +91,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     from lippmann.rendering.film import wavefront
     from lippmann.rendering.film.wavefront import samples_of_tile
     from lippmann.rendering.film.wavefront_plan import cut_wavefronts
-    from lippmann.rendering.transport import caustic_light, path, path_techniques
+    from lippmann.rendering.transport import path, path_techniques
     from lippmann.rendering.transport.shadow_rays import ShadowRays
 
     source, paths = stage.source, stage.integrator
@@ -114,18 +114,16 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     def alike(kind: type[path.PathIntegrator]) -> path.PathIntegrator:
         return kind(paths.scene, paths.features, paths.depth, light=paths.light)
 
-    tuning = caustic_light.TUNING
-    usual = tuning.photon_parts
+    tuning = path_techniques.TUNING
+    usual = tuning.photons_of_cell
 
-    def traced(
-        integrator: path.PathIntegrator, parts: int = usual, in_rows: bool = False, is_dark: bool = False
-    ) -> Any:
+    def traced(integrator: path.PathIntegrator, most: int = usual, in_rows: bool = False, is_dark: bool = False) -> Any:
         def call(seed: int) -> Any:
-            caustic_light.TUNING = replace(tuning, photon_parts=parts)
+            path_techniques.TUNING = replace(tuning, photons_of_cell=most)
             with mock.patch.object(wavefront, "in_strips", return_value=0) if in_rows else nullcontext():
                 pixels, stream = samples_of_tile(source, plan, tile, run, seed, True)
             with (
-                mock.patch.object(path_techniques, "caustic_light", return_value=mi.Spectrum(0))
+                mock.patch.object(path_techniques.PhotonGathering, "arrive", path_techniques.Technique.arrive)
                 if is_dark
                 else nullcontext()
             ):

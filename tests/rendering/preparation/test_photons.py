@@ -50,3 +50,23 @@ def test_they_are_left_out_where_the_eye_does_not_look(engine):
 
     assert caustics_of([-20], 4, Light("point", (4e4,) * 3, at(30, 20, 60)), exposure=0)[0] == "photons"
     assert caustics_of([-20, -90], -50, Light("point", (4e4,) * 3, at(0, 0, -26)), exposure=0)[0] is None
+
+
+@pytest.mark.parametrize("caustics", ["auto", "photons"])
+def test_a_picture_of_few_paths_has_few_emissions(engine, monkeypatch, caustics):
+    """Pilot and both halves together: five for eight paths."""
+    from lippmann.rendering.transport.photon_shooter import PhotonShooter
+    from lippmann.scene.values.description import Light
+
+    counts, shoot = [], PhotonShooter.shoot
+
+    def counted(self, count, *rest):
+        counts.append(count)
+        return shoot(self, count, *rest)
+
+    monkeypatch.setattr(PhotonShooter, "shoot", counted)
+    assert caustics_of([-20], 4, Light("point", (4e4,) * 3, at(30, 20, 60)), exposure=0, caustics=caustics)[0]
+    paths = 96 * 64 * 4
+    assert len(counts) == 3
+    assert sum(counts) <= 5 / 8 * paths
+    assert min(counts) > 0.01 * paths

@@ -319,7 +319,7 @@ def photons_of(scene_dict, **options):
 
     scene = mi.load_dict({"type": "scene"} | scene_dict)
     features = make_scene_features(scene, has_null=False)
-    return CausticPhotons(scene, features, find_casters(scene), **({"samples": 1, "seed": 2} | options))
+    return CausticPhotons(scene, features, find_casters(scene), **({"samples": 1 << 18, "seed": 2} | options))
 
 
 @pytest.mark.long
@@ -367,6 +367,17 @@ def test_later_passes_serve_as_many_samples_as_all_before():
         assert schedule.at(sample) == (number, ends[number] - sample)
     alike = PassSchedule(1 << 32, 1 << 32)
     assert alike.at(1 << 20) == (0, (1 << 32) - (1 << 20))
+
+
+def test_emissions_go_with_the_samples_of_a_picture():
+    from lippmann.rendering.transport.caustic_photons import FEWEST, MOST, emissions
+
+    samples = 1 << 22
+    assert emissions(samples) == samples // 8
+    assert emissions(1 << 18) == emissions(1 << 19) == FEWEST
+    assert emissions(1 << 30) == MOST
+    assert emissions(1000) == 250  # no more than a quarter of the paths, for either half
+    assert emissions(1) == 1
 
 
 def test_passes_of_more_photons_have_smaller_radii():

@@ -147,10 +147,32 @@ def test_parts_of_the_photons_have_the_mean_of_all(seen):
     for half in (0, 1):
         whole = np.array(gathered(photon_map, points, half, 9, seen=seen).irradiance)
         parts = np.stack(
-            [np.array(gathered(photon_map, points, half, 9, seen=seen, part=k, parts=4).irradiance) for k in range(4)]
+            [np.array(gathered(photon_map, points, half, 9, seen=seen, part=k, most=8).irradiance) for k in range(32)]
         )
         np.testing.assert_allclose(parts.mean(axis=0), whole, rtol=1e-4, atol=1e-5 * whole.max())
         assert (parts.std(axis=0).mean(axis=1) > 0.05 * whole.mean(axis=1)).all()  # each looks at photons of its own
+
+
+@pytest.mark.parametrize("seen", [True, False])
+@pytest.mark.parametrize("count", [7, 1000, 20_000])
+def test_a_look_up_meets_few_photons_of_a_cell_however_many_there_are(count, seen):
+    """All photons of a focus are alike: what a look-up brings tells how many it has met, and how much each counted."""
+    from lippmann.rendering.transport.photon_map import PhotonMap, Photons
+
+    most = 8
+
+    def brought(photons, part):
+        at = np.full((photons, 3), 0.5, np.float32)
+        up = np.tile(np.float32([0, 0, 1]), (photons, 1))
+        focus = Photons(at, up, up, np.ones((photons, 3), np.float32), np.ones(photons, np.uint32))
+        found = gathered(PhotonMap((focus, focus), 1.0), at[:1], 0, 9, seen=seen, part=part, most=most)
+        return np.array(found.irradiance).item(0)
+
+    of_each = brought(1, 0) * 2 ** max(0, np.ceil(np.log2(count / most)))
+    met = np.array([brought(count, part) for part in (0, 1, 77)]) / of_each
+    np.testing.assert_allclose(met, np.round(met), rtol=1e-5)
+    assert (met >= min(count, most // 2) - 1e-3).all()
+    assert (met <= most + 1e-3).all()
 
 
 def gathered_slowly(photons, points, normal, shading, wi, lobe, radius):

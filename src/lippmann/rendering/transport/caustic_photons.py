@@ -24,14 +24,16 @@ from lippmann.rendering.transport.photon_map import PhotonMap, Photons
 from lippmann.rendering.transport.photon_shooter import PhotonShooter
 from lippmann.rendering.transport.scene_features import SceneFeatures
 
-#: Emissions of the pilot for each emitter and caster, and in all.
-PILOT_OF_PAIR, PILOT = 4096, 1 << 20
+#: Emissions of the pilot for each emitter and caster; and in all, one for so many samples of the picture at least.
+PILOT_OF_PAIR, SAMPLES_OF_PILOT = 4096, 8
 _FEWEST_OF_PAIR = 64
 #: Share of the emissions that goes to all pairs alike, whatever the pilot met.
 _UNIFORM_SHARE = 0.1
-#: Emissions of each half: one for so many samples of the picture, within limits. An emission takes as long as one and a
-#: half paths (`benchmarks/photon_share.py`): with twice as many, caustics have 1 to 2 dB less noise.
+#: Emissions of each half: one for so many samples of the picture, within limits. An emission may take as long as two
+#: paths (`benchmarks/photon_share.py`): with twice as many, caustics have 1 to 2 dB less noise.
 SAMPLES_OF_EMISSION, FEWEST, MOST = 8, 1 << 16, 1 << 21
+#: Samples of the picture to an emission of each half at least: photons are to take no more time than its paths.
+FEWEST_SAMPLES_OF_EMISSION = 4
 #: Photons within the radius of a look-up, as a rule, where there are so many emissions.
 NEIGHBOURS, EMISSIONS_OF_NEIGHBOURS = 50, 1 << 18
 #: Photons by which the radius is found.
@@ -48,7 +50,8 @@ def no_photons() -> PhotonMap:
 
 def emissions(samples: int) -> int:
     """Emissions of each half for a picture of so many samples in all."""
-    return int(np.clip(samples // SAMPLES_OF_EMISSION, FEWEST, MOST))
+    fewest = max(1, min(FEWEST, samples // FEWEST_SAMPLES_OF_EMISSION))
+    return int(np.clip(samples // SAMPLES_OF_EMISSION, fewest, MOST))
 
 
 class CausticPhotons:
@@ -131,7 +134,8 @@ class CausticPhotons:
         """Shares of the emissions of each emitter and caster: as the roots of the second moments of what they bring."""
         if casters.pairs == 0:
             return None
-        count = min(PILOT_OF_PAIR, max(_FEWEST_OF_PAIR, PILOT // casters.pairs)) * casters.pairs
+        affordable = self._samples // SAMPLES_OF_PILOT // casters.pairs
+        count = int(np.clip(affordable, _FEWEST_OF_PAIR, PILOT_OF_PAIR)) * casters.pairs
         even = np.full(casters.pairs, 1 / casters.pairs)
         photons, pair = self._shooter.shoot(count, even, (self._seed + _PILOT_STEP) % 2**32)
         seen = photons.are_inside(self._region)

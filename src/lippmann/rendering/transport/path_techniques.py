@@ -147,7 +147,6 @@ class PhotonGathering(Technique):
         """
         si, stream = vertex.si, vertex.stream
         lands = vertex.active & (vertex.has_wide_lobes | (dr.max(vertex.albedo) > 0))
-        parts = dr.select(state.is_seen, mi.UInt32(TUNING.photon_parts), 1)
         found = self._photons.gather(
             si,
             facing_normal(si),
@@ -157,8 +156,8 @@ class PhotonGathering(Technique):
             stream.next_1d(vertex.dimension + GATHER_DIMENSION),
             state.is_seen,
             lands,
-            (stream.key + stream.index) & (parts - 1),
-            parts,
+            stream.key + stream.index,
+            TUNING.photons_of_cell,
         )
         light = vertex.albedo * found.irradiance * dr.inv_pi
         wo = si.to_local(found.toward)

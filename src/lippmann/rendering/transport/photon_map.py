@@ -172,7 +172,7 @@ class PhotonMap:
         seen: Bool,
         active: Bool,
         part: UInt32 | int = 0,
-        parts: UInt32 | int = 1,
+        most: int = 1 << 31,
     ) -> Gathered:
         """Light of the photons around a point: by an Epanechnikov kernel, or in its cell.
 
@@ -194,9 +194,9 @@ class PhotonMap:
         seen:
             Whether the point is seen; else the mean over the part of its tangent plane that lies in its cell will do,
             which costs a tenth.
-        part, parts:
-            Only every ``parts``-th photon is looked at, from number ``part`` (below ``parts``, a power of two) on, and
-            counts ``parts`` times. Over all parts the mean is that of all photons.
+        part, most:
+            No more than ``most`` photons of a bucket of cells are looked at: every second, fourth, ... one, from number
+            ``part`` on, which counts so many times. Over successive parts the mean is that of all photons.
         """
         r = self._r
         p = mi.Point3f(si.p)
@@ -211,15 +211,14 @@ class PhotonMap:
         corner = dr.select(seen, mi.UInt32(0), 13)
         end_corner = dr.select(seen, mi.UInt32(27), 14)
         density = dr.select(seen, 2 / (dr.pi * r * r), 1 / _area_in_cell(p - (base + 1) * r, normal, r))
-        step, first = mi.UInt32(parts), mi.UInt32(part)
-        density *= mi.Float(step)
+        first = mi.UInt32(part)
         first_bucket = half * (self._last_bucket + 2)
         looking = active & self.may_reach(p, active)
         # What does not change is no state: else Dr.Jit would record the loops a second time, without it.
         while dr.hint(
             looking,
             label="cells",
-            exclude=[si, p, r, normal, lobe, surfaces, seen, base, end_corner, reach, step, first, first_bucket],
+            exclude=[si, p, r, normal, lobe, surfaces, seen, base, end_corner, reach, first, first_bucket],
         ):
             cell = base + mi.Vector3f(mi.Float(corner % 3), mi.Float(corner // 3 % 3), mi.Float(corner // 9))
             from_center = (cell + 0.5) * r - p
@@ -227,15 +226,17 @@ class PhotonMap:
             touches &= dr.squared_norm(dr.maximum(dr.abs(from_center) - 0.5 * r, 0)) < r * r
             bucket = first_bucket + (_mixed_number(cell) & self._last_bucket)
             number = dr.gather(mi.UInt32, self._start, bucket, looking)
-            number += (first - number) & (step - 1)
             end = dr.gather(mi.UInt32, self._start, bucket + 1, looking)
+            # The least power of two of which `most` steps go through all.
+            step = mi.UInt32(1) << (32 - dr.lzcnt((dr.maximum(end - number, 1) - 1) // most))
+            number += (first - number) & (step - 1)
             inside = looking & touches & (number < end)
             while dr.hint(inside, label="photons", exclude=[si, p, r, normal, lobe, surfaces, seen, step, cell, end]):
                 q = dr.gather(mi.Vector4f, self._position, number, inside).xyz
                 apart = q - p
                 distance2 = dr.squared_norm(apart)
                 near = inside & (~seen | (distance2 < r * r))
-                if dr.hint(near, exclude=[si, r, normal, lobe, surfaces, seen, cell, q, apart, distance2]):
+                if dr.hint(near, exclude=[si, r, normal, lobe, surfaces, seen, step, cell, q, apart, distance2]):
                     # Two of the cells may share a bucket.
                     fits = near & dr.all(dr.floor(q / r) == cell)
                     n = dr.gather(mi.Vector4f, self._normal, number, near).xyz
@@ -247,7 +248,7 @@ class PhotonMap:
                     wo = si.to_local(d)
                     fits &= ~is_sharp(si, lobe, wo)
                     share_of_power = dr.select(seen, 1 - distance2 / (r * r), 1)
-                    power = dr.select(fits, mi.Color3f(brought.xyz) * share_of_power, 0)
+                    power = dr.select(fits, mi.Color3f(brought.xyz) * (share_of_power * mi.Float(step)), 0)
                     # dr.mean would write the number of lanes into the kernel, and make one for each.
                     weight = (power.x + power.y + power.z) / 3
                     weights += weight

@@ -88,10 +88,19 @@ class PhotonShooter:
         index = dr.arange(mi.UInt32, lanes) + dr.opaque(mi.UInt32, first)
         stream = SampleStream.of_pixels(mi.UInt32(0), index, dr.opaque(mi.UInt32, seed))
         ray, power = self._emitted(pair, share, stream)
+        o, d, is_lit = mi.Point3f(ray.o), mi.Vector3f(ray.d), dr.max(power) > 0
+        dr.eval(o, d, power, is_lit)
+        # Half of the points on a body face away from an emitter, and many lie in shadow: only the others are followed.
+        lit = dr.compress(is_lit)
+        if not dr.width(lit):
+            return Photons.dark(0), np.zeros(0, np.int64)
+        o, d, power = (dr.gather(type(each), each, lit) for each in (o, d, power))
+        stream = SampleStream(stream.key, dr.gather(mi.UInt32, index, lit))
         surfaces = MOST_EVENTS + (_MOST_CROSSINGS if features.has_null else 0)
-        landed = _Landed(lanes, surfaces)
-        self._follow(ray, power, dr.max(power) > 0, stream, landed, surfaces)
-        return landed.photons()
+        landed = _Landed(dr.width(lit), surfaces)
+        self._follow(mi.Ray3f(o, d), power, mi.Bool(True), stream, landed, surfaces)
+        photons, lanes_of_photons = landed.photons()
+        return photons, np.array(lit, dtype=np.int64)[lanes_of_photons]
 
     def _emitted(self, pair: NDArray[np.int64], share: mi.Float, stream: SampleStream) -> tuple[Ray3f, Color3f]:
         """Rays that meet the casters, and the flux that comes along each; 0 where something is in the way."""

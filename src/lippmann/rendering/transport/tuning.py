@@ -34,9 +34,9 @@ class TransportTuning:
         lie from the tangent plane there, in radii.
     steepest:
         Limit on what interpolated normals may add to light that grazes the true surface.
-    photon_parts:
-        Parts of the photons about a point that is seen: a power of two. Successive samples of a pixel look at one part
-        each (``kernel_profile.py``).
+    photons_of_cell:
+        Photons of a cell that one look-up meets at most: in the focus of a lens there are thousands. Successive samples
+        of a pixel meet others (``kernel_profile.py``).
     wider_look_up:
         Radius of a wider look-up over that of the picture's, by which blur is told.
     light_vertices:
@@ -62,7 +62,7 @@ class TransportTuning:
     least_agreement: float = 0.7
     farthest_from_plane: float = 0.4
     steepest: float = 4.0
-    photon_parts: int = 4
+    photons_of_cell: int = 8
     wider_look_up: float = 2.0
     light_vertices: int = 1 << 16
     vertex_pilot_of_emitter: int = 1 << 12
