@@ -162,7 +162,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     before = path.PathIntegrator(paths.scene, paths.features, paths.depth, light=light, shadow_rays=undivided)
     kernels = {
         "whole": traced(paths),
-        "before": traced(before, parts=1, in_rows=True),
+        "before": traced(before, most=1 << 31, in_rows=True),
         "shadow rays": traced(alike(Unshadowed)),
         "evaluation": traced(alike(Unevaluated)),
         "emitters": traced(alike(Unlit)),
