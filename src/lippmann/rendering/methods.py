@@ -18,8 +18,8 @@ from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.denoise.cost_model import effort_of, traced_work
 from lippmann.rendering.denoise.dual_buffer import Denoised
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
-from lippmann.rendering.denoise.light_apart import clean_light, without_excess
-from lippmann.rendering.denoise.outlines import by_coverage
+from lippmann.rendering.denoise.light_apart import clean_light, remove_excess
+from lippmann.rendering.denoise.outlines import exchange_coverage
 from lippmann.rendering.denoise.subpixels import SubpixelBatches
 from lippmann.rendering.estimate.denoised_psnr import DenoisedEstimator
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
@@ -276,9 +276,9 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     denoiser = _denoiser(job, frame)
     noisy = frame.pixels
     if frame.coverage is not None and (further := denoiser.coverage()) is not None:
-        noisy = by_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)
+        noisy = exchange_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)
     (cleaned,) = clean_light(noisy, frame.seen, denoiser, None)
-    cleaned = without_excess(cleaned, frame.excess)
+    cleaned = remove_excess(cleaned, frame.excess)
     frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
     return replace(traced, options=_denoiser_options(denoiser), seconds={"denoise": denoiser.seconds})
 

@@ -306,7 +306,7 @@ class Session:
         return [*scene.settings, *(line for part in parts if isinstance(part, Options) for line in settings_of(part))]
 
     def _warn_of_emptiness(self, frame: Frame, work: int, has_pixels: bool) -> tuple[str, ...]:
-        from lippmann.rendering.film.seen_share import nothing_seen, seen_share
+        from lippmann.rendering.film.seen_share import seen_share, warn_of_emptiness
 
         if self.request.integrator not in ("path", "direct", "classic"):
             return ()
@@ -316,7 +316,7 @@ class Session:
             background = (0.0, 0.0, 0.0)
         if not has_pixels and background is not None and max(background) == 0.0:
             return ()  # glowing surfaces in front of a black background send no rays on
-        return nothing_seen(seen_share(frame.pixels if has_pixels else None, background, frame.rays, work))
+        return warn_of_emptiness(seen_share(frame.pixels if has_pixels else None, background, frame.rays, work))
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lippmann.rendering.denoise.noisy_blend import own_share
+from lippmann.rendering.denoise.noisy_blend import weigh_samples
 
 SHAPE = (96, 96, 3)
 
@@ -20,7 +20,7 @@ def clean(value=0.3):
 
 
 def share(noisy, of, transfer="linear", threads=1):
-    return own_share(noisy, of, transfer, threads=threads)[..., 0]
+    return weigh_samples(noisy, of, transfer, threads=threads)[..., 0]
 
 
 def test_samples_change_nothing_where_the_clean_picture_is_right():

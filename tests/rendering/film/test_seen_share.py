@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lippmann.rendering.film.seen_share import nothing_seen, seen_share
+from lippmann.rendering.film.seen_share import seen_share, warn_of_emptiness
 from lippmann.rendering.film.wavefront import RayTotals
 
 GREY = (0.2, 0.2, 0.2)
@@ -25,11 +25,11 @@ def test_rays_bound_the_share_where_the_background_varies():
 
 
 def test_the_warning_names_the_way_out():
-    assert nothing_seen(0.01) == ()
-    (line,) = nothing_seen(0.004)
+    assert warn_of_emptiness(0.01) == ()
+    (line,) = warn_of_emptiness(0.004)
     assert "0.4% of it shows anything" in line
     assert "camera" in line
-    assert "(nothing)" in nothing_seen(0)[0]
+    assert "(nothing)" in warn_of_emptiness(0)[0]
 
 
 @pytest.mark.slow

@@ -36,10 +36,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer, coding_slope, encode
-from lippmann.rendering.denoise.light_apart import clean_light, without_excess
+from lippmann.rendering.denoise.light_apart import clean_light, remove_excess
 from lippmann.rendering.denoise.local_statistics import mean_around
-from lippmann.rendering.denoise.noisy_blend import own_share
-from lippmann.rendering.denoise.outlines import by_coverage
+from lippmann.rendering.denoise.noisy_blend import weigh_samples
+from lippmann.rendering.denoise.outlines import exchange_coverage
 from lippmann.rendering.denoise.unshared_blend import own_light
 from lippmann.rendering.estimate.bias_posterior import OUTLIER_RATIO
 from lippmann.rendering.estimate.jackknife import OUTLIERS_TOLD_FROM
@@ -107,7 +107,7 @@ class Denoised:
 
     def picture(self) -> Floats:
         """``(H, W, 3)`` float32 linear RGB."""
-        return without_excess(self._mean(), self._renderer.excess())
+        return remove_excess(self._mean(), self._renderer.excess())
 
     def _mean(self) -> Floats:
         if self._renderer.samples < 2:
@@ -157,7 +157,7 @@ class Denoised:
             self._noisy = self._noisy_halves()
             clean = self._best_of_halves()
             noisy = self._shown_halves()
-            own = own_share(noisy, clean, self._transfer, threads=self._threads)
+            own = weigh_samples(noisy, clean, self._transfer, threads=self._threads)
             self._cleaned = clean[0] + own * (noisy[0] - clean[0]), clean[1] + own * (noisy[1] - clean[1])
         return self._cleaned
 
@@ -167,7 +167,9 @@ class Denoised:
         if coverage is None:
             return halves
         threads = self._threads
-        first, second = (by_coverage(half, *both, threads=threads) for half, both in zip(halves, coverage, strict=True))
+        first, second = (
+            exchange_coverage(half, *both, threads=threads) for half, both in zip(halves, coverage, strict=True)
+        )
         return first, second
 
     def _coverages(self) -> list[tuple[Coverage, Coverage]] | None:
@@ -186,7 +188,7 @@ class Denoised:
         noisy, coverage = self._renderer.traced_picture(), self._coverages()
         if coverage is not None:
             (paths, further), (more_paths, more_further) = coverage
-            noisy = by_coverage(noisy, paths + more_paths, further + more_further, threads=self._threads)
+            noisy = exchange_coverage(noisy, paths + more_paths, further + more_further, threads=self._threads)
         return self._cleaned_and_shared(noisy, self._renderer.seen())[-1]
 
     def _best_of_halves(self) -> tuple[Floats, Floats]:

@@ -63,6 +63,6 @@ def clean_light(
     return found
 
 
-def without_excess(picture: Floats, excess: Floats | None) -> Floats:
+def remove_excess(picture: Floats, excess: Floats | None) -> Floats:
     """``picture`` without what of it rests on single chains of seen light, not below 0."""
     return picture if excess is None else np.maximum(picture - excess, np.float32(0))

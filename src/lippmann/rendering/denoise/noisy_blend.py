@@ -31,7 +31,7 @@ Floats = NDArray[np.float32]
 NEAR, FAR = 2, 8
 
 
-def own_share(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int) -> Floats:
+def weigh_samples(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int) -> Floats:
     """The weight of each pixel's own samples against its clean value, ``(H, W, 1)`` in [0, 1].
 
     Parameters

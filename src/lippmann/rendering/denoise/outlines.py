@@ -25,7 +25,7 @@ _LEAST_WEIGHT = 0.05
 _AROUND = [step for step in np.ndindex(3, 3) if step != (1, 1)]
 
 
-def by_coverage(pixels: Floats, paths: Coverage, further: Coverage, *, threads: int = 1) -> Floats:
+def exchange_coverage(pixels: Floats, paths: Coverage, further: Coverage, *, threads: int = 1) -> Floats:
     """``pixels (H, W, 3)``, linear, with the coverage of all rays.
 
     Parameters

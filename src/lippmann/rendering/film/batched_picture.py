@@ -172,7 +172,7 @@ class BatchedPicture:
         return values
 
     def _keep(self, run: Run, sums: dict[str, Floats]) -> None:
-        """Add to its batches what :func:`~lippmann.rendering.film.wavefront.sums_of` gives for a run."""
+        """Add to its batches what :func:`~lippmann.rendering.film.wavefront.sum_samples` gives for a run."""
         per_stream = self._batches_of_stream
         pixels = slice(run.first, run.last)
         for place, batch in enumerate(run.batches):

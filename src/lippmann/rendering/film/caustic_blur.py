@@ -20,7 +20,7 @@ from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.rendering.film.memory_model import PREFERRED_LANES
-from lippmann.rendering.film.wavefront import shown_colors
+from lippmann.rendering.film.wavefront import select_colors
 from lippmann.rendering.transport.caustic_photons import CausticPhotons
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
@@ -68,21 +68,21 @@ class SquaredBlur:
         if share >= 2 * self._share or share == 1.0 > self._share:
             # The photons that the last sample met are at hand.
             self._share, (self._pass, _) = share, passes.schedule.at(samples - 1)
-            self._of_pass = self._looked(passes.of_pass(self._pass), share)
+            self._of_pass = self._measure(passes.of_pass(self._pass), share)
         scaled = _mean_area(passes, samples) / passes.relative_radius(self._pass) ** 2
         return (self._of_pass * np.float32(scaled**2)).reshape(*self._window.shape, 3)
 
-    def _looked(self, photons: PhotonMap, share: float) -> Floats:
-        """``(pixels, 3)`` by a look at this share of the pixels, each of which stands for its like."""
+    def _measure(self, photons: PhotonMap, share: float) -> Floats:
+        """``(pixels, 3)``, of this share of the pixels, each of which stands for its like."""
         assert isinstance(self._integrator, PathIntegrator)
         blur = ShownBlur(self._integrator, photons)
-        looked = _looked_at(self._source, self._window, self._seed, share)
-        found = np.zeros((self._window.pixels, 3), np.float32)
+        chosen = _choose_pixels(self._source, self._window, self._seed, share)
+        squares = np.zeros((self._window.pixels, 3), np.float32)
         step = max(1, PREFERRED_LANES // (2 * self._source.channels))
-        for first in range(0, len(looked), step):
-            part = looked[first : first + step]
-            found[part] = _products(blur, self._source, self._window, part, self._seed) / np.float32(share)
-        return found
+        for first in range(0, len(chosen), step):
+            part = chosen[first : first + step]
+            squares[part] = _products(blur, self._source, self._window, part, self._seed) / np.float32(share)
+        return squares
 
 
 def _mean_area(passes: CausticPhotons, samples: int) -> float:
@@ -95,7 +95,7 @@ def _mean_area(passes: CausticPhotons, samples: int) -> float:
     return total / samples
 
 
-def _looked_at(source: RaySource, window: PixelWindow, seed: int, share: float) -> NDArray[np.intp]:
+def _choose_pixels(source: RaySource, window: PixelWindow, seed: int, share: float) -> NDArray[np.intp]:
     """Numbers of a share of the pixels of a window, spread evenly."""
     row, column = np.divmod(np.arange(window.pixels, dtype=np.uint64), np.uint64(window.width))
     number = (row + np.uint64(window.top)) * np.uint64(source.width) + column + np.uint64(window.left)
@@ -121,4 +121,4 @@ def _products(blur: ShownBlur, source: RaySource, window: PixelWindow, pixels: N
     ray = source.rays(column, row, channel, stream.next_2d(PIXEL_DIMENSION))
     added = np.array(dr.ravel(blur.sample(ray, stream, mi.Bool(True)))).reshape(-1, channels, 2, 3)
     product = np.nan_to_num(added[:, :, 0] * added[:, :, 1], posinf=0.0, neginf=0.0)
-    return shown_colors(product)
+    return select_colors(product)

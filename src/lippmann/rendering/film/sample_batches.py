@@ -34,7 +34,7 @@ from lippmann.rendering.film.wavefront import (
     compile_seconds,
     evaluate,
     sample_pixels,
-    sums_of,
+    sum_samples,
 )
 from lippmann.rendering.film.wavefront_plan import Run, cut_batches
 from lippmann.rendering.transport.integrator import Integrator
@@ -186,7 +186,7 @@ class FullInBatches(BatchedPicture):
                 yield from cut_batches(pixels, batches, tuple(starts), count, lanes, strip)
 
     def _trace(self, integrator: Integrator, run: Run, together: int) -> dict[str, Floats]:
-        """What :func:`~lippmann.rendering.film.wavefront.sums_of` gives for a run; excess by the samples that every
+        """What :func:`~lippmann.rendering.film.wavefront.sum_samples` gives for a run; excess by the samples that every
         pixel then has ``together``.
 
         Lanes are ordered pixel (see :mod:`.lane_order`), then channel, then batch, then sample. What differs from run
@@ -214,7 +214,7 @@ class FullInBatches(BatchedPicture):
         samples = None if self._covered is None else dr.opaque(mi.Float, together)
         traced = sample_pixels(integrator, pixels, stream, samples)
         evaluate(traced, lanes, self.rays)
-        sums = sums_of(traced, channels, number, run.count)
+        sums = sum_samples(traced, channels, number, run.count)
         return {name: to_rows(part, window.width) for name, part in sums.items()} if run.in_strips else sums
 
 

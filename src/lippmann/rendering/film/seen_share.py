@@ -39,7 +39,7 @@ def seen_share(pixels: NDArray[np.float32] | None, background: Color | None, ray
     return min(1.0, (rays.shadow + rays.secondary) / samples)
 
 
-def nothing_seen(share: float) -> tuple[str, ...]:
+def warn_of_emptiness(share: float) -> tuple[str, ...]:
     """The warning, or nothing."""
     if share >= LEAST_SHARE:
         return ()

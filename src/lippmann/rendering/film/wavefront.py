@@ -99,7 +99,7 @@ def trace_frame(
             samples = dr.opaque(mi.Float, plan.samples) if for_denoiser else None
             sample = sample_pixels(integrator, pixels, stream, samples)
             evaluate(sample, lanes, frame.rays)
-            sums = sums_of(sample, plan.channels, 1, run.count)
+            sums = sum_samples(sample, plan.channels, 1, run.count)
             if done == 0:
                 frame.seconds_compile = compile_seconds()
         for name, values in sums.items():
@@ -170,7 +170,7 @@ def evaluate(sample: PixelSample, lanes: int, totals: RayTotals) -> None:
     totals.discarded += lanes - int(dr.count(finite)[0])
 
 
-def sums_of(sample: PixelSample, channels: int, batches: int, count: int) -> dict[str, NDArray[np.float32]]:
+def sum_samples(sample: PixelSample, channels: int, batches: int, count: int) -> dict[str, NDArray[np.float32]]:
     """``(pixels, batches, 3)`` sums of what is told of evaluated samples, ``(pixels, batches, channels)`` of coverage.
 
     Lanes are ordered pixel, channel, batch, sample.
@@ -180,14 +180,14 @@ def sums_of(sample: PixelSample, channels: int, batches: int, count: int) -> dic
         light = getattr(sample, name)
         if light is not None:
             parts = [dr.block_sum(component, count) if count > 1 else component for component in light]
-            sums[name] = shown_colors(np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, channels, batches, 3))
+            sums[name] = select_colors(np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, channels, batches, 3))
     if sample.covered is not None:
         hits = dr.block_sum(sample.covered, count) if count > 1 else sample.covered
         sums["covered"] = np.swapaxes(np.array(hits).reshape(-1, channels, batches), 1, 2)
     return sums
 
 
-def shown_colors(values: NDArray[np.float32]) -> NDArray[np.float32]:
+def select_colors(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """``(pixels, ..., 3)``: of ``(pixels, channels, ..., 3)`` what the pixels show.
 
     The rays of a sub-pixel carry all three colours; it shows its own.

@@ -21,14 +21,14 @@ def develop(values: Floats, pixels: PixelSet, request: RenderRequest) -> Codes:
         return develop_picture(arrange(values, pixels), pixels, request)
     # Each pixel is coded once, and its three codes are copied as one number; the last stands for places past the panel.
     codes = np.zeros((len(values) + 1, 4), np.uint8)
-    codes[:-1, :3] = codes_of(values, request)
+    codes[:-1, :3] = encode_light(values, request)
     picture = codes.view(np.uint32)[:, 0][pixels.number[..., 0]]
     return np.ascontiguousarray(picture[..., None].view(np.uint8)[..., :3])
 
 
 def develop_picture(picture: Floats, pixels: PixelSet, request: RenderRequest) -> Codes:
     """Codes of a linear picture ``(height, width, 3)``, black where no pixel is seen."""
-    codes = codes_of(picture, request)
+    codes = encode_light(picture, request)
     codes[pixels.number < 0 if pixels.channels == 3 else (pixels.number < 0)[..., 0]] = 0
     return codes
 
@@ -41,7 +41,7 @@ def arrange(values: Floats, pixels: PixelSet) -> Floats:
     return with_black[pixels.number, np.arange(3)]
 
 
-def codes_of(values: Floats, request: RenderRequest) -> Codes:
+def encode_light(values: Floats, request: RenderRequest) -> Codes:
     """Codes of linear radiance ``(..., 3)``; same shape. One in 100 of the darkest is off by one."""
     table = _code_table()
     place = np.clip(request.shown(values), 0, 1) * np.float32(len(table) - 1)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.rendering.denoise.noisy_blend import own_share
+from lippmann.rendering.denoise.noisy_blend import weigh_samples
 from lippmann.rendering.denoise.oidn import denoise, load_denoiser
 from lippmann.rendering.film.batched_picture import STREAMS
 from lippmann.rendering.live.develop import arrange, develop, develop_picture
@@ -184,5 +184,5 @@ def _denoised(
     for half in noisy:
         clean.append(denoise(half, albedo, normal, effort="fast", threads=threads))
         yield None
-    share = own_share(noisy, (clean[0], clean[1]), "srgb", threads=threads)
+    share = weigh_samples(noisy, (clean[0], clean[1]), "srgb", threads=threads)
     yield np.asarray((clean[0] + clean[1]) / 2 * (1 - share) + mean * share, np.float32)
