@@ -25,6 +25,7 @@ else:
 
 COMMANDS = "reference/commands/"
 PROPERTIES = "reference/properties.md"
+OPTIONS = "reference/python/options.md"
 #: Roles of Sphinx in docstrings, as Markdown leaves them: ``:class:<code>~a.b.Name</code>``.
 ROLE = re.compile(r":[a-z]+:(?=<code>)(<code>)(?:~[\w.]*\.)?")
 
@@ -41,6 +42,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages of the commands and of the properties."""
     tables = [tomllib.loads(Path(file.abs_src_path).read_text("utf-8")) for file in files if _is_table(file)]
     files.append(File.generated(config, PROPERTIES, content=properties_page(tables)))
+    files.append(File.generated(config, OPTIONS, content=options_page()))
     commands = list(leaves(command_tree()))
     files.append(File.generated(config, f"{COMMANDS}index.md", content=overview(commands)))
     for path, command in commands:
@@ -66,6 +68,36 @@ def properties_page(tables: list[dict[str, Any]]) -> str:
         rows = [f"| {_cell(row['name'])} | {row['is']} | {_cell(row['how'])} |" for row in table["rows"]]
         head = "| property | is | how |\n|---|---|---|"
         parts.append("\n".join([f"## {table['title']}\n", f"{_cell(table['source'])}.\n", head, *rows]))
+    return "\n\n".join(parts) + "\n"
+
+
+def options_page() -> str:
+    """The page of the options of a render, as Python and the studio's files have them."""
+    from lippmann.options.light import LightOptions
+    from lippmann.options.option import default_of, options_of
+    from lippmann.options.placement import PlacementOptions
+    from lippmann.options.quality import MachineOptions, QualityOptions
+    from lippmann.options.scene import SceneOptions
+
+    parts = [
+        "# Options",
+        "Keywords of the calls, fields of these classes, settings of a studio's file, and options of the command line "
+        "(with `-` for `_`) are the same.",
+    ]
+    for kind, where in (
+        (SceneOptions, "Keywords of `load_scene`."),
+        (LightOptions, "`light` of `load_scene`: the class, or a dict of its fields."),
+        (PlacementOptions, "`placement` of `render` and the others: the class, or a dict of its fields."),
+        (QualityOptions, "Keywords of `render`, `render_to_file`, `render_quilt`, `preview` and `plan`."),
+        (MachineOptions, "Keywords of the same calls, and of `studio`."),
+    ):
+        rows = [
+            f"| {_code(each.name)} | {_cell(its.help_in_python)} | {_code(repr(default_of(each)))} |"
+            for each, its in options_of(kind)
+        ]
+        parts.append(
+            "\n".join([f"## {kind.__name__}\n", f"{where}\n", "| option | meaning | default |", "|---|---|---|", *rows])
+        )
     return "\n\n".join(parts) + "\n"
 
 

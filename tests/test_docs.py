@@ -176,7 +176,9 @@ def test_python_examples_run(page, workplace, engine):
 
 
 def test_links_lead_somewhere():
-    made = re.compile(r"(^|/)(commands/[\w-]+|properties)\.md$")  # by the site: from help texts, from tables
+    made = re.compile(
+        r"(^|/)(commands/[\w-]+|properties|python/options)\.md$"
+    )  # by the site: from help texts, from tables
     for page in PAGES:
         for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text(encoding="utf-8")):
             assert made.search(target) or (page.parent / target).exists(), f"{name(page)} links to {target}"
@@ -217,6 +219,9 @@ def test_the_site_tells_of_every_option_and_function(site):
     functions = (site / "reference" / "python" / "rendering.html").read_text(encoding="utf-8")
     assert 'id="lippmann.render_to_file"' in functions
     assert "placement" in functions
+    options = (site / "reference" / "python" / "options.html").read_text(encoding="utf-8")
+    assert "clamp_indirect" in options
+    assert "environment_strength" in options
 
 
 def test_the_site_shows_the_tables_of_properties(site):

@@ -21,6 +21,8 @@ T = TypeVar("T", bound="Options")
 
 #: Key of a field's metadata.
 _KEY = "option"
+#: An upper end that keeps numbers representable alone, and tells people nothing.
+_UNTOLD = 1e15
 #: Another option, named in a help text.
 _OPTION = re.compile(r"`(\w+)`")
 
@@ -80,8 +82,11 @@ class Option:
 
     @property
     def help_in_python(self) -> str:
-        """The help with other options as keywords."""
-        return _OPTION.sub(r"``\1``", self.help)
+        """The help with other options as keywords, and the range."""
+        least = f"Above {self.low:g}, at most" if self.excludes_low else f"{self.low:g} to"
+        text = f"{least} {self.high:.10g}."
+        is_left_out = self.low == -math.inf or self.high > _UNTOLD or text in self.help
+        return _OPTION.sub(r"``\1``", self.help) + ("" if is_left_out else f" {text}")
 
     def check(self, name: str, value: object, kind: Any) -> None:
         """Refuse a value that is not of the annotated type ``kind``, or out of range.

@@ -392,11 +392,6 @@ def _info_lines(path: Path, file: PictureFile) -> list[str]:
     return lines + _provenance_lines(provenance)
 
 
-def _plan_lines(provenance: Provenance) -> list[object]:
-    lines = provenance.options.get("plan")
-    return lines if isinstance(lines, list) else []
-
-
 def _provenance_lines(provenance: Provenance) -> list[str]:
     lines = [
         f"scene       {provenance.scene or 'unknown'}",
@@ -410,6 +405,9 @@ def _provenance_lines(provenance: Provenance) -> list[str]:
         lines.append("rays        " + ", ".join(f"{count:,} {kind}" for kind, count in provenance.rays.items()))
     if provenance.seconds:
         lines.append("seconds     " + ", ".join(f"{stage} {spent:.2f}" for stage, spent in provenance.seconds.items()))
-    lines += [f"{name:<11} {value}" for name, value in provenance.options.items() if name != "plan"]
-    lines += [f"{'plan' if place == 0 else '':<11} {line}" for place, line in enumerate(_plan_lines(provenance))]
+    lists = {name: provenance.options.get(name) for name in ("settings", "plan")}
+    lines += [f"{name:<11} {value}" for name, value in provenance.options.items() if name not in lists]
+    for name, each in lists.items():
+        if isinstance(each, list):
+            lines += [f"{name if place == 0 else '':<11} {line}" for place, line in enumerate(each)]
     return lines + [f"note        {note}" for note in provenance.notes]
