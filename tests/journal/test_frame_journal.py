@@ -14,7 +14,6 @@ from lippmann.errors import LippmannError, OutputError, PictureError
 from lippmann.journal.frame_journal import FrameJournal
 
 OF = {"spp": "4", "the scene": "0" * 64}
-CHOSEN = {"method": "full"}
 
 
 @pytest.fixture
@@ -25,7 +24,7 @@ def begun(tmp_path):
     with FrameJournal.open(path, OF, resume=False) as journal:
         for number, file in enumerate(files):
             file.write_bytes(b"frame %d" % number)
-            journal.add(number, file, CHOSEN)
+            journal.add(number, file)
     return path, files
 
 
@@ -34,15 +33,13 @@ def held(path, files, fingerprint=OF):
         return [number for number, file in enumerate(files) if journal.holds(number, file)]
 
 
-def test_finished_frames_are_held_and_what_was_chosen_for_them(begun):
+def test_finished_frames_are_held(begun):
     path, files = begun
     assert held(path, files) == [0, 1, 2]
     with FrameJournal.open(path, OF, resume=True) as journal:
-        assert journal.chosen == CHOSEN
         assert 2 in journal
         assert 3 not in journal
-        journal.add(3, files[0], {"method": "reuse"})
-        assert journal.chosen == CHOSEN
+        journal.add(3, files[0])
     assert held(path, [*files, files[0]]) == [0, 1, 2, 3]
 
 
@@ -59,7 +56,7 @@ def test_a_frame_may_be_a_folder(begun, tmp_path):
     (folder / "c").mkdir(parents=True)
     (folder / "c" / "0").write_bytes(b"values")
     with FrameJournal.open(path, OF, resume=True) as journal:
-        journal.add(3, folder, CHOSEN)
+        journal.add(3, folder)
         assert journal.holds(3, folder)
         (folder / "c" / "0").rename(folder / "c" / "1")
         assert not journal.holds(3, folder)
@@ -85,7 +82,7 @@ def test_without_resuming_it_begins_anew(begun):
     path, files = begun
     with FrameJournal.open(path, OF | {"spp": "8"}, resume=False) as journal:
         assert not journal.holds(0, files[0])
-        journal.add(1, files[1], CHOSEN)
+        journal.add(1, files[1])
     assert held(path, files, OF | {"spp": "8"}) == [1]
 
 
@@ -112,7 +109,7 @@ def test_a_journal_cut_short_anywhere_holds_the_lines_that_are_whole(begun):
         assert held(path, files) == list(range(max(0, whole)))
         # It goes on behind the last whole line.
         with FrameJournal.open(path, OF, resume=True) as journal:
-            journal.add(2, files[2], CHOSEN)
+            journal.add(2, files[2])
         assert 2 in held(path, files)
 
 
@@ -129,7 +126,7 @@ def test_what_is_no_journal_is_said_to_be_none(tmp_path, head):
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(
     line=st.dictionaries(
-        st.sampled_from(["frame", "sum", "chosen"]),
+        st.sampled_from(["frame", "sum"]),
         st.none()
         | st.booleans()
         | st.integers()

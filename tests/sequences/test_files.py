@@ -14,7 +14,7 @@ from dataclasses import replace
 import pytest
 
 from lippmann.display import load_display
-from lippmann.errors import PictureError, UsageError
+from lippmann.errors import PictureError
 from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.sequences.files import journal_of, saved_sequence
@@ -95,28 +95,6 @@ def test_damaged_and_absent_frames_are_rendered_again(unbroken, moving_ball, dis
 def test_what_was_half_written_is_swept(unbroken, moving_ball, display, tmp_path):
     run(moving_ball, display, tmp_path, most=1)
     (tmp_path / ".f_03-0123abcd.part.png").write_bytes(b"half")
-    run(moving_ball, display, tmp_path, resume=True)
-    assert contents(tmp_path) == unbroken
-
-
-@pytest.mark.slow
-def test_what_was_chosen_for_the_first_frame_holds(unbroken, moving_ball, display, tmp_path):
-    run(moving_ball, display, tmp_path, most=1)
-    journal = tmp_path / "f_%02d.png.journal"
-    head, line = journal.read_text().splitlines()
-    assert json.loads(line)["chosen"] == {"method": "pooled", "denoise": "oidn"}
-    journal.write_text(f"{head}\n{line.replace('pooled', 'guessed')}\n")
-    with pytest.raises(UsageError, match="unknown method 'guessed'"):
-        run(moving_ball, display, tmp_path, resume=True)
-
-
-@pytest.mark.long
-def test_a_journal_chooses_no_other_options(unbroken, moving_ball, display, tmp_path):
-    run(moving_ball, display, tmp_path, most=1)
-    journal = tmp_path / "f_%02d.png.journal"
-    text = journal.read_text()
-    journal.write_text(text.replace('"chosen": {', '"chosen": {"integrator": "normal", "device": "gpu", '))
-    assert journal.read_text() != text
     run(moving_ball, display, tmp_path, resume=True)
     assert contents(tmp_path) == unbroken
 

@@ -39,13 +39,10 @@ class FrameJournal:
     ----------
     path:
         The journal's file.
-    chosen:
-        Settings by name that were chosen with the first frame and hold for all.
     """
 
-    def __init__(self, path: Path, file: IO[bytes], sums: dict[int, str], chosen: dict[str, str]) -> None:
+    def __init__(self, path: Path, file: IO[bytes], sums: dict[int, str]) -> None:
         self.path = path
-        self.chosen = chosen
         self._file = file
         self._sums = sums
 
@@ -80,14 +77,13 @@ class FrameJournal:
             line = file.readline(_MOST_HEAD)
             head = _head_of(line, path)
             sums: dict[int, str] = {}
-            chosen: dict[str, str] = {}
             length = 0
             if resume and head:
                 _check_same(head, fingerprint, path)
-                sums, chosen, length = _frames_of(file.read())
+                sums, length = _frames_of(file.read())
                 length += len(line)
             file.truncate(length)
-            journal = cls(path, file, sums, chosen)
+            journal = cls(path, file, sums)
             if not length:
                 journal._add({_KEY: _VERSION, "fingerprint": dict(fingerprint)})
         except BaseException:
@@ -102,7 +98,7 @@ class FrameJournal:
         except OSError:
             return False
 
-    def add(self, frame: int, file: Path, chosen: Mapping[str, str]) -> None:
+    def add(self, frame: int, file: Path) -> None:
         """Record a finished frame.
 
         Parameters
@@ -111,8 +107,6 @@ class FrameJournal:
             Its number.
         file:
             Its file or folder, complete.
-        chosen:
-            Settings by name that hold for all frames; those of the first frame are kept.
 
         Raises
         ------
@@ -123,9 +117,8 @@ class FrameJournal:
             check_sum = _sum_of(file)
         except OSError as error:
             raise OutputError(f"cannot be read again: {error.strerror or error}", where=str(file)) from error
-        self._add({"frame": frame, "sum": check_sum, "chosen": dict(chosen)})
+        self._add({"frame": frame, "sum": check_sum})
         self._sums[frame] = check_sum
-        self.chosen = self.chosen or dict(chosen)
 
     def finish(self) -> None:
         """Remove the journal, after the last frame."""
@@ -199,19 +192,17 @@ def _check_same(begun: Mapping[str, object], fingerprint: Mapping[str, str], pat
         )
 
 
-def _frames_of(data: bytes) -> tuple[dict[int, str], dict[str, str], int]:
-    """Check sums by frame, chosen settings, and the length in bytes of the undamaged lines."""
+def _frames_of(data: bytes) -> tuple[dict[int, str], int]:
+    """Check sums by frame, and the length in bytes of the undamaged lines."""
     sums: dict[int, str] = {}
-    chosen: dict[str, str] = {}
     length = 0
     for line in data.split(b"\n")[:-1]:
         values = _values(line)
         if values is None or not _is_frame(values):
             break
         sums[values["frame"]] = values["sum"]
-        chosen = chosen or values["chosen"]
         length += len(line) + 1
-    return sums, chosen, length
+    return sums, length
 
 
 def _values(line: bytes) -> dict[str, Any] | None:
@@ -223,7 +214,7 @@ def _values(line: bytes) -> dict[str, Any] | None:
 
 
 def _is_frame(values: Mapping[str, Any]) -> bool:
-    return type(values.get("frame")) is int and isinstance(values.get("sum"), str) and _are_texts(values.get("chosen"))
+    return type(values.get("frame")) is int and isinstance(values.get("sum"), str)
 
 
 def _are_texts(values: object) -> TypeGuard[dict[str, str]]:

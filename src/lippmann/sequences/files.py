@@ -19,14 +19,14 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import engine
 from lippmann.scene.placement import options_of_sequence
 from lippmann.sequences.forms import INTEGRAL, Form
-from lippmann.sequences.frames import Stand, find_stand, hold_choice, render_frames, render_tiled_frames
+from lippmann.sequences.frames import Stand, find_stand, render_frames, render_tiled_frames
 from lippmann.sequences.motion import Motion
 
 if TYPE_CHECKING:
     from lippmann.tiles.tiled_render import Runner
 
-#: A frame's number, how it was made, and what was chosen for it.
-_Made: TypeAlias = "tuple[int, Provenance, dict[str, str]]"
+#: A frame's number, and how it was made.
+_Made: TypeAlias = "tuple[int, Provenance]"
 
 #: What of a request changes nothing in the pictures, or is told apart.
 _IMMATERIAL = ("device", "threads", "plan", "placement")
@@ -126,7 +126,6 @@ def saved_sequence(
         "the format": name,
         "values": stored,
         "frames are rendered": "whole" if runner is None else "in tiles",
-        # What is chosen for it holds for all.
         "the first frame": str(frames[0]),
     }
     where = find_stand(motion, display, placement)
@@ -134,15 +133,11 @@ def saved_sequence(
         missing = [number for number in frames if not journal.holds(number, path_of(number))]
         if missing:
             sweep_beside(path_of(missing[0]))  # which an interrupted run may have left half written
-        if missing and missing[0] != frames[0]:
-            # Nothing else is taken from a journal, which somebody may have changed.
-            chosen = {"method": request.method, "denoise": request.denoise, **journal.chosen}
-            request = hold_choice(request, chosen["method"], chosen["denoise"])
         if runner is None:
             made = _whole(motion, display, missing, where, path_of, bits, progress, request, form)
         else:
             files = render_tiled_frames(motion, display, missing, where, path_of, request, runner, bits, progress)
-            made = ((number, written.provenance, {}) for number, written in files)
+            made = ((number, written.provenance) for number, written in files)
         yield _in_order(frames, missing, path_of, made, journal, form)
         if all(number in journal for number in frames):
             journal.finish()
@@ -163,8 +158,8 @@ def _in_order(
         if number not in absent:
             yield SavedFrame(number, path, form.provenance(path), found=True)
             continue
-        _, provenance, chosen = next(made)
-        journal.add(number, path, chosen)
+        _, provenance = next(made)
+        journal.add(number, path)
         yield SavedFrame(number, path, provenance)
 
 
@@ -182,5 +177,4 @@ def _whole(
     """Frames rendered in one piece, and saved."""
     for number, image in render_frames(motion, display, frames, where, request, form, progress):
         form.write(image, path_of(number), bits)
-        made = image.provenance
-        yield number, made, {"method": made.method, "denoise": str(made.options.get("denoise", "none"))}
+        yield number, image.provenance

@@ -19,7 +19,7 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import options_of_sequence
 from lippmann.sequences.files import SavedFrame
 from lippmann.sequences.forms import INTEGRAL, QuiltForm
-from lippmann.sequences.frames import Stand, find_stand, hold_choice, hold_exposure
+from lippmann.sequences.frames import Stand, find_stand, hold_exposure
 from lippmann.sequences.motion import Motion
 from lippmann.viewing.replay import Eye, default_size
 from lippmann.viewing.video_frames import (
@@ -144,14 +144,9 @@ class QuiltCameras:
     _where: Stand | None = field(default=None, init=False)
 
     def __call__(self, frame: int) -> Quilt:
-        first = self._where is None
         where = self._begin() if self._where is None else self._where
         request = replace(self.request, placement=where(frame))
-        quilt = self._form().render(self.motion.scene(frame), self.display, request, silent)
-        if first:
-            made = quilt.provenance
-            self.request = hold_choice(self.request, made.method, str(made.options.get("denoise", "none")))
-        return quilt
+        return self._form().render(self.motion.scene(frame), self.display, request, silent)
 
     def _begin(self) -> Stand:
         """Find where the display stands, and what of the request a quilt can honour."""

@@ -26,7 +26,6 @@ from lippmann.sequences.motion import Motion, open_motion
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
-    from lippmann.options.choices import Denoiser, Method
     from lippmann.quilts.quilt import Quilt
     from lippmann.tiles.tiled_render import Rendered, Runner
 
@@ -277,9 +276,6 @@ def render_frames(
         report = _of_frame(progress, position, len(frames))
         image = form.render(motion.scene(frame), display, replace(request, placement=where(frame)), report)
         made = image.provenance
-        if position == 0:
-            # What was chosen for the first frame holds for all: a change of method would be seen.
-            request = hold_choice(request, made.method, str(made.options.get("denoise", "none")))
         yield frame, replace(image, provenance=replace(made, options={**made.options, "frame": frame}))
 
 
@@ -312,17 +308,6 @@ def render_tiled_frames(
                 progress=_of_frame(progress, position, len(frames)),
             ),
         )
-
-
-def hold_choice(request: RenderRequest, method: str, denoise: str) -> RenderRequest:
-    """``request`` with the method and the denoiser that were chosen for a sequence's first frame.
-
-    Raises
-    ------
-    UsageError
-        They are not known.
-    """
-    return replace(request, method=cast("Method", method), denoise=cast("Denoiser", denoise))
 
 
 def hold_exposure(request: RenderRequest, motion: Motion, display: Display, where: Stand) -> RenderRequest:
