@@ -9,11 +9,9 @@ random numbers and bookkeeping. Parts overlap in a processor, so that shares are
 *Lanes at work*: a vector unit goes on until the longest of its 16 paths has ended; the share of its lanes that have
 still something to do.
 
-*Before*: pixels in the order of rows (:mod:`lippmann.rendering.film.lane_order`), opaque surfaces without an
-acceleration structure of their own where others let rays straight through
-(:mod:`lippmann.rendering.transport.shadow_rays`), look-ups of all photons about a point by every sample
-(``photons_of_cell`` of :mod:`lippmann.rendering.transport.tuning`), and photons in NumPy's memory, whose rows
-cannot be fetched at once (:mod:`lippmann.device.kernel_ops`).
+*Before*: pixels in the order of rows (:mod:`lippmann.rendering.film.lane_order`), look-ups of all photons about a
+point by every sample (``photons_of_cell`` of :mod:`lippmann.rendering.transport.tuning`), and photons in NumPy's
+memory, whose rows cannot be fetched at once (:mod:`lippmann.device.kernel_ops`).
 
 python benchmarks/kernel_profile.py [--scenes NAME,...]
 
@@ -92,7 +90,6 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     from lippmann.rendering.film.wavefront import samples_of_tile
     from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport import path, path_techniques
-    from lippmann.rendering.transport.shadow_rays import ShadowRays
 
     source, paths = stage.source, stage.integrator
     plan = cut_wavefronts(source.width, source.height, SAMPLES, memory=4 << 30)
@@ -154,12 +151,10 @@ def _kernels(stage: Stage) -> dict[str, Any]:
         dr.eval(way, steps)
         return np.array(steps) - 1
 
-    light, undivided = paths.light, ShadowRays(paths.scene, has_null=False)
-    if paths.features.has_null:
-        undivided.opaque, undivided.asked = None, paths.scene
+    light = paths.light
     if light.photons is not None:
         light = replace(light, photons=_unaligned(light.photons))
-    before = path.PathIntegrator(paths.scene, paths.features, paths.depth, light=light, shadow_rays=undivided)
+    before = path.PathIntegrator(paths.scene, paths.features, paths.depth, light=light)
     kernels = {
         "whole": traced(paths),
         "before": traced(before, most=1 << 31, in_rows=True),

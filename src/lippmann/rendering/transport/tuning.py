@@ -26,9 +26,6 @@ class TransportTuning:
         that counts as narrow.
     small_emitter:
         Emitters are small whose area is less than this part of the square of the scene's diagonal.
-    most_opaque:
-        Opaque primitives beyond which a second acceleration structure takes more memory than its time is worth: of so
-        many it takes some 100 MB.
     least_agreement, farthest_from_plane:
         The least cosine between the normals of a photon and of the point that it is looked up at, and how far it may
         lie from the tangent plane there, in radii.
@@ -58,7 +55,6 @@ class TransportTuning:
     most_power: float = 0.75
     least_cosine_angle: float = 0.05
     small_emitter: float = 1e-3
-    most_opaque: int = 1 << 20
     least_agreement: float = 0.7
     farthest_from_plane: float = 0.4
     steepest: float = 4.0
