@@ -371,7 +371,7 @@ def plan(
         return forecast(_scene(scene), _display(display), _request(placement, options), told)
 
 
-@takes(SceneOptions, PlacementOptions, LightOptions, QualityOptions, MachineOptions)
+@takes(SceneOptions, PlacementOptions, LightOptions, QualityOptions, MachineOptions, integrator="path")
 def studio(
     scene: Scene | object = "teapot",
     display: str | Path = "seed-lenticular",

@@ -161,6 +161,13 @@ def test_calls_say_their_keywords(function, kinds, left_out):
     assert "**" not in described
 
 
+def test_the_studio_says_its_settings():
+    parameters, state = inspect.signature(lippmann.studio).parameters, StudioState()
+    for each, _ in options_of(StudioState):
+        if each.name not in ("scene", "display", "eye"):
+            assert parameters[each.name].default == getattr(state, each.name), each.name
+
+
 @pytest.mark.parametrize(
     ("keywords", "kinds"),
     [

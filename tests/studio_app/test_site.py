@@ -37,7 +37,7 @@ from lippmann.studio_app.live_socket import LiveSocket
 from lippmann.studio_app.page_values import state_of_values, values_of_state
 from lippmann.studio_app.pages import static_files
 from lippmann.studio_app.session import StudioSession
-from lippmann.studio_app.state import StudioState
+from lippmann.studio_app.state import FILES, StudioState
 from lippmann.studio_app.state_toml import state_of_text
 
 STATE = values_of_state(StudioState(display=TINY))
@@ -282,9 +282,9 @@ def test_picked_depth_and_saved_states(studio):
         assert said(socket, "state")["state"]["scale"] == 3.0
 
 
-@pytest.mark.parametrize("name", ["scene", "environment", "display"])
+@pytest.mark.parametrize("name", FILES)
 def test_states_open_no_files_that_were_not_given(studio, tmp_path, name):
-    file = tmp_path / {"scene": "a.glb", "environment": "a.exr", "display": "a.toml"}[name]
+    file = tmp_path / {"scene": "a.glb", "display": "a.toml"}.get(name, "a.exr")
     file.write_bytes(b"x")
     with studio.connect() as socket:
         socket.send(view(STATE | {name: str(file)}))

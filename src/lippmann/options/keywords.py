@@ -13,15 +13,23 @@ from lippmann.options.option import Options, default_of, options_of
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def takes(*kinds: type[Options], without: tuple[str, ...] = ()) -> Callable[[F], F]:
-    """Say in a function's signature and docstring which options its ``**options`` are: those of the dataclasses."""
+def takes(*kinds: type[Options], without: tuple[str, ...] = (), **defaults: Any) -> Callable[[F], F]:
+    """Say in a function's signature and docstring which options its ``**options`` are: those of the dataclasses.
+
+    ``defaults`` are those that the function has in place of theirs.
+    """
 
     def decorate(function: F) -> F:
         chosen = [(each, its) for kind in kinds for each, its in options_of(kind) if each.name not in without]
         signature = inspect.signature(function)
         own = [each for each in signature.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
         keywords = [
-            inspect.Parameter(each.name, inspect.Parameter.KEYWORD_ONLY, default=default_of(each), annotation=each.type)
+            inspect.Parameter(
+                each.name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=defaults.get(each.name, default_of(each)),
+                annotation=each.type,
+            )
             for each, _ in chosen
         ]
         function.__signature__ = signature.replace(parameters=[*own, *keywords])  # type: ignore[attr-defined]
