@@ -98,13 +98,15 @@ def trace_reused(
         )
         settled = _report(progress, source.width * source.height)
         arguments = source.display, points, tracer, bands
-        if order == "paper":
-            _make(PaperOrder(*arguments, settled), method)
+        rules = choose_rules(careful=careful, coded=transfer == "srgb")
+        is_paper = order == "paper"
+        maker = PaperOrder(*arguments, settled) if is_paper else DefaultOrder(*arguments, rules, settled)
+        if method == "lens-view":
+            maker.lens_view()
         else:
-            maker = DefaultOrder(*arguments, choose_rules(careful=careful, coded=transfer == "srgb"), settled)
-            _make(maker, method)
-            if careful:
-                maker.correct()
+            maker.interpolated()
+        if careful and isinstance(maker, DefaultOrder):
+            maker.correct()
     progress(Progress("trace", 1, 1))
     seconds_compile = tracer.seconds_compile + (compiling.duration if compiling.done else 0.0)
     return Frame(
@@ -133,13 +135,6 @@ def wavefront_lanes(memory: int, width: int, height: int, samples: int) -> int:
     needed = max(samples, min(SMALLEST_LANES, width * height * samples))
     kept = width * height * (PICTURE + POINT_IMAGE)
     return max(needed, lanes_within(memory, kept, needed, f"{width}x{height} pixels and their points"))
-
-
-def _make(maker: PaperOrder | DefaultOrder, method: ReuseMethod) -> None:
-    if method == "lens-view":
-        maker.lens_view()
-    else:
-        maker.interpolated()
 
 
 def _report(progress: ProgressCallback, total: int) -> Settled:
