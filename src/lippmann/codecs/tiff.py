@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import struct
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -301,6 +302,9 @@ class TiffPicture:
         """A ValueError if a strip or tile lies (partly) beyond the end: memory would be given to what is claimed."""
         size, page = self._file.seek(0, 2), self._page
         spans = zip(page.dataoffsets, page.databytecounts, strict=True)
+        # The library would fill in each of those that are missing.
+        if not page.is_contiguous and len(page.dataoffsets) < math.prod(page.chunked):
+            raise ValueError(f"it names {len(page.dataoffsets)} of {math.prod(page.chunked)} strips or tiles")
         # Older versions of the library read some numbers as negative ones.
         if any(not 0 <= place <= place + count <= size for place, count in spans):
             raise ValueError("it is cut short")
