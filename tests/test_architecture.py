@@ -397,7 +397,7 @@ WALK = (
 )
 
 #: How large the centre of the program may be. Raised by hand alone, and only where a user is worth it.
-MOST_LINES = 16_750
+MOST_LINES = 16_770
 MOST_CONSTANTS = 248
 MOST_BRANCHES = 207
 #: Files of which a default render calls a function, and calls from a file to one of a part above its own.

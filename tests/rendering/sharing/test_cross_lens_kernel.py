@@ -75,7 +75,7 @@ def surface(seed):
 def test_the_mean_is_the_slow_one(cylindrical, reach, stop, channels, monkeypatch):
     from lippmann.rendering.sharing import cross_lens_kernel
 
-    monkeypatch.setattr(cross_lens_kernel, "_PIXELS", 100)  # several parts
+    monkeypatch.setattr(cross_lens_kernel, "PREFERRED_LANES", 100)  # several parts
     random = np.random.default_rng(7)
     normal, height = surface(8)
     light = random.lognormal(0, 0.2, (HEIGHT, WIDTH, channels)).astype(np.float32)

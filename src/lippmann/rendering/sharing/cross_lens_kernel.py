@@ -110,14 +110,40 @@ class _Picture:
 
         total, color = mi.Float(0), self._light_type(0)
         di, dj = -reach_i, -reach_j
-        while is_surface & (dj <= reach_j):
+        active = is_surface & (dj <= reach_j)
+        # What does not change is no state: else Dr.Jit would record the loop a second time, without it.
+        while dr.hint(
+            active,
+            label="lenses about a point",
+            exclude=[
+                own_i,
+                own_j,
+                own_center,
+                lens_rows,
+                lens_columns,
+                rows,
+                columns,
+                row,
+                column,
+                reach_i,
+                reach_j,
+                shift,
+                z,
+                per_height,
+                per_light,
+                normal,
+                light,
+                is_surface,
+            ],
+        ):
             i, j = own_i + di, own_j + dj
             other = j * lens_columns + i
             is_lens = (i >= 0) & (i < lens_columns) & (j >= 0) & (j < lens_rows)
             center = dr.gather(mi.Point2f, self._centers, other, is_lens)
             u = column + 0.5 + (center.x - own_center.x) * shift
             v = row + 0.5 + (center.y - own_center.y) * shift
-            if is_lens & (u >= -1) & (u < columns + 1) & (v >= -1) & (v < rows + 1):
+            is_seen = is_lens & (u >= -1) & (u < columns + 1) & (v >= -1) & (v < rows + 1)
+            if dr.hint(is_seen, exclude=[other, u, v, rows, columns, z, per_height, per_light, normal, light]):
                 x, y = mi.Int32(dr.floor(u)), mi.Int32(dr.floor(v))
                 for step_y, step_x in product((-1, 0, 1), repeat=2):
                     rx, ry = x + step_x, y + step_y
@@ -127,7 +153,7 @@ class _Picture:
                     du, dv = rx + 0.5 - u, ry + 0.5 - v
                     dz = (dr.gather(mi.Float, self._height, there, inside) - z) * per_height
                     fade = du * du + self._down * dv * dv + dz * dz
-                    if inside & (fade < _FADED):
+                    if dr.hint(inside & (fade < _FADED), exclude=[there, per_light, normal, light]):
                         fade += _NORMAL * dr.squared_norm(dr.gather(mi.Vector3f, self._normal, there) - normal)
                         here = dr.gather(self._light_type, self._light, there)
                         fade += dr.squared_norm(here - light) * per_light
@@ -141,4 +167,5 @@ class _Picture:
             is_end = di > reach_i
             di = dr.select(is_end, -reach_i, di)
             dj += dr.select(is_end, 1, 0)
+            active = is_surface & (dj <= reach_j)
         return dr.select(is_surface, color / total, light)
