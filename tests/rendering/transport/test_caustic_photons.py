@@ -372,11 +372,10 @@ def test_later_passes_serve_as_many_samples_as_all_before():
 def test_emissions_go_with_the_samples_of_a_picture():
     from lippmann.rendering.transport.caustic_photons import FEWEST, MOST, emissions
 
-    samples = 1 << 22
-    assert emissions(samples) == samples // 8
-    assert emissions(1 << 18) == emissions(1 << 19) == FEWEST
+    assert emissions(12 << 20) == 1 << 20
+    assert emissions(6 << 16) == emissions(12 << 16) == FEWEST
     assert emissions(1 << 30) == MOST
-    assert emissions(1000) == 250  # no more than a quarter of the paths, for either half
+    assert emissions(6000) == 1000  # no more than a sixth of the paths, for either half
     assert emissions(1) == 1
 
 
