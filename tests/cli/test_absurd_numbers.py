@@ -70,5 +70,5 @@ def test_every_command_with_numbers_is_tried():
             yield " ".join(words)
 
     # These serve pages, work for a cluster, or take no number but a port and threads.
-    without = {"worker", "displays", "doctor", "studio", "show", "view", "compare", "reproduce", "quilt sizes"}
+    without = {"worker", "displays", "doctor", "proof", "studio", "show", "view", "compare", "reproduce", "quilt sizes"}
     assert set(walk(typer.main.get_command(make_app()), [])) - without - {"calibrate page"} == set(NEEDED)
