@@ -119,13 +119,25 @@ def _grid(columns: int, rows: int, steps: int) -> tuple[Vector3f, Point2f, Point
     import drjit as dr
     import mitsuba as mi
 
-    from lippmann.device.kernel_ops import upload
-
-    across, even = ((np.arange(count) + 0.5) / count for count in (columns, steps))
-    down = np.linspace(0, 1, rows)
-    roughness, cosine, u, v = (upload(part) for part in np.meshgrid(down, across, even, even, indexing="ij"))
-    alpha = dr.maximum(dr.square(roughness), MIN_ALPHA)
+    row, column, *step = _indices(rows, columns, steps, steps)
+    alpha = dr.maximum(dr.square(row / (rows - 1)), MIN_ALPHA)
+    cosine, u, v = (column + 0.5) / columns, *((part + 0.5) / steps for part in step)
     return mi.Vector3f(dr.sqrt(1 - dr.square(cosine)), 0, cosine), mi.Point2f(alpha), mi.Point2f(u, v)
+
+
+def _indices(*shape: int) -> list[Float]:
+    """The indices of every entry of an array of this shape, counted on the device: arrays of them would be large."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.device.kernel_ops import divide
+
+    number = dr.arange(mi.UInt32, math.prod(shape))
+    indices = []
+    for length in reversed(shape):
+        number, index = divide(number, length)
+        indices.append(mi.Float(index))
+    return indices[::-1]
 
 
 def _means(values: Float, rows: int, columns: int) -> NDArray[np.float32]:
@@ -209,12 +221,11 @@ def sheen_albedo_table(size: int = 32, steps: tuple[int, int] = (64, 32)) -> NDA
     import drjit as dr
     import mitsuba as mi
 
-    from lippmann.device.kernel_ops import upload
-
-    centres = (np.arange(size) + 0.5) / size
-    z = (np.arange(steps[0]) + 0.5) / steps[0]
-    phi = (np.arange(steps[1]) + 0.5) * (math.pi / steps[1])  # the lobe is even in phi: half a turn suffices
-    roughness, cos_i, cos_o, angle = (upload(part) for part in np.meshgrid(centres, centres, z, phi, indexing="ij"))
+    row, column, *step = _indices(size, size, *steps)
+    roughness, cos_i, cos_o = (
+        (part + 0.5) / count for part, count in ((row, size), (column, size), (step[0], steps[0]))
+    )
+    angle = (step[1] + 0.5) * (math.pi / steps[1])  # the lobe is even in phi: half a turn suffices
     alpha = dr.maximum(dr.square(roughness), MIN_ALPHA)
     sin_i, sin_o = dr.sqrt(1 - dr.square(cos_i)), dr.sqrt(1 - dr.square(cos_o))
     h = dr.normalize(mi.Vector3f(sin_i + sin_o * dr.cos(angle), sin_o * dr.sin(angle), cos_i + cos_o))
