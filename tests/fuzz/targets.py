@@ -46,6 +46,7 @@ from lippmann.exchange.layouts import import_image
 from lippmann.image import compose, read_picture, streamed
 from lippmann.image.metadata import from_text
 from lippmann.journal import DamagedTile, FrameJournal, TileGrid, TileStore, decode
+from lippmann.options import texts
 from lippmann.quilts import files as quilt_files
 from lippmann.quilts import quilt
 from lippmann.rendering.request.render_request import RenderRequest
@@ -344,9 +345,9 @@ def _words(data: bytes, folder: Path) -> object:
     readers: tuple[Callable[[], object], ...] = (
         lambda: frame_range(text),
         lambda: numbered(folder / text.replace("/", "_").replace("\0", "_")[:80], 2)(7),
-        lambda: parse.numbers(text, "--eye", (1, 3)),
+        lambda: texts.numbers(text, "--eye", (1, 3)),
         lambda: parse.size(text, "--resolution"),
-        lambda: parse.memory(text),
+        lambda: texts.memory(text, "--memory"),
         lambda: parse_target(text),
     )
     refused: list[LippmannError] = []
@@ -393,7 +394,7 @@ def _frames(data: bytes, folder: Path) -> object:
     (folder / "j").write_bytes(data)
     with FrameJournal.open(folder / "j", {"version": "1", "spp": "4"}, resume=True) as journal:
         found = [number for number in range(3) if journal.holds(number, folder / "0.png")]
-        journal.add(2, folder / "0.png", journal.chosen)
+        journal.add(2, folder / "0.png")
     return found
 
 

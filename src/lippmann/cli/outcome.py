@@ -25,7 +25,6 @@ _ComplaintError = BadParameter.__mro__[2]
 def run(words: list[str], *, debug: bool = False) -> int:
     """Run one command; errors become one line on standard error unless ``debug`` asks for the traceback."""
     command_clock.start()
-    limit_inputs(None)  # of the command before, in one process
     from lippmann.cli.app import app_of
 
     try:
@@ -39,6 +38,8 @@ def run(words: list[str], *, debug: bool = False) -> int:
         if debug or not isinstance(error, Exception):
             raise
         return _told(error)
+    finally:
+        limit_inputs(None)  # so that what this process does next is not held to the command's memory
     # Typer makes an exit code of most Ctrl-C.
     if code == INTERRUPTED:
         return stopped()
