@@ -15,6 +15,7 @@ import lippmann
 NAMES = [name for name in lippmann.__all__ if name != "__version__"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_examples_of_a_public_name(name, tmp_path, monkeypatch, engine):
     monkeypatch.chdir(tmp_path)
