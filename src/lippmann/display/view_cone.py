@@ -7,8 +7,7 @@ import math
 from lippmann.display.display import Display
 
 #: Degrees to which programs that render quilts narrow the cone of newer panels, so that neighbouring views fuse: in 50
-#: degrees the same views lie farther apart (``STANDARD_VIEW_CONE`` of quiltwright, 2026). The maker's own packages name
-#: no such limit.
+#: degrees the same views lie farther apart (``STANDARD_VIEW_CONE`` of quiltwright, 2026).
 FUSED_CONE = 35.0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -76,9 +77,13 @@ def _blur(display: Display) -> float:
 
 def _spread(display: Display, slope: float, step: float) -> Real:
     """Shares of the light of a direction on places ``step`` wide, as many to both sides of its middle."""
-    if display.lens is None:
-        return np.ones(1)
-    table = light_table(Lens.of(display), slope, places_per_lens=_PLACES, neighbours=2)
+    return np.ones(1) if display.lens is None else _spread_by(Lens.of(display), slope, step)
+
+
+@lru_cache(maxsize=16)
+def _spread_by(lens: Lens, slope: float, step: float) -> Real:
+    """That of a lens; kept, as numbers of strips are tried on the same one."""
+    table = light_table(lens, slope, places_per_lens=_PLACES, neighbours=2)
     sums = np.concatenate([[0.0], np.cumsum(table.shares[0])]) / table.light[0]
     half = len(table.places) // 2
     edges = table.mean_places[0] + (np.arange(2 * half + 1) - half) * step

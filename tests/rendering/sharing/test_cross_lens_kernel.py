@@ -73,9 +73,9 @@ def surface(seed):
 @pytest.mark.parametrize("stop", [0.0, 40.0])
 @pytest.mark.parametrize(("cylindrical", "reach"), [(True, (4, 0)), (False, (3, 3))])
 def test_the_mean_is_the_slow_one(cylindrical, reach, stop, channels, monkeypatch):
-    from lippmann.rendering.sharing import cross_lens_kernel
+    from lippmann.rendering.sharing import cross_lens_kernel, device_pixels
 
-    monkeypatch.setattr(cross_lens_kernel, "PREFERRED_LANES", 100)  # several parts
+    monkeypatch.setattr(device_pixels, "PREFERRED_LANES", 100)  # several parts
     random = np.random.default_rng(7)
     normal, height = surface(8)
     light = random.lognormal(0, 0.2, (HEIGHT, WIDTH, channels)).astype(np.float32)

@@ -46,9 +46,9 @@ def shared_light(light, normal, height, slopes):
 
 @pytest.mark.usefixtures("engine")
 def test_the_mean_is_the_slow_one(monkeypatch):
-    from lippmann.rendering.sharing import cross_view_kernel
+    from lippmann.rendering.sharing import cross_view_kernel, device_pixels
 
-    monkeypatch.setattr(cross_view_kernel, "_AT_A_TIME", 100)  # several parts
+    monkeypatch.setattr(device_pixels, "PREFERRED_LANES", 100)  # several parts
     random = np.random.default_rng(1)
     shape = (ROWS * HEIGHT, COLUMNS * WIDTH)
     light = random.lognormal(0, 0.5, (*shape, 3)).astype(np.float32)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -12,8 +11,8 @@ from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide
 from lippmann.device.syntax import syntax
-from lippmann.device.types import Array, Float, UInt32
-from lippmann.rendering.film.memory_model import PREFERRED_LANES
+from lippmann.device.types import Array, UInt32
+from lippmann.rendering.sharing.device_pixels import light_of_pixels, upload
 
 #: Sums of squared differences from which on nothing is shared: weights are ``(1 - sum / 10)^8``, which is nearly
 #: ``exp(-0.8 sum)`` and takes a fraction of its time.
@@ -45,14 +44,8 @@ def share(
     through lens C lies at ``q + (C' - C) (1 + g / z)`` under lens C'. Where there is no surface (a normal of 0) light
     stays as it is.
     """
-    pixels, channels = height.size, light.shape[2]
     picture = _Picture(light, normal, height, lens, centers, gap, reach, cylindrical, stop)
-    shared = np.empty((pixels, channels), dtype=np.float32)
-    for first in range(0, pixels, PREFERRED_LANES):
-        last = min(first + PREFERRED_LANES, pixels)
-        pixel = dr.arange(mi.UInt32, last - first) + dr.opaque(mi.UInt32, first)
-        shared[first:last] = np.array(picture.mean_light(pixel)).T
-    return shared.reshape(light.shape)
+    return light_of_pixels(picture.mean_light, light.shape)
 
 
 class _Picture:
@@ -70,16 +63,11 @@ class _Picture:
         cylindrical: bool,
         stop: float,
     ) -> None:
-        def read(values: NDArray[Any]) -> Float:
-            return mi.Float(np.ascontiguousarray(values, dtype=np.float32).ravel())
-
         def opaque(kind: type[Array], *values: float) -> tuple[Array, ...]:
             return tuple(dr.opaque(kind, value) for value in values)
 
         self._light_type = mi.Color3f if light.shape[2] == 3 else mi.Color1f
-        self._light, self._normal, self._height, self._centers = (
-            read(values) for values in (light, normal, height, centers)
-        )
+        self._light, self._normal, self._height, self._centers = upload(light, normal, height, centers)
         self._lens = mi.Int32(np.ascontiguousarray(lens, dtype=np.int32).ravel())
         self._size = opaque(mi.Int32, *height.shape)
         self._lenses = opaque(mi.Int32, *centers.shape[:2])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -11,14 +9,13 @@ from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide
 from lippmann.device.syntax import syntax
-from lippmann.device.types import Color3f, Float, UInt32
+from lippmann.device.types import Color3f, UInt32
+from lippmann.rendering.sharing.device_pixels import light_of_pixels, upload
 
 #: The squared difference of normals from which on they are those of different surfaces: an angle of 25 degrees.
 _OTHER_NORMAL = 0.19
 #: Heights count as alike within so many pixels and this share of them.
 _PIXELS, _OF_HEIGHT = 2.0, 0.01
-#: Pixels at a time: more take memory, fewer time for each start of the kernel.
-_AT_A_TIME = 2**20
 
 
 def share(
@@ -39,12 +36,7 @@ def share(
     ``(s_k - s_j) z / (1 - z / D)`` millimetres to the right of it in its picture.
     """
     views = _Views(light, normal, height, slopes, columns, convergence, pixels_per_mm, reach)
-    shared = np.empty((height.size, 3), dtype=np.float32)
-    for first in range(0, height.size, _AT_A_TIME):
-        last = min(first + _AT_A_TIME, height.size)
-        pixel = dr.arange(mi.UInt32, last - first) + dr.opaque(mi.UInt32, first)
-        shared[first:last] = np.array(views.mean_light(pixel)).T
-    return shared.reshape(light.shape)
+    return light_of_pixels(views.mean_light, light.shape)
 
 
 class _Views:
@@ -61,12 +53,7 @@ class _Views:
         pixels_per_mm: float,
         reach: int,
     ) -> None:
-        def read(values: NDArray[Any]) -> Float:
-            return mi.Float(np.ascontiguousarray(values, dtype=np.float32).ravel())
-
-        self._light, self._normal, self._height, self._slopes = (
-            read(values) for values in (light, normal, height, slopes)
-        )
+        self._light, self._normal, self._height, self._slopes = upload(light, normal, height, slopes)
         size = height.shape[1] // columns, height.shape[0] // (len(slopes) // columns)
         self._width, self._height_of_view = (dr.opaque(mi.Int32, value) for value in size)
         self._columns, self._count, self._reach = (dr.opaque(mi.Int32, n) for n in (columns, len(slopes), reach))
