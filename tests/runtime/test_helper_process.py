@@ -89,11 +89,8 @@ assert process.ask(b"ab", where="f") == b"ba"
 def test_an_answer_beyond_the_memory_is_refused(helper):
     process = helper()
     process.ask(b"ready", where="f")
-    try:
-        limit_inputs(1 << 20)
+    with limit_inputs(1 << 20):
         for _ in range(5):  # what is small is granted without a look
             process.ask(b"large", where="f")
         with pytest.raises(MemoryLimitError):
             process.ask(b"large", where="f")
-    finally:
-        limit_inputs(None)

@@ -16,7 +16,6 @@ from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.errors import LippmannError, UsageError
 from lippmann.printable import one_line
 from lippmann.runtime.atomic_write import reason_and_fix
-from lippmann.runtime.input_memory import limit_inputs
 
 #: The base of all complaints about the command line itself; its home moved between releases of typer.
 _ComplaintError = BadParameter.__mro__[2]
@@ -38,8 +37,6 @@ def run(words: list[str], *, debug: bool = False) -> int:
         if debug or not isinstance(error, Exception):
             raise
         return _told(error)
-    finally:
-        limit_inputs(None)  # so that what this process does next is not held to the command's memory
     # Typer makes an exit code of most Ctrl-C.
     if code == INTERRUPTED:
         return stopped()

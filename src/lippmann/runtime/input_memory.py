@@ -6,6 +6,8 @@ reader asks here before it allocates what a file wants.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
@@ -38,9 +40,14 @@ class _Limit:
 _limit: ContextVar[_Limit] = ContextVar("input memory")
 
 
-def limit_inputs(most: int | None) -> None:
-    """Let what is read from files take ``most`` bytes in all from now on; None for all that is free."""
-    _limit.set(_Limit(most, _resident() if most is not None else 0))
+@contextmanager
+def limit_inputs(most: int | None) -> Iterator[None]:
+    """Let what is read from files meanwhile take ``most`` bytes in all; None for all that is free."""
+    before = _limit.set(_Limit(most, _resident() if most is not None else 0))
+    try:
+        yield
+    finally:
+        _limit.reset(before)
 
 
 def check_input(size: int, what: str, *, where: str) -> None:

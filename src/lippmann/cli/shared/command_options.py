@@ -10,7 +10,8 @@ place, reads their words, and hands the command the whole::
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import Field, dataclass
 from typing import Annotated, Any, TypeVar, get_args, get_origin
 
@@ -65,11 +66,9 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
     def run(**values: Any) -> None:
         values.pop(_HELP_ALL.name, None)
         made = {name: _make(kind, chosen, values) for name, (kind, chosen) in groups.items()}
-        for each in made.values():
-            if isinstance(each, MachineOptions):
-                _limit_inputs(each.memory)
         own = {name: value for name, value in values.items() if name not in options}
-        command(**own, **made)
+        with _limit_inputs(made.values()):
+            command(**own, **made)
 
     run.__name__, run.__doc__, run.__module__ = command.__name__, command.__doc__, command.__module__
     run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
@@ -120,11 +119,14 @@ def _value(each: Field[Any], its: Option, words: Any) -> Any:
     return default_of(each) if words is None or words in ([], ()) else its.read(words, its.flag_of(each.name))
 
 
-def _limit_inputs(memory: int | None) -> None:
-    """Hold what is read from files to the limit, too, from the moment that it is known."""
+def _limit_inputs(made: Iterable[Options]) -> AbstractContextManager[None]:
+    """Hold what the command reads from files to its limit of memory, where it has one."""
+    memory = next((each.memory for each in made if isinstance(each, MachineOptions)), None)
+    if memory is None:
+        return nullcontext()
     from lippmann.runtime.input_memory import limit_inputs
 
-    limit_inputs(memory)
+    return limit_inputs(memory)
 
 
 def _show_all(context: typer.Context, is_asked: bool) -> None:
