@@ -13,12 +13,13 @@ from lippmann.display import NUMPY
 from lippmann.errors import PictureError, UsageError
 from lippmann.exchange.cameras import Cameras
 from lippmann.image.views import view_grid
-from lippmann.viewing.replay import eye_of_view
+from lippmann.viewing.replay import eye_of_offset
 
 
 def pixel_of(display, point, ky, kx):
     """Where in view ``(ky, kx)`` a point is seen, in pixels right and down: by similar triangles from its eye."""
-    eye = eye_of_view(display, ky, kx)
+    places = view_grid(display)
+    eye = eye_of_offset(display, places.right[kx], places.down[ky])
     x, y, z = point
     lens_x, lens_y = x + (x - eye[0]) * z / (eye[2] - z), y + (y - eye[1]) * z / (eye[2] - z)
     pitch = display.lattice.pitch

@@ -18,7 +18,8 @@ from lippmann.exchange.light_field import (
     view_shape,
 )
 from lippmann.image import IntegralImage
-from lippmann.viewing.replay import eye_of_view
+from lippmann.image.views import view_grid
+from lippmann.viewing.replay import eye_of_offset
 
 TYPES = st.sampled_from(["uint8", "uint16", "float16", "float32"])
 
@@ -36,11 +37,12 @@ def test_a_picture_comes_back_bit_by_bit(random_displays, picture, same, data, s
 
 def test_the_first_view_is_the_top_left_camera_s(display):
     made = display("square", lenses=(2, 2), pixels=3, distance=400)
+    places = view_grid(made)
     # Every pixel tells where the eye is that sees it.
     pixels = np.zeros((2, 3, 2, 3, 3), dtype=np.float32)
     for ky in range(3):
         for kx in range(3):
-            pixels[:, ky, :, kx] = eye_of_view(made, ky, kx)
+            pixels[:, ky, :, kx] = eye_of_offset(made, places.right[kx], places.down[ky])
     field = light_field_of(IntegralImage(pixels.reshape(6, 6, 3), made), "float32")
     eyes = field.values[:, :, 0, 0]
     assert (np.diff(eyes[..., 0], axis=1) > 0).all()  # s counts to the right

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from readable_twins import trace_back
 
 from lippmann.display.formats.typical_sheets import TYPICAL_SHEETS
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_profile import LensProfile
-from lippmann.optics.directions import true_directions
+from lippmann.optics.directions import _interpolate, true_directions
 from lippmann.optics.fitting import fit_profile, gap_of
 from lippmann.optics.lens import Lens
-from lippmann.optics.trace import Vectors, trace_back
+from lippmann.optics.trace import Vectors
 
 SIXTY = Lens(fit_profile(LensArray("lenticular", 25.4 / 60), thickness=0.6604), LensArray("lenticular", 25.4 / 60))
 
@@ -25,7 +26,7 @@ def test_each_is_the_others_inverse(name):
     slopes = directions.direction_of(places)
     assert np.all(np.diff(slopes) < 0)
     assert slopes == pytest.approx(-slopes[::-1], abs=1e-12)
-    assert directions.place_of(slopes) == pytest.approx(places, abs=1e-12)
+    assert _interpolate(slopes, directions.slopes[::-1], directions.places[::-1]) == pytest.approx(places, abs=1e-12)
 
 
 def test_the_mean_is_that_of_light_sent_from_the_panel():

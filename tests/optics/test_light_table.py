@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from readable_twins import readable_light_table
 
 from lippmann.display import load_display
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_profile import LensProfile
 from lippmann.errors import DisplayError
 from lippmann.optics.lens import Lens
-from lippmann.optics.light_table import light_table, readable_light_table
+from lippmann.optics.light_table import light_table
 from lippmann.optics.trace import trace
 
 PITCH = 0.5

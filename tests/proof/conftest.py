@@ -10,6 +10,7 @@ import pytest
 
 # Modules that only the proofs use lie beside them.
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parent.parent / "viewing"))
 
 SCENES = {
     "teapot": "teapot",

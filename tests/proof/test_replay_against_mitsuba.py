@@ -156,7 +156,7 @@ def test_replay_equals_direct_pictures(scene, name, distance, pictures):
 
 def check_eye_where_views_meet(made, built):
     """All views meet at the viewing distance, parallel ones infinitely far away: one direct camera sees it all."""
-    from lippmann.viewing.replay import eye_of_view
+    from lens_samples import eye_of_view
 
     sheet = made.sheet
     far = sheet.distance if math.isfinite(sheet.distance) else 1e12
@@ -199,7 +199,7 @@ def test_fine_pixels_show_what_a_camera_at_the_very_eye_sees(scene, layout, pict
     A lenticular sheet shows a true perspective to eyes level with its middle, at the viewing distance. Samples where
     the camera sees another surface when it moves by a pixel are left out.
     """
-    from lippmann.viewing.replay import replay_at_lens_centers
+    from lens_samples import replay_at_lens_centers
 
     sheet = FINE[layout]
     made, built = pictures(scene, sheet)

@@ -7,3 +7,4 @@ from pathlib import Path
 
 # Modules that only these tests use lie beside them.
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parent.parent / "viewing"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from lens_samples import eye_of_view
 from pages import (
     CELLS,
     DISPLAYS,
@@ -24,7 +25,7 @@ from lippmann.color.transfer import encode_srgb
 from lippmann.display import NUMPY
 from lippmann.image import IntegralImage, Provenance
 from lippmann.viewing.refocus import refocus
-from lippmann.viewing.replay import default_eye, eye_of_view
+from lippmann.viewing.replay import default_eye
 
 #: In the middle, aside within the field, far beyond it and high.
 EYES = ((0.0, 0.0, 300.0), (17.3, -9.0, 260.0), (-171.0, 60.0, 410.0))

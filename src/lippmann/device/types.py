@@ -22,8 +22,6 @@ Int32: TypeAlias = Any
 
 #: ``mi.Point2f``: points of the plane, such as samples in [0, 1)^2.
 Point2f: TypeAlias = Any
-#: ``mi.Vector2f``: two numbers, one for each side of a pixel.
-Vector2f: TypeAlias = Any
 #: ``mi.Point3f``: points of space.
 Point3f: TypeAlias = Any
 #: ``mi.Vector3f``: directions and offsets.

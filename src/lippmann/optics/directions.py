@@ -43,10 +43,6 @@ class TrueDirections:
         """Slope of the mean direction of places; beyond the lens as its last places go on."""
         return _interpolate(place, self.places, self.slopes)
 
-    def place_of(self, slope: Real) -> Real:
-        """The place whose mean direction has this slope."""
-        return _interpolate(slope, self.slopes[::-1], self.places[::-1])
-
 
 @lru_cache(maxsize=16)
 def true_directions(lens: Lens) -> TrueDirections:

@@ -22,7 +22,6 @@ from typing import Any
 from lippmann.errors import UsageError
 from lippmann.options.option import default_of, options_of
 from lippmann.options.plain import from_plain, toml_of
-from lippmann.runtime.atomic_write import replacing
 from lippmann.runtime.regular_file import check_kind
 from lippmann.studio_app.state import FILES, StudioState
 
@@ -58,19 +57,6 @@ def read_state(path: Path) -> StudioState:
     except OSError as error:
         raise UsageError(f"cannot be read: {error.strerror}", where=str(path), rule=_KIND) from None
     return state_of_text(text, where=str(path), folder=path.parent)
-
-
-def write_state(state: StudioState, path: Path) -> None:
-    """Write a state to a file, which appears whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
-    text = text_of_state(state, path.parent)
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
 
 
 def state_of_text(text: str, *, where: str = "state", folder: Path | None = None) -> StudioState:

@@ -85,40 +85,6 @@ def check_stack_path(path: Path, bits: int | None = None) -> None:
     check_writable(path)
 
 
-def write_focal_stack(
-    image: IntegralImage | LargePicture,
-    planes: Sequence[float],
-    path: Path,
-    *,
-    size: tuple[int, int] | None = None,
-    bits: int | None = None,
-    progress: ProgressCallback = silent,
-) -> None:
-    """Write a focal stack, a plane at a time.
-
-    Parameters
-    ----------
-    image, planes, size, progress:
-        As for :func:`focal_stack`.
-    path:
-        ``.tif``: one page per plane. ``.png``, ``.apng`` or ``.mp4``: an animation. Without an ending: a folder with
-        one PNG per plane, whose names say the plane in mm.
-    bits:
-        Bits per channel of a TIFF (8, 16, 32) or PNG (8, 16); 8 by default.
-
-    Raises
-    ------
-    UsageError
-        As for :func:`focal_stack`.
-    PictureError
-        If a value is not finite.
-    OutputError
-        If the ending is unknown, there are no such bits, or the file cannot be written.
-    """
-    pictures = focal_planes(image, planes, size=size)
-    write_planes(pictures, planes, path, bits=bits, transfer=image.provenance.transfer, progress=progress)
-
-
 def write_planes(
     pictures: Iterator[FloatArray],
     planes: Sequence[float],
@@ -128,12 +94,17 @@ def write_planes(
     transfer: Transfer = "srgb",
     progress: ProgressCallback = silent,
 ) -> None:
-    """Write the pictures of a focal stack, as :func:`write_focal_stack` does.
+    """Write the pictures of a focal stack, one at a time.
 
     Parameters
     ----------
     pictures:
         ``(height, width, 3)`` linear RGB, one for each of the ``planes``.
+    path:
+        ``.tif``: one page per plane. ``.png``, ``.apng`` or ``.mp4``: an animation. Without an ending: a folder with
+        one PNG per plane, whose names say the plane in mm.
+    bits:
+        Bits per channel of a TIFF (8, 16, 32) or PNG (8, 16); 8 by default.
     transfer:
         Coding of the values.
     """

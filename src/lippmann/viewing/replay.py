@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -22,7 +21,6 @@ from lippmann.display import NUMPY, Display
 from lippmann.errors import UsageError
 from lippmann.image.picture import Picture
 from lippmann.image.stored_values import FloatArray
-from lippmann.image.views import view_grid
 
 Eye = tuple[float, float, float]
 Real = NDArray[np.float64]
@@ -42,34 +40,6 @@ _ON_BOUNDARY = 1e-6
 
 #: Points per block, so that their arrays stay in the processor's cache.
 _BLOCK = 1 << 15
-
-
-@dataclass(frozen=True, eq=False)
-class LensSamples:
-    """Samples that one eye sees at the centres of all lenses.
-
-    Arrays are ``(lens_rows, lens_cols, ...)``. For a lenticular sheet the rows are the panel's, and the points are on
-    the lens's axis where the eye sees the middle of the row.
-
-    Parameters
-    ----------
-    points:
-        ``(..., 2)`` positions in the lens plane, mm.
-    pixels:
-        ``(..., 2)`` column and row of the pixel seen; may lie off the panel.
-    offsets:
-        ``(..., 2)`` offset right and down of the point seen from that pixel's centre, in pixels.
-    colors:
-        ``(..., 3)`` linear RGB of the pixel; zero off the panel.
-    own:
-        True if the pixel is on the panel and belongs to the lens; otherwise the eye is outside the lens's field.
-    """
-
-    points: Real
-    pixels: NDArray[np.int64]
-    offsets: Real
-    colors: FloatArray
-    own: NDArray[np.bool_]
 
 
 def replay(
@@ -117,33 +87,6 @@ def replay(
         panel_x, panel_y = image.display.panel_point_seen_by(*eye, x, y, NUMPY)
         picture[rows] = _panel_colors(image, panel_x, panel_y, filter, subpixels)
     return picture
-
-
-def replay_at_lens_centers(image: Picture, eye: Eye) -> LensSamples:
-    """Unfiltered samples at the centres of all lenses, for comparison with renders of the same rays.
-
-    Raises
-    ------
-    UsageError
-        If the eye is not in front of the lens plane.
-    """
-    eye = checked_eye(eye)
-    display = image.display
-    x, y, i, j = _lens_points(display, eye)
-    panel_x, panel_y = display.panel_point_seen_by(*eye, x, y, NUMPY)
-    u, v = display.pixel_coordinates(panel_x, panel_y)
-    column, row = pixel_at(u), pixel_at(v)
-    owner_i, owner_j = display.lens_of(*display.panel_point(column + 0.5, row + 0.5), NUMPY)
-    inside = is_on_panel(display, column, row)
-    colors = np.zeros((*x.shape, 3), dtype=np.float32)
-    colors[inside] = image.take(row[inside], column[inside])
-    return LensSamples(
-        points=np.stack([x, y], axis=-1),
-        pixels=np.stack([column, row], axis=-1),
-        offsets=np.stack([u - (column + 0.5), v - (row + 0.5)], axis=-1),
-        colors=colors,
-        own=inside & (owner_i == i) & (owner_j == j),
-    )
 
 
 def sweep(
@@ -207,23 +150,6 @@ def default_eye(display: Display) -> Eye:
     across = 0 if display.lens_array.layout == "lenticular" else 1
     extent = max(display.size_mm[: across + 1])
     return 0.0, 0.0, 1.5 * extent / (2 * math.tan(half_field))
-
-
-def eye_of_view(display: Display, ky: int, kx: int) -> Eye:
-    """Position ``(x, y, z)`` in mm of the eye that sees view ``(ky, kx)`` through all lenses.
-
-    Its distance is the viewing distance; if that is infinite, :data:`FAR`.
-
-    Raises
-    ------
-    UsageError
-        If there is no such view.
-    """
-    grid = view_grid(display)
-    if not (0 <= ky < len(grid.down) and 0 <= kx < len(grid.right)):
-        rule = f"the display {display.name} has {len(grid.down)} x {len(grid.right)} (down x right)"
-        raise UsageError(f"there is no view ({ky}, {kx})", rule=rule)
-    return eye_of_offset(display, grid.right[kx], grid.down[ky])
 
 
 def eye_of_offset(display: Display, right: float, down: float) -> Eye:
@@ -372,23 +298,6 @@ def _cell_values(image: Picture, x: Real, y: Real, channel: int, filter_: Filter
     usable = weights > _ON_BOUNDARY
     values = np.where(usable, total / np.where(usable, weights, 1.0), nearest)
     return values.astype(np.float32)[..., None]
-
-
-def _lens_points(display: Display, eye: Eye) -> tuple[Real, Real, Real, Real]:
-    """Points ``(x, y)`` of the lens plane to look at, one per lens, and the lenses ``(i, j)``."""
-    grid, lattice = display.lens_grid, display.lattice
-    if lattice.layout != "lenticular":
-        j, i = np.indices((grid.rows, grid.columns)).astype(np.float64)
-        x, y = lattice.center(i, j, 0.0 * i, 0.0 * j, NUMPY)
-        return x, y, i, j
-    row, i = np.indices((display.panel.height, grid.columns)).astype(np.float64)
-    _, panel_y = display.panel_point(0.0 * row, row + 0.5)
-    # The line from the eye meets the panel at y + (y - eye_y) g / eye_z.
-    scale = display.gap / eye[2]
-    y = (panel_y + eye[1] * scale) / (1 + scale)
-    across = lattice.origin_x + i * lattice.pitch
-    slant = math.radians(lattice.slant)
-    return across / math.cos(slant) + y * math.tan(slant), y, i, 0.0 * i
 
 
 def checked_eye(eye: Eye) -> Eye:

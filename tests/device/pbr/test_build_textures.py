@@ -168,7 +168,7 @@ def test_picture_is_uploaded_once(engine, texels):
     ]
     store = TextureStore()
     make_finishes(materials, [Variant(number) for number in range(len(materials))], store)
-    assert store.bitmap_count == 1
+    assert len(store._bitmaps) + len(store._pooled) == 1
 
 
 @pytest.mark.slow
@@ -237,4 +237,5 @@ def test_even_picture_counts_as_a_number(engine):
     store = TextureStore()
     np.testing.assert_allclose(store.constant(even, (0, 1, 2)), decoded([128] * 3), atol=1e-12)
     np.testing.assert_allclose(store.constant(even, (3,)), [128 / 255], atol=1e-12)  # alpha is linear
-    assert store.bitmap_count == 0
+    assert not store._bitmaps
+    assert not store._pooled

@@ -77,11 +77,6 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-def read_options(kind: type[T], values: Mapping[str, Any]) -> T:
-    """Options of a dataclass from a command's parameters, as they were typed; what it has not stays at its default."""
-    return _make(kind, [(each, its) for each, its in options_of(kind) if each.name in values], values)
-
-
 def _make(kind: type[T], chosen: list[tuple[Field[Any], Option]], values: Mapping[str, Any]) -> T:
     return kind(**{each.name: _value(each, its, values[each.name]) for each, its in chosen})
 

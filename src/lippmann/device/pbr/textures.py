@@ -33,11 +33,6 @@ class TextureStore:
         self._pooled: dict[int, int] = {}  # first texel of each picture in the pool
         self._pool_size = 0
 
-    @property
-    def bitmap_count(self) -> int:
-        """Pictures on the device, those in the pool included."""
-        return len(self._bitmaps) + len(self._pooled)
-
     def color(self, textures: Textures, factors: NDArray[np.float64], uv: UvAttributes) -> Signal:
         """An RGB signal; ``factors`` is ``(members, 3)``."""
         return self._signal(textures, (0, 1, 2), factors, uv)

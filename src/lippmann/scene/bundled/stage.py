@@ -24,7 +24,6 @@ from lippmann.scene.values.whitted_camera import ClassicCamera
 Point = tuple[float, float, float]
 
 PICTURE_HEIGHT = 512 * 0.264583
-DEPTH_RANGE = (-54.4, 10.0)
 
 
 @dataclass(frozen=True)
