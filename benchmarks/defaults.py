@@ -140,8 +140,7 @@ class Reference:
     def judge(self, file: Path) -> dict[str, Any]:
         """PSNR of a picture in dB, what it states of itself, and the reference's own PSNR as the picture shows it."""
         import lippmann
-        from lippmann.color.tone_map import pbr_neutral
-        from lippmann.color.transfer import encode_srgb
+        from lippmann.color.transfer import encode_srgb, pbr_neutral
 
         image = lippmann.read_picture(file)
         options = image.provenance.options

@@ -22,8 +22,7 @@ from PIL import Image, ImageDraw
 import lippmann
 from first_picture_models import models
 from harness import save, saved
-from lippmann.color.tone_map import pbr_neutral
-from lippmann.color.transfer import encode_srgb, quantize
+from lippmann.color.transfer import encode_srgb, pbr_neutral, quantize
 from lippmann.display import Display
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from lippmann.display import Display
-from lippmann.display.formats.typical_sheets import TYPICAL_SHEETS
+from lippmann.display.formats.print_sheet import TYPICAL_SHEETS
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_profile import LensProfile
 from lippmann.display.panel import Panel

@@ -131,7 +131,7 @@ def _level_rays(direct: Any, world_from_display: NDArray[np.float64]) -> Any:
     import drjit as dr
     import mitsuba as mi
 
-    from lippmann.device.drjit_ops import DEVICE as OPS
+    from lippmann.device.kernel_ops import DEVICE as OPS
     from lippmann.display.view_cone import cone_tangent
     from lippmann.rendering.transport.ray_source import world_ray
 

@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING
 from lippmann.display import Display, load_display
 from lippmann.display.sheet_layout import with_bleed
 from lippmann.options.forms import LEFT_OUT
-from lippmann.options.keywords import takes
 from lippmann.options.light import LightOptions
+from lippmann.options.option import takes
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.quality import MachineOptions, QualityOptions, RenderKeywords
 from lippmann.options.scene import SceneOptions

@@ -149,11 +149,11 @@ def test_a_light_field_of_one_packed_byte_is_refused(tmp_path):
 
 def test_a_photograph_larger_than_memory_is_refused_before_it_is_decoded(tmp_path, monkeypatch):
     from lippmann.cli import run
-    from lippmann.runtime import input_memory
+    from lippmann.runtime import machine
 
     for k in range(2):
         Image.new("L", (6000, 6000)).save(tmp_path / f"{k}.png")
-    monkeypatch.setattr(input_memory.machine, "available_memory", lambda: 100 << 20)
+    monkeypatch.setattr(machine, "available_memory", lambda: 100 << 20)
     said = io.StringIO()
     monkeypatch.setattr(sys, "stderr", said)
     names = [str(tmp_path / f"{k}.png") for k in range(2)]

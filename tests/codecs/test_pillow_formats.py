@@ -222,7 +222,7 @@ def test_the_memory_that_is_left_bounds_a_picture_of_16384_pixels_a_side():
     import zlib
 
     from lippmann.errors import MemoryLimitError
-    from lippmann.runtime.input_memory import limit_inputs
+    from lippmann.runtime.machine import limit_inputs
 
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))

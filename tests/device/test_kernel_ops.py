@@ -5,9 +5,13 @@ from __future__ import annotations
 import ctypes
 import mmap
 import sys
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
+
+from lippmann.color.transfer import encode
+from lippmann.device.kernel_ops import arrays_of
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -92,3 +96,54 @@ def test_nothing_is_read_beyond_the_end_of_a_table(number):
     values[:] = np.arange(number)
     np.testing.assert_array_equal(np.array(upload(values)), np.arange(number))
     assert protect(ctypes.c_void_p(start + 2 * page), page, mmap.PROT_READ | mmap.PROT_WRITE) == 0
+
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+
+@dataclass(eq=False)
+class Part:
+    value: object
+    name: str = "a"
+    count: int = 3
+    more: object = None
+
+
+def test_arrays_and_textures_of_all_parts_are_found_once():
+    import mitsuba as mi
+
+    number, color, texels = mi.Float(1), mi.Color3f(1), mi.UInt32([1, 2])
+    texture = mi.load_dict({"type": "checkerboard"})
+    whole = Part((number, Part(color, more=Part(texture))), more=Part(number, more=(texels, None, 1.5)))
+    found = arrays_of(whole)
+    assert [id(each) for each in found] == [id(each) for each in (number, color, texture, texels)]
+
+
+def test_plugins_show_their_arrays_and_hide_their_models():
+    from lippmann.device.pbr.gltf_bsdf import surface_bsdf
+    from lippmann.device.pbr.gltf_bsdf_parameters import SurfaceModel
+    from lippmann.device.pbr.texture_lookup import Signal, numbers
+
+    def signal(value):
+        return Signal(numbers([value]))
+
+    bsdf = surface_bsdf(SurfaceModel(Signal(numbers([(0.5, 0.2, 0.1)])), signal(0.5), signal(1.5)))
+    assert list(vars(bsdf)) == ["arrays"]
+    assert len(bsdf.arrays) == 3
+
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+
+@pytest.mark.parametrize("transfer", ["srgb", "linear"])
+def test_codes_are_those_of_the_host(transfer):
+    import mitsuba as mi
+
+    from lippmann.device.kernel_ops import encode as encode_on_device
+
+    linear = np.concatenate([[-1, 0, 0.0031308, 1, 2], np.geomspace(1e-6, 1, 500)]).astype(np.float32)
+    np.testing.assert_allclose(
+        np.array(encode_on_device(mi.Float(linear), transfer)), encode(linear, transfer), atol=1e-6
+    )
+    color = np.array(encode_on_device(mi.Color3f(mi.Float(linear)), transfer))
+    np.testing.assert_allclose(color[1], encode(linear, transfer), atol=1e-6)

@@ -15,7 +15,7 @@ def device(engine):
     """Double-precision device arrays: their type, and their operations."""
     import mitsuba as mi
 
-    from lippmann.device.drjit_ops import DEVICE
+    from lippmann.device.kernel_ops import DEVICE
 
     return mi.Float64, DEVICE
 

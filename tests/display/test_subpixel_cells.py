@@ -51,7 +51,7 @@ def test_one_kind_is_as_plain_offsets():
 def test_the_same_on_the_device(engine):
     import mitsuba as mi
 
-    from lippmann.device.drjit_ops import DEVICE
+    from lippmann.device.kernel_ops import DEVICE
 
     panel = Panel(30, 20, 0.1, subpixel_cells=CELLS)
     rng = np.random.default_rng(3)

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from lippmann.errors import LippmannError
-from lippmann.runtime.input_memory import limit_inputs
+from lippmann.runtime.machine import limit_inputs
 
 #: CPU seconds and bytes of memory that one input may take. Seconds of the clock would measure the machine's load.
 #: Readers are granted a quarter of the bytes for what files hold, and have to ask first.

@@ -37,7 +37,7 @@ from lippmann.cluster.address import parse_target
 from lippmann.codecs.ktx2 import Ktx2Error, decode_ktx2
 from lippmann.codecs.pfm import read_pfm
 from lippmann.display import Display, LensArray, Panel, load_display
-from lippmann.display.formats.inline_spec import display_of_short_form
+from lippmann.display.formats.load import display_of_short_form
 from lippmann.display.formats.looking_glass import display_of_calibration
 from lippmann.display.formats.monitor_toml import monitor_of_tables
 from lippmann.errors import LippmannError, PictureError, SceneError

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from readable_twins import trace_back
 
-from lippmann.display.formats.typical_sheets import TYPICAL_SHEETS
+from lippmann.display.formats.print_sheet import TYPICAL_SHEETS
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_profile import LensProfile
 from lippmann.optics.directions import _interpolate, true_directions

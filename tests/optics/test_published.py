@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from lippmann.display import Display, load_display
-from lippmann.display.formats.typical_sheets import TYPICAL_SHEETS
+from lippmann.display.formats.print_sheet import TYPICAL_SHEETS
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_profile import LensProfile
 from lippmann.display.panel import Panel

@@ -20,9 +20,9 @@ from lippmann.options.light import LightOptions
 from lippmann.options.option import default_of, kinds_of, options_of
 from lippmann.options.outputs import AccessOptions
 from lippmann.options.placement import PlacementOptions
-from lippmann.options.plain import from_plain, settings_of, to_plain, toml_of
 from lippmann.options.quality import MachineKeywords, MachineOptions, QualityOptions, RenderKeywords
 from lippmann.options.scene import LoadKeywords, SceneOptions
+from lippmann.options.texts import from_plain, settings_of, to_plain, toml_of
 from lippmann.studio_app.command_line import words_of_state
 from lippmann.studio_app.state import StudioState
 from lippmann.studio_app.state_toml import state_of_text, text_of_state
@@ -215,7 +215,7 @@ NEW = """
 import inspect, sys
 import lippmann
 from lippmann.cli import run
-from lippmann.options.plain import settings_of
+from lippmann.options.texts import settings_of
 from lippmann.options.quality import QualityOptions
 from lippmann.studio_app.command_line import words_of_state
 from lippmann.studio_app.state import StudioState

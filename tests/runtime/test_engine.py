@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 
 from lippmann.errors import UsageError
-from lippmann.runtime import engine, gpu, llvm, machine
+from lippmann.runtime import engine, llvm, machine
 
 OLD = [library for library in llvm.installed() if library.version and library.version[0] < llvm.OLDEST]
 GOOD = [library for library in llvm.installed() if not library.problem]
 
 needs_good = pytest.mark.skipif(not GOOD, reason="no LLVM library that would do is installed")
-needs_cpu_only = pytest.mark.skipif(gpu.find() is not None, reason="the GPU would be used")
+needs_cpu_only = pytest.mark.skipif(machine.find_gpu() is not None, reason="the GPU would be used")
 
 NOTHING_FOUND = (
     "from pathlib import Path; from lippmann.runtime import llvm;"
@@ -120,7 +120,7 @@ def test_named_library_is_missing(tmp_path):
 
 @pytest.mark.slow
 def test_named_library_is_missing_and_a_gpu_does_not_excuse_it(tmp_path):
-    before = "from lippmann.runtime import gpu; gpu.find = lambda: 'Test GPU'\n"
+    before = "from lippmann.runtime import machine; machine.find_gpu = lambda: 'Test GPU'\n"
     path = str(tmp_path / "libLLVM.so.19.1")
     assert f"'{path}' not found" in start_fails(before, device="auto", **{llvm.PATH_VARIABLE: path})
 
@@ -239,8 +239,8 @@ def test_old_library_loaded_by_someone_else_before_is_never_put_to_work():
 def test_variant_chosen_by_the_caller_is_kept(monkeypatch):
     code = (
         "import mitsuba as mi; mi.set_variant('llvm_ad_rgb')\n"
-        "from lippmann.runtime import engine, gpu\n"
-        "gpu.obstacle = lambda dr: ''\n"  # as if there were a GPU
+        "from lippmann.runtime import engine, machine\n"
+        "machine.gpu_obstacle = lambda dr: ''\n"  # as if there were a GPU
         "assert engine.start('auto').variant == 'llvm_ad_rgb'\n"
         "assert engine.start('auto').variant == 'llvm_ad_rgb'\n"
     )

@@ -1,5 +1,8 @@
 """Threads and forks: every test runs a program of its own, which a fault would end or hold up for ever."""
 
+from __future__ import annotations
+
+import gc
 import os
 import signal
 import subprocess
@@ -7,10 +10,11 @@ import sys
 import textwrap
 import threading
 import time
+import weakref
 
 import pytest
 
-from lippmann.runtime.engine_lock import exclusive
+from lippmann.runtime.engine_lock import exclusive, no_collection
 
 needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 
@@ -475,3 +479,50 @@ def test_a_thread_that_waits_goes_before_one_that_takes_the_lock_again():
     finally:
         ends.set()
         thread.join()
+
+
+class Ring:
+    """Garbage that only the cyclic collector finds."""
+
+    def __init__(self):
+        self.own = self
+
+
+def drop_a_ring():
+    """A reference to what is lost already."""
+    return weakref.ref(Ring())
+
+
+def make_garbage():
+    for _ in range(20 * gc.get_threshold()[0]):
+        Ring()
+
+
+def test_garbage_stays_within_the_block():
+    gc.collect()
+    with no_collection():
+        lost = drop_a_ring()
+        make_garbage()
+        assert lost() is not None
+    make_garbage()
+    assert lost() is None
+
+
+@pytest.mark.parametrize("was_enabled", [True, False])
+def test_the_collector_is_left_as_it_was(was_enabled):
+    (gc.enable if was_enabled else gc.disable)()
+    try:
+        with pytest.raises(ValueError, match="within"), no_collection():
+            raise ValueError("within")
+        assert gc.isenabled() == was_enabled
+    finally:
+        gc.enable()
+
+
+def test_the_engine_is_used_without_it():
+    with exclusive():
+        assert not gc.isenabled()
+        with exclusive():
+            pass
+        assert not gc.isenabled()
+    assert gc.isenabled()

@@ -8,7 +8,7 @@ import pytest
 
 from lippmann.errors import MemoryLimitError
 from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
-from lippmann.runtime.input_memory import limit_inputs
+from lippmann.runtime.machine import limit_inputs
 
 ECHO = """
 import os

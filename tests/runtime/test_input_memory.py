@@ -3,8 +3,8 @@
 import pytest
 
 from lippmann.errors import MemoryLimitError
-from lippmann.runtime import input_memory
-from lippmann.runtime.input_memory import check_input, input_memory_left, limit_inputs
+from lippmann.runtime import machine as process
+from lippmann.runtime.machine import check_input, input_memory_left, limit_inputs
 
 
 @pytest.fixture(autouse=True)
@@ -17,8 +17,8 @@ def no_limit():
 def machine(monkeypatch):
     """Sets what the machine has free, and what the process has."""
     state = {"free": 10 << 30, "has": 1 << 30}
-    monkeypatch.setattr(input_memory.machine, "available_memory", lambda: state["free"])
-    monkeypatch.setattr(input_memory, "_resident", lambda: state["has"])
+    monkeypatch.setattr(process, "available_memory", lambda: state["free"])
+    monkeypatch.setattr(process, "_resident", lambda: state["has"])
     return state
 
 

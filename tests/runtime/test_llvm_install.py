@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from lippmann.runtime import llvm_install
+from lippmann.runtime.library_file import Host
 from lippmann.runtime.llvm_install import Remedy, Tools, remedy
-from lippmann.runtime.llvm_places import Host
 
 OLDEST, NEWEST = 17, 22
 

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from lippmann.errors import SceneError, UsageError
+from lippmann.scene.cloud_selection import SplatSelection
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.scene import Scene
 from lippmann.scene.splat_clouds import check_splats, cropped, moved, typical_points
-from lippmann.scene.splat_selection import SplatSelection
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import Splats, joined, real_harmonics
 

@@ -9,7 +9,7 @@ import lippmann
 from lippmann.options.placement import PlacementOptions
 from lippmann.scene.matrices import inverse, rotation, transform_points
 from lippmann.scene.turntable import outline, swept_points, turn_about, turning_axis, with_lights_moved
-from lippmann.scene.values.whitted_lighting import Background, ClassicLight
+from lippmann.scene.values.whitted_surfaces import Background, ClassicLight
 from lippmann.scene.whitted.world_frame import world_from_scene
 
 AXES = [(0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)]

@@ -16,9 +16,8 @@ from lippmann.display import Display
 from lippmann.display.sheet import Sheet
 from lippmann.errors import OutputError, PictureError
 from lippmann.image import IntegralImage
-from lippmann.image.encoding import stored_values
+from lippmann.image.encoding import mirrored_in_file, profile_in_file, stored_values
 from lippmann.image.metadata import Metadata, to_text
-from lippmann.image.sheet_codes import mirrored_in_file, profile_in_file
 from lippmann.image.stored_values import FloatArray, Stored, Values
 from lippmann.image.streamed import LargePicture
 from lippmann.image.write import format_for

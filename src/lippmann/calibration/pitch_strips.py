@@ -24,7 +24,7 @@ from lippmann.calibration.patterns import check_step, round_step
 from lippmann.display.formats.print_sheet import Print
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
-from lippmann.runtime.cached_property import cached_property
+from lippmann.runtime.engine_lock import cached_property
 
 #: Largest height of a label in mm; smaller in low strips.
 _LABEL = 6.0

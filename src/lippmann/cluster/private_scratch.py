@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
 from lippmann.errors import ClusterError
-from lippmann.runtime.temporary_names import scratch_folder
+from lippmann.runtime.atomic_write import scratch_folder
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lippmann.cluster.job_pickle import unpack
 from lippmann.errors import ClusterError
 from lippmann.journal.tile_file import encode
-from lippmann.runtime.temporary_names import scratch_folder
+from lippmann.runtime.atomic_write import scratch_folder
 
 if TYPE_CHECKING:
     from lippmann.tiles.tile_render import Prepared

@@ -21,7 +21,7 @@ from lippmann.codecs.picture_notes import aspect_note, pictures_note
 from lippmann.codecs.pillow_formats import BYTES_PER_PIXEL, FORMATS, codes_of, open_picture
 from lippmann.codecs.types import Pixels
 from lippmann.errors import PictureError
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 
 if TYPE_CHECKING:
     from PIL import Image

@@ -21,7 +21,7 @@ from lippmann.codecs.picture_notes import aspect_note, pictures_note
 from lippmann.codecs.types import Pixels
 from lippmann.color.primaries import REC709
 from lippmann.errors import PictureError
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 from lippmann.runtime.quiet_stderr import libraries_silenced
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"

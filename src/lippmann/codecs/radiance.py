@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.primaries import rec709_from_rgb, to_rec709, xyz_from_rgb
 from lippmann.errors import PictureError
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 
 MAGICS = (b"#?RADIANCE", b"#?RGBE")
 

@@ -18,8 +18,8 @@ from lippmann.codecs.picture_notes import aspect_note, pictures_note
 from lippmann.codecs.tiff_colors import UnreadColorsError, check_colors, gray_or_rgb, is_stored_so, stored_type
 from lippmann.codecs.types import Pixels, StoredType
 from lippmann.errors import PictureError
-from lippmann.runtime.cached_property import cached_property
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.engine_lock import cached_property
+from lippmann.runtime.machine import check_input
 
 #: Byte order and version of classic and of big TIFF.
 SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")

@@ -15,7 +15,7 @@ import numpy as np
 from lippmann.codecs.types import Attributes, Pixels, StoredType, ZarrArray, ZarrModule
 from lippmann.codecs.zarr_reader import array_names, node_kind, open_array, read_array
 from lippmann.errors import MemoryLimitError, PictureError
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 
 ENDING = ".zarr"
 

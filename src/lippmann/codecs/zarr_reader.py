@@ -20,7 +20,7 @@ from typing import Any, Literal
 from lippmann.codecs.types import Attributes, ZarrArray, ZarrModule
 from lippmann.codecs.zarr_metadata import ARRAY_2, ATTRIBUTES_2, GROUP_2, NODE_3, ArrayMetadata, admitted
 from lippmann.errors import PictureError
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 
 #: Bytes of a file of metadata; a light field of ours has some thousand.
 _MOST_METADATA = 1 << 22

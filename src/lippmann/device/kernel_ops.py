@@ -1,8 +1,12 @@
-"""Operations whose plain form compiles to slow code on the CPU, or fails at the smallest sizes."""
+"""Small operations on the device: those that ``display/`` is written in, uploads, sRGB codes, an object's arrays.
+
+Some have a plain form that compiles to slow code on the CPU, or fails at the smallest sizes.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import is_dataclass
 from typing import Any
 
 import drjit as dr
@@ -10,7 +14,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.types import Array, Bool, UInt32
+from lippmann.color.transfer import SRGB_EXPONENT, SRGB_OFFSET, SRGB_SLOPE, SRGB_THRESHOLD, Transfer
+from lippmann.device.types import Array, Bool, FloatOrColor, UInt32
 
 #: A multiple of the lanes of any processor's vectors.
 _PACKET = 64
@@ -61,3 +66,76 @@ def smaller(a: Array, b: Array) -> Array:
 def larger(a: Array, b: Array) -> Array:
     """The larger of two numbers; ``b`` where one is NaN. See :func:`smaller`."""
     return dr.select(a > b, a, b)
+
+
+#: Integrators and materials are shallow; what lies deeper belongs to others.
+_DEEPEST = 12
+
+
+def arrays_of(whole: object) -> list[object]:
+    """Dr.Jit arrays and Mitsuba's objects in an object, in its parts and theirs, each once.
+
+    Parts are items of collections, fields of dataclasses and attributes of this project's objects.
+    """
+    found: list[object] = []
+    _collect(whole, found, set(), 0)
+    return found
+
+
+def _collect(value: object, found: list[object], seen: set[int], depth: int) -> None:
+    import drjit as dr
+    import mitsuba as mi
+
+    if id(value) in seen or depth > _DEEPEST:
+        return
+    seen.add(id(value))
+    if isinstance(value, mi.Object) or type(value).__module__.split(".")[0] in ("drjit", "mitsuba"):
+        # Arrays without entries have no variable behind them.
+        if not dr.is_array_v(value) or dr.width(value) > 0:
+            found.append(value)
+    elif isinstance(value, dict):
+        for item in value.values():
+            _collect(item, found, seen, depth + 1)
+    elif isinstance(value, (list, tuple, set, frozenset)):
+        for item in value:
+            _collect(item, found, seen, depth + 1)
+    elif hasattr(value, "__dict__") and (is_dataclass(value) or type(value).__module__.startswith("lippmann.")):
+        _collect(vars(value), found, seen, depth + 1)
+
+
+class DeviceOps:
+    """Array operations on Dr.Jit arrays, by the names of :class:`lippmann.display.array_ops.ArrayOps`."""
+
+    def floor(self, x: Array, /) -> Array:
+        return dr.floor(x)
+
+    def abs(self, x: Array, /) -> Array:
+        return dr.abs(x)
+
+    def sqrt(self, x: Array, /) -> Array:
+        return dr.sqrt(x)
+
+    def minimum(self, a: Array, b: Array, /) -> Array:
+        return dr.minimum(a, b)
+
+    def maximum(self, a: Array, b: Array, /) -> Array:
+        return dr.maximum(a, b)
+
+    def where(self, condition: Bool, a: Array, b: Array, /) -> Array:
+        return dr.select(condition, a, b)
+
+
+DEVICE = DeviceOps()
+
+
+#: Keeps the power, which is computed for every value, from infinite slopes at 0; far below the curve's straight part.
+_LEAST = 1e-9
+
+
+def encode(linear: FloatOrColor, transfer: Transfer) -> FloatOrColor:
+    """Coded values in [0, 1] of linear values, which are clipped to [0, 1]."""
+    value = dr.clip(linear, 0, 1)
+    if transfer == "linear":
+        return value
+    curve = (1 + SRGB_OFFSET) * dr.power(dr.maximum(value, _LEAST), 1 / SRGB_EXPONENT) - SRGB_OFFSET
+    return dr.select(value <= SRGB_THRESHOLD, SRGB_SLOPE * value, curve)

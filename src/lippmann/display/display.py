@@ -22,9 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display.array_ops import NUMPY, Array, ArrayOps
-from lippmann.display.lattice import Lattice
+from lippmann.display.lattice import WHOLE_TOLERANCE, Lattice, LensGrid, lattice_in_front_of
 from lippmann.display.lens_array import LensArray
-from lippmann.display.lens_grid import WHOLE_TOLERANCE, LensGrid, lattice_in_front_of
 from lippmann.display.lens_profile import LensProfile
 from lippmann.display.panel import Panel
 from lippmann.display.pixel_aperture import PixelAperture
@@ -32,7 +31,7 @@ from lippmann.display.sheet import Sheet
 from lippmann.display.validation import Table, check_keys, check_text, number, positive
 from lippmann.errors import DisplayError
 from lippmann.json_values import JsonObject
-from lippmann.runtime.cached_property import cached_property
+from lippmann.runtime.engine_lock import cached_property
 from lippmann.wording import html_table
 
 #: Infinite viewing distances in files.

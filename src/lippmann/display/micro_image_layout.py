@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lippmann.display.array_ops import NUMPY
 from lippmann.display.display import Display
-from lippmann.display.lens_grid import BOUNDARY_TOLERANCE, WHOLE_TOLERANCE
+from lippmann.display.lattice import BOUNDARY_TOLERANCE, WHOLE_TOLERANCE
 
 Indices = NDArray[np.int32]
 

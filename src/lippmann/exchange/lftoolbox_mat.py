@@ -28,8 +28,8 @@ from lippmann.exchange.matlab5 import Matlab5Error, read_variables
 from lippmann.exchange.metadata_text import TEXT_KEY, from_note, to_note
 from lippmann.exchange.optional_import import optional
 from lippmann.runtime.atomic_write import replacing
-from lippmann.runtime.input_memory import check_input
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.machine import check_input
+from lippmann.runtime.private_files import check_kind
 
 LAYOUT = "lftoolbox"
 

@@ -27,7 +27,7 @@ from lippmann.image.metadata import metadata_of
 from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.stored_values import Stored, Values
 from lippmann.image.views import view_grid
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 
 #: Cameras down and across, rows and columns of a view.
 Shape = tuple[int, int, int, int]
@@ -90,12 +90,12 @@ class LightField:
     @property
     def shape(self) -> Shape:
         """Cameras down and across, rows and columns of a view."""
-        return cast(Shape, self.values.shape[:4])
+        return cast("Shape", self.values.shape[:4])
 
     @property
     def stored(self) -> Stored:
         """Type of the values: ``uint8``, ``uint16``, ``float16`` or ``float32``."""
-        return cast(Stored, self.values.dtype.name)
+        return cast("Stored", self.values.dtype.name)
 
     @property
     def transfer(self) -> Transfer:

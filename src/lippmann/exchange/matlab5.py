@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 
 _HEADER = 128
 _MATRIX, _COMPRESSED = 14, 15

@@ -9,14 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Literal, cast
+from typing import Literal, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.codecs import exr, png, tiff, zarr_array
+from lippmann.codecs.icc import srgb_profile
 from lippmann.color.transfer import Transfer, dequantize, quantize
+from lippmann.display import Display
 from lippmann.display.pixel_window import TileGrid
+from lippmann.display.sheet import SRGB
 from lippmann.errors import PictureError
 from lippmann.image.micro_images import row_blocks
 from lippmann.image.stored_values import FloatArray, Layer, Stored, Values
@@ -167,7 +170,7 @@ def encode_values(
     OSError
         If the file cannot be written.
     """
-    values = cast(Values, layers[""])
+    values = cast("Values", layers[""])
     size = values.shape[1], values.shape[0]
     texts = {TEXT_KEY: text} if text else {}
     if name == "png":
@@ -219,3 +222,27 @@ def layers_of_channels(channels: Mapping[str, Layer], path: Path) -> dict[str, L
         if len(parts) >= 2 and len({part.dtype for part in parts}) == 1:
             layers[layer] = np.stack(parts, axis=-1)
     return layers
+
+
+Number = TypeVar("Number", bound=np.generic)
+
+
+def is_mirrored(display: Display | None) -> bool:
+    """Whether files of a display's pictures hold them mirrored."""
+    return display is not None and display.sheet is not None and display.sheet.mirrored
+
+
+def mirrored_in_file(rows: NDArray[Number], display: Display | None) -> NDArray[Number]:
+    """``(H, W, ...)`` whole rows in memory as a file holds them; and those of a file as memory does."""
+    return rows[:, ::-1] if is_mirrored(display) else rows
+
+
+def profile_in_file(display: Display | None, stored: Stored, transfer: Transfer, icc: bytes = b"") -> bytes:
+    """The ICC profile that a picture's file is given: ``icc``, else sRGB's if the sheet of a print says so.
+
+    Empty for panels, whose players read pixels alone, and for values that are no display codes.
+    """
+    sheet = None if display is None else display.sheet
+    if sheet is None or transfer != "srgb" or stored not in ("uint8", "uint16"):
+        return b""
+    return icc or (srgb_profile() if sheet.profile == SRGB else b"")

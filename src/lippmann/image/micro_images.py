@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display, covers_whole_pixels, micro_image_shape, pixel_indices_under_lens, pixel_lenses
 from lippmann.errors import PictureError
-from lippmann.runtime.cached_property import cached_property
+from lippmann.runtime.engine_lock import cached_property
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 

@@ -38,7 +38,7 @@ from lippmann.image.views import (
 from lippmann.image.write import stored_as
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.atomic_write import replacing_folder
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.private_files import check_kind
 
 MANIFEST = "lippmann.json"
 
@@ -236,7 +236,7 @@ def _write_parts(
         for (row, column), layers, report in parts:
             file = _part_name(kind, name, shape, (row, column))
             files[row][column] = file
-            values = converted_values(cast(Values, layers[""]), stored, transfer)
+            values = converted_values(cast("Values", layers[""]), stored, transfer)
             encode_values(temporary / file, name, {**layers, "": values}, transfer=transfer)
             progress(report)
         manifest = {
@@ -352,7 +352,7 @@ def _read_manifest(folder: Path) -> _Manifest:
     if not isinstance(files, list) or not all(isinstance(row, list) and all(map(_is_name, row)) for row in files):
         rule = "it must be rows of names of files in this folder"
         raise PictureError("'files' makes no sense", where=str(path), rule=rule)
-    return _Manifest(metadata, cast(Kind, kind), cast(Stored, stored), files)
+    return _Manifest(metadata, cast("Kind", kind), cast("Stored", stored), files)
 
 
 def _is_name(value: object) -> bool:

@@ -18,15 +18,14 @@ from lippmann.codecs.claims import check_claim
 from lippmann.codecs.icc import convert_codes
 from lippmann.display import Display, load_display
 from lippmann.errors import PictureError
-from lippmann.image.encoding import STORED, TEXT_KEY, FormatName, layers_of_channels, linear_values
+from lippmann.image.encoding import STORED, TEXT_KEY, FormatName, layers_of_channels, linear_values, mirrored_in_file
 from lippmann.image.integral_image import IntegralImage
 from lippmann.image.metadata import Metadata, from_text, is_quilt_text
 from lippmann.image.provenance import Provenance
-from lippmann.image.sheet_codes import mirrored_in_file
 from lippmann.image.stored_values import Layer, Stored, Values
-from lippmann.runtime.cached_property import cached_property
-from lippmann.runtime.input_memory import check_input
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.engine_lock import cached_property
+from lippmann.runtime.machine import check_input
+from lippmann.runtime.private_files import check_kind
 
 #: Largest number of pixels decoded at once; a file that claims more is damaged, or meant to fill the memory.
 MOST_PIXELS = 1 << 29
@@ -140,7 +139,7 @@ class PictureFile:
         if stored not in known:
             rule = f"{self.format} is read with {', '.join(known)}"
             raise PictureError(f"holds values of the type {stored}", where=str(self.path), rule=rule)
-        return cast(Stored, stored)
+        return cast("Stored", stored)
 
     def picture(self, display: Display | str | PathLike[str] | None = None) -> IntegralImage:
         """The whole picture in memory; ``display`` and errors as in :func:`read_picture`."""
@@ -258,7 +257,7 @@ def _opened(path: Path, file: BufferedReader, start: bytes) -> PictureFile:
 
         def linear() -> dict[str, Layer]:
             layers = layers_of_channels(exr.read_exr(path, parts), path)
-            colors = cast(Values, layers[""])
+            colors = cast("Values", layers[""])
             if colors.shape[2] >= 3:
                 layers[""] = np.concatenate(
                     [parts.rec709(colors[..., :3]), colors[..., 3:]], axis=2, dtype=colors.dtype
@@ -324,4 +323,4 @@ def opaque_colors(values: Layer, path: Path, icc: bytes = b"") -> Values:
             values = convert_codes(values, icc)
         except PictureError as error:
             raise PictureError(error.what, where=str(path), fix=error.fix) from None
-    return cast(Values, np.repeat(values, 3, axis=2) if values.shape[2] == 1 else values)
+    return cast("Values", np.repeat(values, 3, axis=2) if values.shape[2] == 1 else values)

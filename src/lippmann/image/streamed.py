@@ -12,12 +12,11 @@ import numpy as np
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import PictureError
-from lippmann.image.encoding import linear_values
+from lippmann.image.encoding import is_mirrored, linear_values, mirrored_in_file
 from lippmann.image.integral_image import IntegralImage
 from lippmann.image.picture import Picture
 from lippmann.image.provenance import Provenance
 from lippmann.image.read import PictureFile, opaque_colors, open_file
-from lippmann.image.sheet_codes import is_mirrored, mirrored_in_file
 from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, Values
 
 #: Pictures of more pixels are decoded piece by piece: as float32 they would take 400 MB and more.

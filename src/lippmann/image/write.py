@@ -22,11 +22,12 @@ from lippmann.image.encoding import (
     encode_tiles,
     encode_values,
     is_tiled,
+    mirrored_in_file,
+    profile_in_file,
     tiles_of_rows,
 )
 from lippmann.image.metadata import Metadata, metadata_of, to_text
 from lippmann.image.picture import Picture
-from lippmann.image.sheet_codes import mirrored_in_file, profile_in_file
 from lippmann.image.stored_values import FloatArray, Layer, Stored, Values
 from lippmann.runtime.atomic_write import check_folder_writable, check_writable, replacing, replacing_folder
 
@@ -85,7 +86,7 @@ def write_picture(picture: Picture, path: Path, *, bits: int | None = None, icc:
     bits:
         Bits per channel, see :func:`format_for`; by default as in the file that the picture came from.
     icc:
-        ICC profile of a print's codes, see :func:`~lippmann.image.sheet_codes.profile_in_file`.
+        ICC profile of a print's codes, see :func:`~lippmann.image.encoding.profile_in_file`.
 
     Raises
     ------

@@ -28,9 +28,8 @@ from lippmann.journal.fingerprint import differences
 from lippmann.journal.journal_folder import JOB, LOCK, TILE, clear, foreign_names, holds_tiles, is_tile, no_tile, sweep
 from lippmann.journal.tile_file import MARK, DamagedTile, TileResult, decode, encode, whole_length
 from lippmann.runtime import private_files
-from lippmann.runtime.atomic_write import replacing
+from lippmann.runtime.atomic_write import pattern_of, replacing
 from lippmann.runtime.private_files import ForeignFileError
-from lippmann.runtime.temporary_names import pattern_of
 
 #: Added to the picture's name.
 ENDING = ".parts"

@@ -21,7 +21,7 @@ from lippmann.metrics.silhouettes import SilhouetteShare, depth_of, source_of
 from lippmann.metrics.structural_similarity import ViewSimilarity
 from lippmann.metrics.view_metrics import ViewSums
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.runtime.cached_property import cached_property
+from lippmann.runtime.engine_lock import cached_property
 
 Real = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from lippmann.display.display import INFINITE, Display
 from lippmann.display.pixel_aperture import PixelAperture
-from lippmann.display.units import INCH
+from lippmann.display.validation import INCH
 from lippmann.display.view_cone import cone_tangent, size_seen
 from lippmann.json_values import JsonObject, JsonValue
 from lippmann.optics.crosstalk import ANNOYING, VISIBLE, crosstalk, independent_directions, most_strips

@@ -1,14 +1,16 @@
 """An option: a field of a frozen dataclass that knows its meaning, its range, and how the command line shows it.
 
 A field of a subclass of :class:`Options` that is made by :func:`option` becomes an option of the commands that take its
-class (:mod:`lippmann.cli.shared.command_options`), a keyword of the calls that do (:mod:`lippmann.options.keywords`),
+class (:mod:`lippmann.cli.shared.command_options`), a keyword of the calls that do (:func:`takes`),
 and a setting of the studio and its files. It has the same name everywhere, with ``-`` for ``_`` on the command line.
 
 Annotations of such classes are types, not texts: their modules do without ``from __future__ import annotations``.
 """
 
+import inspect
 import math
 import re
+import textwrap
 import types
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
@@ -177,3 +179,37 @@ def kinds_of(kind: Any) -> tuple[Any, ...]:
 def flag_of(name: str) -> str:
     """The option of the command line."""
     return f"--{name.replace('_', '-')}"
+
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def takes(*kinds: type[Options], without: tuple[str, ...] = (), **defaults: Any) -> Callable[[F], F]:
+    """Say in a function's signature and docstring which options its ``**options`` are: those of the dataclasses.
+
+    ``defaults`` are those that the function has in place of theirs.
+    """
+
+    def decorate(function: F) -> F:
+        chosen = [(each, its) for kind in kinds for each, its in options_of(kind) if each.name not in without]
+        signature = inspect.signature(function)
+        own = [each for each in signature.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
+        keywords = [
+            inspect.Parameter(
+                each.name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=defaults.get(each.name, default_of(each)),
+                annotation=each.type,
+            )
+            for each, _ in chosen
+        ]
+        function.__signature__ = signature.replace(parameters=[*own, *keywords])  # type: ignore[attr-defined]
+        entries = "".join(
+            f"{each.name}:\n{textwrap.fill(its.help_in_python, 112, initial_indent='    ', subsequent_indent='    ')}\n"
+            for each, its in chosen
+        )
+        before, _, after = inspect.cleandoc(function.__doc__ or "").partition("**options:\n")
+        function.__doc__ = f"{before}{entries}{after.partition(chr(10))[2]}"
+        return function
+
+    return decorate

@@ -27,7 +27,7 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import MOST_SIDE, Quilt, QuiltLayout, check_size, layout_of_name, names_layout
 from lippmann.quilts.quilt_metadata import metadata_of_text, quilt_text
 from lippmann.runtime.atomic_write import replacing_folder
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.private_files import check_kind
 
 #: Endings of the picture files that are read; JPEG is not written.
 _JPEG = (".jpg", ".jpeg")
@@ -75,7 +75,7 @@ def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
             layout = layout._replace(aspect=metadata.layout.aspect)
         check_size(*file.size, layout, str(path))
         values = file.read()
-    stored = cast(Stored, values.dtype.name)
+    stored = cast("Stored", values.dtype.name)
     if metadata is None:
         return Quilt(values, layout, stored, notes=file.notes)
     return Quilt(values, layout, stored, metadata.provenance, metadata.display, file.notes)

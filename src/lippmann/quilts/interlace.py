@@ -22,9 +22,8 @@ from lippmann.codecs.tiff_strips import write_tiff_bands
 from lippmann.codecs.types import Pixels
 from lippmann.display import Display
 from lippmann.errors import OutputError, PictureError, UsageError
-from lippmann.image.encoding import FORMATS, TEXT_KEY, converted_values
+from lippmann.image.encoding import FORMATS, TEXT_KEY, converted_values, mirrored_in_file, profile_in_file
 from lippmann.image.metadata import Metadata, to_text
-from lippmann.image.sheet_codes import mirrored_in_file, profile_in_file
 from lippmann.image.stored_values import FloatArray
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.photos import Photos

@@ -24,8 +24,7 @@ from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.picture import traced_window
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.preconditions import why_no_estimate
-from lippmann.rendering.request.render_plan import shown_value
-from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.request.render_request import RenderRequest, shown_value
 from lippmann.rendering.session import Session, open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.placement import Placement

@@ -21,8 +21,8 @@ from lippmann.image.provenance import Provenance
 from lippmann.options.choices import POOLED_LIGHT, REUSING
 from lippmann.options.option import Options
 from lippmann.options.placement import PlacementOptions
-from lippmann.options.plain import settings_of
 from lippmann.options.quality import QualityOptions
+from lippmann.options.texts import settings_of
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.estimate.psnr import Estimate
@@ -30,8 +30,7 @@ from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.light_statements import light_notes, stated_error
 from lippmann.rendering.request.plan import follow
 from lippmann.rendering.request.region_of_interest import even_background
-from lippmann.rendering.request.render_plan import Choice
-from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.request.render_request import Choice, RenderRequest
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
 from lippmann.scene.camera_placement import CameraView, VisibleDepth

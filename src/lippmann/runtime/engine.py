@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, Literal, cast
 
 from lippmann.errors import EngineError, UsageError
-from lippmann.runtime import gpu, llvm, machine
+from lippmann.runtime import llvm, machine
 from lippmann.runtime.child_python import python_command
 from lippmann.runtime.engine_lock import exclusive
 
@@ -121,7 +121,7 @@ def _point_to_llvm(device: DeviceChoice) -> llvm.Library | None:
         library = llvm.choose()
     except EngineError as error:
         forced_wrong = error.where == llvm.PATH_VARIABLE
-        if device == "gpu" or (device == "auto" and not forced_wrong and gpu.find()):
+        if device == "gpu" or (device == "auto" and not forced_wrong and machine.find_gpu()):
             return None  # Dr.Jit may find another library, but compiles nothing with it on the GPU
         raise
     os.environ[llvm.PATH_VARIABLE] = str(library.path)
@@ -191,7 +191,7 @@ def _resolve(device: DeviceChoice, dr: Any, mi: Any) -> Literal["cpu", "gpu"]:
         return VARIANTS[current]
     if device == "cpu":
         return "cpu"
-    obstacle = gpu.obstacle(dr)
+    obstacle = machine.gpu_obstacle(dr)
     if device == "gpu" and obstacle:
         raise EngineError(obstacle, where="device 'gpu'", fix="render on the CPU: device 'cpu'")
     return "cpu" if obstacle else "gpu"
@@ -226,7 +226,7 @@ def _load_error(path: Path) -> str:
 
 
 def _on_gpu() -> Engine:
-    return Engine("cuda_ad_rgb", "gpu", 1, gpu_name=gpu.find())
+    return Engine("cuda_ad_rgb", "gpu", 1, gpu_name=machine.find_gpu())
 
 
 @dataclass(frozen=True)

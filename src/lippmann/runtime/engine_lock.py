@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import atexit
 import ctypes
+import gc
 import os
 import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from lippmann.errors import EngineError
-from lippmann.runtime.collector import no_collection
 
 #: Libraries that start threads of their own.
 _THREADED = ("drjit", "pyoidn")
@@ -120,3 +120,43 @@ if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
     #: GNU C library only: registers a function that receives the exit code and runs before earlier destructors.
     _ON_EXIT: Any = getattr(_LIBC, "on_exit", None)
     os.register_at_fork(after_in_child=_after_fork)
+
+
+@contextmanager
+def no_collection() -> Iterator[None]:
+    """Free nothing that only the cyclic collector finds, such as an earlier scene, within the block.
+
+    The collector runs at any moment. Where it frees an emitter or a surface between two calls that one kernel makes to
+    all of them, Dr.Jit 1.5 writes the code of those that are left down twice (its key of a function tells single ones
+    from one of many) and aborts the process; a frozen kernel cannot record that either.
+    """
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+if TYPE_CHECKING or sys.version_info >= (3, 12):
+    from functools import cached_property as cached_property
+else:
+
+    class cached_property:  # noqa: N801 - stands in for that of functools
+        """``functools.cached_property`` without the lock that it has before Python 3.12.
+
+        All objects share that lock: a thread that holds it while it waits for another lock, or a fork while a thread
+        holds it, deadlocks every access. Here two threads may both compute the value; both get the one stored first.
+        """
+
+        def __init__(self, compute):
+            self.compute = compute
+            self.__doc__ = compute.__doc__
+
+        def __set_name__(self, owner, name):
+            self.name = name
+
+        def __get__(self, instance, owner=None):
+            # For an object this is called only until the value is in its dictionary.
+            return self if instance is None else vars(instance).setdefault(self.name, self.compute(instance))

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from lippmann.runtime.child_python import python_command
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 
 _LENGTH = struct.Struct("<Q")
 #: Seconds without a request after which the process ends, and its memory is free.

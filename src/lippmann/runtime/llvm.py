@@ -18,9 +18,8 @@ from pathlib import Path
 
 from lippmann.errors import EngineError
 from lippmann.runtime.child_python import python_command
-from lippmann.runtime.library_file import name_of
+from lippmann.runtime.library_file import VERSION_IN_NAME, Host, name_of
 from lippmann.runtime.llvm_install import remedy
-from lippmann.runtime.llvm_places import VERSION_IN_NAME, Host
 
 #: Environment variable with the path of Dr.Jit's library; users may set it to force one.
 PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lippmann.runtime.llvm_places import Host
+from lippmann.runtime.library_file import Host
 
 #: LLVM version that is asked for by number.
 VERSION = 19

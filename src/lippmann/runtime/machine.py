@@ -1,9 +1,18 @@
-"""Cores and memory that this process may use."""
+"""What this process may use: cores, memory, what input files may take of it, and an NVIDIA GPU."""
 
 from __future__ import annotations
 
+import ctypes
 import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
+
+from lippmann.errors import MemoryLimitError
 
 _CONTROL_GROUP = Path("/sys/fs/cgroup")
 
@@ -60,3 +69,144 @@ def _used() -> int:
             continue
         return max(0, used - int(fields.get(key, 0)))
     return 0
+
+
+_WINDOWS = sys.platform == "win32"
+_DRIVER, _OPTIX = ("nvcuda.dll", "nvoptix.dll") if _WINDOWS else ("libcuda.so.1", "libnvoptix.so.1")
+
+
+def find_gpu() -> str | None:
+    """Name of the first GPU; None without a GPU or its driver."""
+    try:
+        driver = ctypes.CDLL(os.environ.get("DRJIT_LIBCUDA_PATH") or _DRIVER)
+        count = ctypes.c_int(0)
+        if driver.cuInit(0) != 0 or driver.cuDeviceGetCount(ctypes.byref(count)) != 0 or count.value < 1:
+            return None
+        name = ctypes.create_string_buffer(256)
+        if driver.cuDeviceGetName(name, len(name), 0) != 0:
+            return None
+    except (OSError, AttributeError):
+        return None
+    return name.value.decode(errors="replace")
+
+
+def gpu_obstacle(dr: ModuleType) -> str:
+    """Reason why Mitsuba cannot use the GPU; empty if it can.
+
+    It needs a CUDA driver and OptiX, which containers often lack. ``dr`` is the module ``drjit``.
+    """
+    if not dr.has_backend(dr.JitBackend.CUDA):
+        return "no NVIDIA GPU with a driver of version 535 or newer was found"
+    if tuple(dr.detail.cuda_version())[:2] == (12, 7):
+        return "NVIDIA drivers of versions 560 to 569 miscompile kernels; install 570 or newer"
+    optix = os.environ.get("DRJIT_LIBOPTIX_PATH") or _optix_path()
+    try:
+        ctypes.CDLL(optix).optixQueryFunctionTable  # noqa: B018 - the look-up raises if the function is missing
+    except (OSError, AttributeError):
+        return f"the GPU's driver cannot trace rays: '{optix}' (OptiX) cannot be loaded"
+    return ""
+
+
+def _optix_path() -> str:
+    """OptiX of the driver: by name, or on Windows in the driver's own folder, which no search path holds."""
+    if not _WINDOWS:
+        return _OPTIX
+    drivers = Path(os.environ.get("SYSTEMROOT", r"C:\Windows"), "System32", "DriverStore", "FileRepository")
+    return next((str(path) for path in sorted(drivers.glob(f"nv*/{_OPTIX}"))), _OPTIX)
+
+
+#: Bytes that are granted without a look at the machine, until as many were granted so.
+_UNSEEN = 16 << 20
+
+
+@dataclass
+class _Limit:
+    """``most`` bytes, of which ``granted`` were asked for in all, since the process had ``start``.
+
+    What was granted may be free again, and what the process took besides may be libraries: the lesser of the two
+    counts. ``unseen`` bytes were granted without a look.
+    """
+
+    most: int | None = None
+    start: int = 0
+    granted: int = 0
+    unseen: int = 0
+
+    @property
+    def taken(self) -> int:
+        """Bytes that are certainly taken for what files hold."""
+        return min(self.granted, max(0, _resident() - self.start))
+
+
+_input_limit: ContextVar[_Limit] = ContextVar("input memory")
+
+
+@contextmanager
+def limit_inputs(most: int | None) -> Iterator[None]:
+    """Let what is read from files meanwhile take ``most`` bytes in all; None for all that is free."""
+    before = _input_limit.set(_Limit(most, _resident() if most is not None else 0))
+    try:
+        yield
+    finally:
+        _input_limit.reset(before)
+
+
+def check_input(size: int, what: str, *, where: str) -> None:
+    """Ask for ``size`` bytes for something that a file holds.
+
+    Parameters
+    ----------
+    what:
+        What takes them, such as "texture 'wood.png'".
+    where:
+        The file.
+
+    Raises
+    ------
+    MemoryLimitError
+        There are not as many: neither free on the machine nor left of the limit of :func:`limit_inputs`.
+    """
+    limit = _current()
+    limit.unseen += size
+    if limit.unseen < _UNSEEN:
+        limit.granted += size
+        return
+    limit.unseen = 0
+    free, fix = _left(limit)
+    limit.granted += size
+    if size > free:
+        took = f"{what} takes {_amount(size)} of memory"
+        raise MemoryLimitError(took, where=where, rule=f"{_amount(free)} are left", fix=fix)
+
+
+def input_memory_left() -> int:
+    """Bytes that may still be taken for what files hold."""
+    return _left(_current())[0]
+
+
+def _current() -> _Limit:
+    limit = _input_limit.get(None)
+    if limit is None:
+        limit = _Limit()
+        _input_limit.set(limit)
+    return limit
+
+
+def _left(limit: _Limit) -> tuple[int, str]:
+    """Bytes, and what gives more."""
+    free = available_memory()
+    if limit.most is not None:
+        left = max(0, limit.most - limit.taken)
+        if left < free:
+            return left, "allow more with memory=..."
+    return free, "close other programs, or use a machine with more memory"
+
+
+def _resident() -> int:
+    import psutil
+
+    return int(psutil.Process().memory_info().rss)
+
+
+def _amount(size: int) -> str:
+    return f"{size / 2**30:.1f} GiB" if size >= 1 << 30 else f"{max(1, round(size / 2**20))} MiB"

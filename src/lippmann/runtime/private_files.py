@@ -1,4 +1,6 @@
-"""Private files: files and folders that the program names itself, opened without following links and only if own.
+"""Files that are opened with care: inputs must be plain files, private ones the program's own.
+
+Private files are files and folders that the program names itself, opened without following links and only if own.
 
 The user names an output, so that a link there is followed. The program chooses the names of journals and temporary
 files. In a folder that others may write to, such as ``/tmp``, another user may have created a link or a file under such
@@ -19,6 +21,8 @@ import stat
 from contextlib import suppress
 from pathlib import Path
 from typing import IO
+
+from lippmann.errors import LippmannError
 
 #: Permissions of private folders and files.
 FOLDER_MODE, FILE_MODE = 0o700, 0o600
@@ -205,3 +209,31 @@ def _status_of_new_file(folder: Path) -> os.stat_result | None:
             with suppress(OSError):
                 path.unlink()
     return _probes[folder]
+
+
+_KINDS = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
+)
+
+
+def other_kind(path: str | os.PathLike[str]) -> str | None:
+    """What ``path`` is, wherever links lead, in place of a plain file; None for such a file, or for nothing at all.
+
+    It is not opened: that alone would wait for whoever writes into a pipe.
+    """
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):  # whoever opens it tells why
+        return None
+    return next((name for is_kind, name in _KINDS if is_kind(mode)), None)
+
+
+def check_kind(path: Path, error: type[LippmannError]) -> None:
+    """Raise ``error`` if ``path`` is a pipe, a device or a socket; of folders and missing files others tell."""
+    kind = other_kind(path)
+    if kind is not None and kind != "a folder":
+        raise error(f"is {kind}, no file", where=str(path), fix="save it as a file first")

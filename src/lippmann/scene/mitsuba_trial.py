@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from lippmann.errors import SceneError
 from lippmann.runtime.child_python import python_command
-from lippmann.runtime.input_memory import input_memory_left
+from lippmann.runtime.machine import input_memory_left
 from lippmann.scene.mitsuba_trial_child import LENGTH
 
 _CODE = "from lippmann.scene.mitsuba_trial_child import main; main()"

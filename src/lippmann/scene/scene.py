@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
 from lippmann.options.light import LightOptions
-from lippmann.runtime.cached_property import cached_property
+from lippmann.runtime.engine_lock import cached_property
 from lippmann.scene.extreme_points import extreme_points_of, used_positions
 from lippmann.scene.light_options import change_environment, change_source
 from lippmann.scene.mitsuba_source import MitsubaSource
@@ -59,7 +59,7 @@ class Scene:
     ``studio`` says whether the built-in studio may light a scene that has no lights. ``light`` changes the direction
     and the strength of its light: :attr:`environment` and :attr:`lights` are those after that change.
     ``has_chosen_background`` says that the background is of a colour that the caller asked for; ``settings`` are the
-    options that it was read with, a line each (:func:`lippmann.options.plain.settings_of`).
+    options that it was read with, a line each (:func:`lippmann.options.texts.settings_of`).
 
     A scene from Mitsuba knows its ``bounds``, ``cameras``, ``lights`` and hence ``environment``, ``background`` and
     ``notes`` only once the engine has started: asked before, they start it.

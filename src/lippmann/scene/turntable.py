@@ -20,8 +20,8 @@ from lippmann.scene.placement import face_viewer
 from lippmann.scene.scene import Scene
 from lippmann.scene.splat_clouds import moved
 from lippmann.scene.values.description import Matrix, SceneDescription
-from lippmann.scene.values.whitted_lighting import Background, ClassicLight
 from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.values.whitted_surfaces import Background, ClassicLight
 from lippmann.scene.volumes.grid import moved as moved_volume
 from lippmann.scene.whitted.world_frame import world_from_scene
 

@@ -21,8 +21,7 @@ from lippmann.scene.placement import Placement
 from lippmann.scene.readers.load import STAGES, kind_of_file, read_scene
 from lippmann.scene.scene import Scene, check_description, find_camera, override_light
 from lippmann.scene.values.description import Camera, Matrix, SceneDescription
-from lippmann.scene.values.whitted_camera import CameraPose
-from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.values.whitted_scene import CameraPose, ClassicScene
 from lippmann.scene.whitted.world_frame import world_camera
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from lippmann.errors import LippmannError, OutputError
 from lippmann.journal.file_lock import locked
 from lippmann.journal.frame_journal import ENDING as FRAMES_ENDING
 from lippmann.journal.tile_journal import journal_of, read_job
+from lippmann.runtime.atomic_write import disk_name
 from lippmann.runtime.private_files import ForeignFileError
-from lippmann.runtime.temporary_names import disk_name
 
 #: Bytes of a name without its number and ending: endings of journals and temporary files are added to it.
 _MOST_STEM = 150

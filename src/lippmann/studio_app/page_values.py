@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from lippmann.display import Display
-from lippmann.display.formats.inline_spec import size_of_short_form
+from lippmann.display.formats.load import size_of_short_form
 from lippmann.errors import UsageError
 from lippmann.options.option import options_of
-from lippmann.options.plain import from_plain, to_plain
+from lippmann.options.texts import from_plain, to_plain
 from lippmann.printable import one_line
 from lippmann.scene.placement import Placement
 from lippmann.studio_app.state import StudioState

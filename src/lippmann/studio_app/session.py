@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lippmann.display import Display, list_displays
-from lippmann.display.formats.inline_spec import is_short_form
+from lippmann.display.formats.load import is_short_form
 from lippmann.errors import LippmannError, UsageError
 from lippmann.options.scene import SceneOptions
 from lippmann.scene import bundled

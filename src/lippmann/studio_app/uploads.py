@@ -19,8 +19,7 @@ from starlette.requests import ClientDisconnect, Request
 
 from lippmann.errors import SceneError
 from lippmann.runtime import private_files
-from lippmann.runtime.atomic_write import reason_and_fix
-from lippmann.runtime.temporary_names import disk_name, sweep, temporary_folder
+from lippmann.runtime.atomic_write import disk_name, reason_and_fix, sweep, temporary_folder
 from lippmann.scene.readers.load import unknown_kind
 from lippmann.studio_app.dropped_scene import ENVIRONMENTS, main_file
 from lippmann.viewer.responses import RefusedError

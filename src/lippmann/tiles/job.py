@@ -24,7 +24,7 @@ from lippmann.rendering.film import memory_model
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import memory_limit
-from lippmann.runtime.cached_property import cached_property
+from lippmann.runtime.engine_lock import cached_property
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.mitsuba_xml import MitsubaXml
 from lippmann.scene.scene import Scene

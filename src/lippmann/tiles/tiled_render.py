@@ -18,10 +18,17 @@ from lippmann.display import Display
 from lippmann.display.pixel_window import TileGrid
 from lippmann.errors import EngineError
 from lippmann.image import IntegralImage
-from lippmann.image.encoding import FormatName, encode_tiles, encode_values, is_tiled, linear_values
+from lippmann.image.encoding import (
+    FormatName,
+    encode_tiles,
+    encode_values,
+    is_mirrored,
+    is_tiled,
+    linear_values,
+    profile_in_file,
+)
 from lippmann.image.metadata import Metadata, to_text
 from lippmann.image.provenance import Provenance
-from lippmann.image.sheet_codes import is_mirrored, profile_in_file
 from lippmann.image.stored_values import FloatArray, Layer, Values
 from lippmann.image.write import can_be_banded, check_output, format_for, replacing_output, write_rows
 from lippmann.journal.tile_file import DamagedTile, TileResult
@@ -309,7 +316,7 @@ def _write_print(
         write_rows(rows, Metadata(printed, world_from_display, provenance), output, bits=bits, icc=finish.icc)
         return
     layers = _whole(job, store)
-    pixels = linear_values(cast(Values, layers.pop("")), job.transfer)
+    pixels = linear_values(cast("Values", layers.pop("")), job.transfer)
     image = IntegralImage(pixels, job.display, world_from_display, provenance, cast("dict[str, Layer]", layers))
     finish.image(image).save(output, bits=bits, icc=finish.icc)
 

@@ -7,10 +7,8 @@ import pytest
 
 from lippmann.device.whitted.bvh import GRID, LEAF, make_bvh
 from lippmann.device.whitted.shape_table import MOST_LISTED_SHAPES, Column, Kind, make_shape_table
-from lippmann.scene.values.whitted_camera import ClassicCamera
-from lippmann.scene.values.whitted_lighting import ClassicLight
-from lippmann.scene.values.whitted_scene import ClassicScene
-from lippmann.scene.values.whitted_surfaces import ClassicMaterial
+from lippmann.scene.values.whitted_scene import ClassicCamera, ClassicScene
+from lippmann.scene.values.whitted_surfaces import ClassicLight, ClassicMaterial
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
 
 pytestmark = pytest.mark.usefixtures("engine")

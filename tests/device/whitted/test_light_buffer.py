@@ -7,9 +7,8 @@ import pytest
 
 from lippmann.device.whitted.light_buffer import MOST_GRIDS, make_light_buffer
 from lippmann.device.whitted.shape_table import make_shape_table
-from lippmann.scene.values.whitted_lighting import ClassicLight
 from lippmann.scene.values.whitted_scene import ClassicScene
-from lippmann.scene.values.whitted_surfaces import ClassicMaterial
+from lippmann.scene.values.whitted_surfaces import ClassicLight, ClassicMaterial
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
 
 pytestmark = pytest.mark.usefixtures("engine")

@@ -369,8 +369,7 @@ def test_sub_pixels_have_guides_of_their_own():
 @pytest.mark.parametrize("handedness", ["left", "right"])
 def test_classic_scenes_have_the_same_layers(handedness):
     from lippmann.device.whitted.scene import build_classic
-    from lippmann.scene.values.whitted_lighting import ClassicLight
-    from lippmann.scene.values.whitted_surfaces import ClassicMaterial
+    from lippmann.scene.values.whitted_surfaces import ClassicLight, ClassicMaterial
     from lippmann.scene.whitted.builder import ClassicSceneBuilder
 
     turned = np.array([1.0, 1.0, -1.0 if handedness == "left" else 1.0])

@@ -9,8 +9,7 @@ from lippmann.display import load_display
 from lippmann.options.choices import ASKED
 from lippmann.rendering.denoise.cost_model import HIGH_FROM, denoising_cost, effort_of, traced_work
 from lippmann.rendering.request.plan import resolve
-from lippmann.rendering.request.render_plan import Choice
-from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.request.render_request import Choice, RenderRequest
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 

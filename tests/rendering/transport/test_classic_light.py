@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lippmann.scene.values.whitted_lighting import AmbientOcclusion, Background, ClassicLight, Fog, Shading
-from lippmann.scene.values.whitted_surfaces import ClassicMaterial
+from lippmann.scene.values.whitted_surfaces import (
+    AmbientOcclusion,
+    Background,
+    ClassicLight,
+    ClassicMaterial,
+    Fog,
+    Shading,
+)
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
 
 pytestmark = pytest.mark.usefixtures("engine")

@@ -9,7 +9,7 @@ from PIL import Image as Pillow
 
 from lippmann.codecs.icc import rgb_profile
 from lippmann.errors import MemoryLimitError, SceneError
-from lippmann.runtime import input_memory
+from lippmann.runtime import machine
 from lippmann.scene.readers.heif_photo import read_heif_photo
 from lippmann.scene.readers.load import load_scene
 
@@ -91,8 +91,8 @@ def test_damaged_files_are_one_line():
 
 
 def test_it_counts_against_the_memory(monkeypatch):
-    monkeypatch.setattr(input_memory, "_UNSEEN", 0)
-    monkeypatch.setattr(input_memory.machine, "available_memory", lambda: 1000)
+    monkeypatch.setattr(machine, "_UNSEEN", 0)
+    monkeypatch.setattr(machine, "available_memory", lambda: 1000)
     with pytest.raises(MemoryLimitError, match=r"x\.heic: a picture of 64 x 48 pixels takes"):
         read_heif_photo(heif(PIXELS, DEPTH), "x.heic")
 

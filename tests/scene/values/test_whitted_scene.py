@@ -9,10 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lippmann.errors import SceneError
-from lippmann.scene.values.whitted_camera import ClassicCamera
-from lippmann.scene.values.whitted_lighting import Background, ClassicLight, Fog
-from lippmann.scene.values.whitted_scene import ClassicScene
-from lippmann.scene.values.whitted_surfaces import ClassicImage, ClassicMaterial, ClassicTexture
+from lippmann.scene.values.whitted_scene import ClassicCamera, ClassicScene
+from lippmann.scene.values.whitted_surfaces import (
+    Background,
+    ClassicImage,
+    ClassicLight,
+    ClassicMaterial,
+    ClassicTexture,
+    Fog,
+)
 from lippmann.scene.whitted.builder import ClassicSceneBuilder, unit
 
 numbers = st.floats(-100, 100)

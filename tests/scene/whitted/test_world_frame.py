@@ -12,9 +12,15 @@ from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.scene import bounds_of
-from lippmann.scene.values.whitted_camera import ClassicCamera
-from lippmann.scene.values.whitted_lighting import Background, ClassicLight, Fog
-from lippmann.scene.values.whitted_surfaces import ClassicImage, ClassicMaterial, ClassicTexture
+from lippmann.scene.values.whitted_scene import ClassicCamera
+from lippmann.scene.values.whitted_surfaces import (
+    Background,
+    ClassicImage,
+    ClassicLight,
+    ClassicMaterial,
+    ClassicTexture,
+    Fog,
+)
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
 from lippmann.scene.whitted.tessellation import icosphere, patches
 from lippmann.scene.whitted.to_pbr import to_physical

@@ -112,7 +112,7 @@ def page(
 def _with_values(monitor: Monitor, pitch: str | None, slope: str | None, center: str | None) -> Monitor:
     """The monitor with the options' values."""
     from lippmann.display.display import INFINITE
-    from lippmann.display.units import plain_number
+    from lippmann.display.validation import plain_number
 
     changed: dict[str, float] = {}
     for option, text in (("--pitch", pitch), ("--slope", slope), ("--center", center)):

@@ -75,7 +75,7 @@ def sheet_of(display: Display, finishing: FinishOptions, *, in_frames: bool = Fa
     from lippmann.calibration.finish import NO_FINISH, Finish
     from lippmann.codecs.icc import read_profile
     from lippmann.display.sheet_layout import with_bleed
-    from lippmann.display.units import length
+    from lippmann.display.validation import length
 
     bleed, marks, icc = finishing.bleed, finishing.marks, finishing.icc
     asked = [f"--{name}" for name, value in vars(finishing).items() if value not in (None, False)]
@@ -121,7 +121,7 @@ def marks(
     from lippmann.calibration.job_sheet import check_job_sheet, write_job_sheet
     from lippmann.codecs.icc import read_profile
     from lippmann.display.sheet_layout import trimmed
-    from lippmann.display.units import length
+    from lippmann.display.validation import length
     from lippmann.image.read import open_file
     from lippmann.image.streamed import picture_of_file
     from lippmann.image.write import check_output, format_for
@@ -163,7 +163,7 @@ def _display_with_bleed(display: Display | None, bleed: str | None) -> Display |
     if bleed is None:
         return display
     from lippmann.display.sheet_layout import with_bleed
-    from lippmann.display.units import length
+    from lippmann.display.validation import length
 
     width = length(bleed, "--bleed")
     if display is None:

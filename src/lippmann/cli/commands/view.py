@@ -18,7 +18,7 @@ from lippmann.cli.shared.end_signals import ended_by_signals
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.cli.shared.option_names import in_options
 from lippmann.errors import LippmannError, UsageError
-from lippmann.runtime.temporary_names import scratch_folder
+from lippmann.runtime.atomic_write import scratch_folder
 
 if TYPE_CHECKING:
     from lippmann.display import Display

@@ -119,7 +119,7 @@ def _limit_inputs(made: Iterable[Options]) -> AbstractContextManager[None]:
     memory = next((each.memory for each in made if isinstance(each, MachineOptions)), None)
     if memory is None:
         return nullcontext()
-    from lippmann.runtime.input_memory import limit_inputs
+    from lippmann.runtime.machine import limit_inputs
 
     return limit_inputs(memory)
 

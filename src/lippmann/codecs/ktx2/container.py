@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 
 Bytes = NDArray[np.uint8]
 

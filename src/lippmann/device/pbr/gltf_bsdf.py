@@ -18,7 +18,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from lippmann.device.array_parts import arrays_of
+from lippmann.device.kernel_ops import arrays_of
 from lippmann.device.pbr import microfacet
 from lippmann.device.pbr.gltf_bsdf_parameters import Lobe, Point, Sheen, SurfaceModel
 from lippmann.device.pbr.texture_lookup import Place

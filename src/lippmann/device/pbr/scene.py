@@ -15,10 +15,9 @@ from lippmann.device.pbr.material_groups import Variant
 from lippmann.device.pbr.materials import Finish, make_finishes
 from lippmann.device.pbr.media import MEDIA_NOTE, has_media
 from lippmann.device.pbr.shapes import Dress, has_volume, make_shapes
-from lippmann.device.pbr.straight_through import has_null, may_pass
 from lippmann.device.pbr.textures import TextureStore
 from lippmann.device.splats.table import SplatTable, make_table
-from lippmann.device.types import Emitter, MitsubaScene, Shape
+from lippmann.device.types import BSDF, Emitter, MitsubaScene, Shape
 from lippmann.device.volumes.table import VolumeTable
 from lippmann.device.volumes.table import make_table as make_volume_table
 from lippmann.errors import SceneError, UsageError
@@ -256,3 +255,20 @@ def _absorption(scene: MitsubaScene, shapes: Sequence[Shape], finishes: Sequence
         for shape, finish in zip(shapes, finishes, strict=True)
         if finish is not None and finish.absorption is not None
     }
+
+
+def is_instance(shape: Shape) -> bool:
+    """Whether a shape shows a group of others, which are out of sight: it tells a surface that none of them has."""
+    return bool(shape.class_name() == "Instance")
+
+
+def may_pass(shape: Shape) -> bool:
+    """Whether a shape may let rays straight through; an instance may."""
+    return is_instance(shape) or has_null(shape.bsdf())
+
+
+def has_null(surface: BSDF) -> bool:
+    """Whether a surface has a null lobe."""
+    import mitsuba as mi
+
+    return bool(mi.has_flag(surface.flags(), mi.BSDFFlags.Null))

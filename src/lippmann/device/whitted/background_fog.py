@@ -6,7 +6,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.types import Color3f, Float, Point3f, Vector3f
-from lippmann.scene.values.whitted_lighting import Background, Fog
+from lippmann.scene.values.whitted_surfaces import Background, Fog
 
 
 def background_color(background: Background, o: Point3f, d: Vector3f) -> Color3f:

@@ -17,7 +17,7 @@ from lippmann.device.whitted.intersections import Row, crossings, fetch, formula
 from lippmann.device.whitted.light_buffer import make_light_buffer
 from lippmann.device.whitted.light_buffer_lookup import LightBufferLookup
 from lippmann.device.whitted.shape_table import Column, Kind, ShapeTable
-from lippmann.scene.values.whitted_lighting import ClassicLight
+from lippmann.scene.values.whitted_surfaces import ClassicLight
 
 #: Up to this many listed shapes are written into the kernel; more are looped over.
 MOST_LITERAL = 64

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.whitted.shape_table import Column, Kind, ShapeTable
-from lippmann.scene.values.whitted_lighting import ClassicLight
 from lippmann.scene.values.whitted_shapes import Numbers
+from lippmann.scene.values.whitted_surfaces import ClassicLight
 
 #: Cells along a side of a grid that are tried, the finest first.
 SIDES = (256, 128, 64, 32, 16)

@@ -17,8 +17,8 @@ from lippmann.device.types import Bool, Color3f, Float, Point3f, UInt32, Vector3
 from lippmann.device.whitted.geometry import FAR, Geometry, Surface
 from lippmann.device.whitted.intersections import xyz
 from lippmann.device.whitted.materials import LEAST, Finish, MaterialTable
-from lippmann.scene.values.whitted_lighting import AmbientOcclusion, ClassicLight
 from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.values.whitted_surfaces import AmbientOcclusion, ClassicLight
 
 #: First sample dimension of sky light; those below place the sample in its pixel and lens.
 _SKY_DIMENSION = 8

@@ -31,8 +31,7 @@ from lippmann.display.formats.monitor_toml import monitor_of_tables
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_profile import LensProfile
 from lippmann.display.pixel_aperture import PixelAperture
-from lippmann.display.units import INCH, MILLIMETRES, length
-from lippmann.display.validation import Arguments, check_keys, refuse_unknown
+from lippmann.display.validation import INCH, MILLIMETRES, Arguments, check_keys, length, refuse_unknown
 from lippmann.errors import DisplayError
 
 _LENS_KEYS = ("thickness", "index", "radius", "field", "conic", "diameter")

@@ -26,8 +26,20 @@ from typing import TypeVar
 from lippmann.display.display import INFINITE
 from lippmann.display.formats.monitor import DEFAULT_CONE, DEFAULT_DISTANCE, Monitor
 from lippmann.display.panel import RGB_STRIPE, Panel
-from lippmann.display.units import INCH, MILLIMETRES, length, plain_number, stripe
-from lippmann.display.validation import Arguments, Table, check_text, finite, positive, refuse_unknown, whole_count
+from lippmann.display.validation import (
+    INCH,
+    MILLIMETRES,
+    Arguments,
+    Table,
+    check_text,
+    finite,
+    length,
+    plain_number,
+    positive,
+    refuse_unknown,
+    stripe,
+    whole_count,
+)
 from lippmann.errors import DisplayError
 from lippmann.json_values import JsonObject, JsonValue
 

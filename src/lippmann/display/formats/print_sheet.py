@@ -18,10 +18,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import cast
 
-from lippmann.display import units
+from lippmann.display import validation
 from lippmann.display.display import INFINITE, Display
 from lippmann.display.formats.recorded_depth import default_aperture
-from lippmann.display.formats.typical_sheets import TypicalSheet, typical_sheet
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_profile import DEFAULT_INDEX, LensProfile, check_index
 from lippmann.display.panel import Panel
@@ -29,7 +28,42 @@ from lippmann.display.pixel_aperture import PixelAperture
 from lippmann.display.sheet import Sheet
 from lippmann.display.validation import MAXIMUM_COUNT, finite, number, refuse_unknown
 from lippmann.errors import DisplayError
-from lippmann.runtime.cached_property import cached_property
+from lippmann.runtime.engine_lock import cached_property
+
+
+@dataclass(frozen=True)
+class TypicalSheet:
+    """Lenses per inch, crest radius and thickness in millimetres, and refractive index of a sheet."""
+
+    lpi: float
+    radius: float
+    thickness: float
+    index: float
+
+
+#: By name.
+TYPICAL_SHEETS = {
+    f"{sheet.lpi:g}lpi": sheet
+    for sheet in (
+        TypicalSheet(18, 1.2319, 3.03, 1.5865),
+        TypicalSheet(25, 1.7088, 3.92, 1.5865),
+        TypicalSheet(32, 1.2049, 3.16, 1.5865),
+        TypicalSheet(42, 0.7846, 2.01, 1.5865),
+        TypicalSheet(50, 0.2707, 0.5895, 1.6357),
+        TypicalSheet(75, 0.2279, 0.5281, 1.6357),
+        TypicalSheet(100, 0.1493, 0.4078, 1.6357),
+        TypicalSheet(161, 0.0995, 0.2456, 1.6357),
+    )
+}
+
+
+def typical_sheet(name: str) -> TypicalSheet:
+    """The sheet of that name, such as ``75lpi``; a :class:`DisplayError` that lists them if there is none."""
+    if name not in TYPICAL_SHEETS:
+        rule = f"typical sheets are {', '.join(TYPICAL_SHEETS)}"
+        raise DisplayError.unknown("sheet", name, TYPICAL_SHEETS, where="sheet", rule=rule)
+    return TYPICAL_SHEETS[name]
+
 
 #: Keys of the short form of a print.
 KEYS = (
@@ -82,7 +116,7 @@ class Print:
     blur:
         Standard deviation of the blur of ink in millimetres.
     sheet:
-        Name of a typical sheet, such as ``75lpi``, see :mod:`~lippmann.display.formats.typical_sheets`; in place of
+        Name of a typical sheet, such as ``75lpi``, see :mod:`~lippmann.display.formats.print_sheet`; in place of
         its pitch, thickness, index and crest radius.
 
     Raises
@@ -157,7 +191,7 @@ class Print:
     def _check_thickness(self, thickness: float) -> None:
         field, index = 0.0, check_index(DEFAULT_INDEX if self.index is None else self.index, "index")
         if finite(thickness, "thickness") > 0:
-            field = math.degrees(2 * math.atan(units.INCH / self._stated_lpi / 2 * index / thickness))
+            field = math.degrees(2 * math.atan(validation.INCH / self._stated_lpi / 2 * index / thickness))
         if not _FIELDS[0] <= field <= _FIELDS[1]:
             rule = f"such lenses must have a field of view of {_FIELDS[0]:g} to {_FIELDS[1]:g} degrees"
             fix = "look at its unit"
@@ -165,7 +199,7 @@ class Print:
 
     def _check_side(self, side: object) -> None:
         length = finite(side, "size")
-        pixels = length * self.ppi / units.INCH
+        pixels = length * self.ppi / validation.INCH
         if not 0.5 < pixels < MAXIMUM_COUNT + 0.5:
             rule = f"at {self.ppi:g} pixels per inch it must be 1 to {MAXIMUM_COUNT} pixels"
             raise DisplayError(f"a side of {length:g} mm is {pixels:.6g} pixels", where="size", rule=rule)
@@ -182,7 +216,7 @@ class Print:
     @property
     def pixels(self) -> tuple[int, int]:
         """Width and height in pixels."""
-        width, height = (round(side * self.ppi / units.INCH) for side in self.size)
+        width, height = (round(side * self.ppi / validation.INCH) for side in self.size)
         return width, height
 
     @property
@@ -207,7 +241,7 @@ class Print:
             return None
         with _own_keys():
             aperture = PixelAperture(blur=self.blur)
-            aperture.lit_size(Panel(1, 1, units.INCH / self.ppi))
+            aperture.lit_size(Panel(1, 1, validation.INCH / self.ppi))
         return aperture
 
     @cached_property
@@ -218,14 +252,14 @@ class Print:
             index = DEFAULT_INDEX if self.index is None else self.index
             return fit_profile(
                 LensArray("lenticular", pitch),
-                thickness=cast(float, self.thickness),
+                thickness=cast("float", self.thickness),
                 index=index,
                 radius=self.radius,
                 field=self.field,
                 conic=0.0 if self.conic is None else self.conic,
             )
 
-        stated = units.INCH / self._stated_lpi
+        stated = validation.INCH / self._stated_lpi
         with _own_keys():
             if self.lpi is None:
                 lens, _, gap = profile_behind(profile, stated, self.viewing_distance)
@@ -245,26 +279,26 @@ class Print:
 
     @property
     def _stated_lpi(self) -> float:
-        return cast(float, self.print_lpi if self.lpi is None else self.lpi)
+        return cast("float", self.print_lpi if self.lpi is None else self.lpi)
 
     @property
     def _parallel_gap(self) -> float:
         """The gap for an infinite viewing distance: micro-images as far apart as the stated lenses per inch."""
         field = DEFAULT_FIELD if self.field is None else self.field
-        return units.INCH / self._stated_lpi / (2 * math.tan(math.radians(field) / 2))
+        return validation.INCH / self._stated_lpi / (2 * math.tan(math.radians(field) / 2))
 
     def display(self) -> Display:
         """The print and its sheet as a display, aligned as :class:`Display` aligns lenses."""
-        lpi, gap, pixel = self.pitch_of_sheet, self.gap, units.INCH / self.ppi
+        lpi, gap, pixel = self.pitch_of_sheet, self.gap, validation.INCH / self.ppi
         width, height = self.pixels
         distance = self.viewing_distance
-        lens_pitch = units.INCH / lpi
+        lens_pitch = validation.INCH / lpi
         place = "afar" if math.isinf(distance) else f"{distance:g} mm"
         size = f"{self.size[0]:g}x{self.size[1]:g} mm"
         return Display(
             name=f"print-{lpi:g}lpi",
             title=f"{lpi:g}-lpi lenticular print, {size} at {self.ppi:g} ppi, seen from {place}",
-            panel=Panel(width, height, pixel, units.stripe("none", "subpixels")),
+            panel=Panel(width, height, pixel, validation.stripe("none", "subpixels")),
             lens_array=LensArray("lenticular", lens_pitch),
             gap=gap,
             viewing_distance=distance,
@@ -291,13 +325,13 @@ def print_of_texts(texts: Mapping[str, str]) -> Print:
     for key in ("ppi", "size"):
         if key not in texts:
             raise DisplayError(f"{key} is missing", where=key, rule="a print needs lpi (or print-lpi), ppi and size")
-    numbers = {key: units.plain_number(texts[key], key) for key in _NUMBERS if key in texts}
-    lengths = {key: units.length(texts[key], key) for key in _LENGTHS if key in texts}
+    numbers = {key: validation.plain_number(texts[key], key) for key in _NUMBERS if key in texts}
+    lengths = {key: validation.length(texts[key], key) for key in _LENGTHS if key in texts}
     distance = texts.get("viewing-distance", str(DEFAULT_DISTANCE))
-    lengths["viewing-distance"] = math.inf if distance == INFINITE else units.length(distance, "viewing-distance")
+    lengths["viewing-distance"] = math.inf if distance == INFINITE else validation.length(distance, "viewing-distance")
     values = {key.replace("-", "_"): value for key, value in (numbers | lengths).items()}
     try:
-        return Print(size=units.size(texts["size"], "size"), sheet=texts.get("sheet"), **values)
+        return Print(size=validation.size(texts["size"], "size"), sheet=texts.get("sheet"), **values)
     except DisplayError as error:
         where = error.where.replace("_", "-")
         raise DisplayError(error.what, where=where, rule=error.rule, fix=error.fix) from None

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
-from lippmann.device.transfer import encode
+from lippmann.device.kernel_ops import encode
 from lippmann.device.types import Bool, Color3f, Float
 
 Floats = NDArray[np.float32]

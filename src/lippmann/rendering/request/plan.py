@@ -3,7 +3,7 @@
 :func:`make_plan` reads as a table of rules, one function a value: what was asked for wins, then the scene decides, then
 the display and the size of the picture. An automatic exposure, photons, chains of seen light and light vertices need a
 pilot of the scene: they are "auto" in the plan until its results are added
-(:meth:`~lippmann.rendering.request.render_plan.RenderPlan.with_pilot`).
+(:meth:`~lippmann.rendering.request.render_request.RenderPlan.with_pilot`).
 """
 
 from __future__ import annotations
@@ -29,8 +29,7 @@ from lippmann.options.choices import (
 from lippmann.options.forms import Form
 from lippmann.options.light import LightOptions
 from lippmann.rendering.request.preconditions import check, check_off_surfaces
-from lippmann.rendering.request.render_plan import Choice, RenderPlan
-from lippmann.rendering.request.render_request import DEFAULT_DEPTH, DEFAULT_SPP, RenderRequest
+from lippmann.rendering.request.render_request import DEFAULT_DEPTH, DEFAULT_SPP, Choice, RenderPlan, RenderRequest
 from lippmann.scene.scene import Scene
 
 T = TypeVar("T")

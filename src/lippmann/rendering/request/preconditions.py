@@ -6,8 +6,7 @@ from lippmann.display import Display
 from lippmann.errors import PictureError, UsageError
 from lippmann.options.choices import LIGHT, POOLED_LIGHT, REUSING
 from lippmann.options.forms import LEFT_OUT, Form
-from lippmann.rendering.request.render_plan import shown_value
-from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.request.render_request import RenderRequest, shown_value
 from lippmann.scene.scene import Scene
 
 #: Pictures number their sub-pixels in 32 bits.

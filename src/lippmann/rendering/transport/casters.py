@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import binary_search
 from lippmann.device.pbr.gltf_bsdf import SHARP_LOBE
-from lippmann.device.pbr.straight_through import is_instance
+from lippmann.device.pbr.scene import is_instance
 from lippmann.device.types import (
     Bool,
     Float,

@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.drjit_ops import DEVICE
+from lippmann.device.kernel_ops import DEVICE
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
 from lippmann.device.types import Float64, Point2f, Ray3f, UInt32
 from lippmann.display import Display

@@ -7,7 +7,7 @@ import mitsuba as mi
 
 from lippmann.device.sobol import hash32
 from lippmann.device.types import Float64, Point2f, Ray3f, UInt32, Vector3d
-from lippmann.scene.values.whitted_camera import ClassicCamera, Handedness
+from lippmann.scene.values.whitted_scene import ClassicCamera, Handedness
 
 
 class WhittedCameraRays:

@@ -14,10 +14,16 @@ from numpy.typing import NDArray
 
 from lippmann.scene.bundled import textures
 from lippmann.scene.bundled.stage import Stage
-from lippmann.scene.values.whitted_lighting import Background, ClassicLight
-from lippmann.scene.values.whitted_numbers import Vector
 from lippmann.scene.values.whitted_scene import ClassicScene
-from lippmann.scene.values.whitted_surfaces import ClassicImage, ClassicMaterial, ClassicTexture, TextureKind
+from lippmann.scene.values.whitted_surfaces import (
+    Background,
+    ClassicImage,
+    ClassicLight,
+    ClassicMaterial,
+    ClassicTexture,
+    TextureKind,
+    Vector,
+)
 from lippmann.scene.whitted.builder import ClassicSceneBuilder, unit
 
 NAME = "primitives"

@@ -15,10 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from lippmann.scene.bundled import textures
 from lippmann.scene.bundled.stage import Stage
-from lippmann.scene.values.whitted_lighting import ClassicLight
-from lippmann.scene.values.whitted_numbers import Vector
 from lippmann.scene.values.whitted_scene import ClassicScene
-from lippmann.scene.values.whitted_surfaces import ClassicImage, ClassicMaterial, ClassicTexture
+from lippmann.scene.values.whitted_surfaces import ClassicImage, ClassicLight, ClassicMaterial, ClassicTexture, Vector
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
 
 NAME = "room"

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lippmann.scene.values.description import Camera, Matrix
-from lippmann.scene.values.whitted_camera import ClassicCamera
+from lippmann.scene.values.whitted_scene import ClassicCamera
 
 Point = tuple[float, float, float]
 

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.scene.bundled.stage import Stage
-from lippmann.scene.values.whitted_lighting import Background, ClassicLight
 from lippmann.scene.values.whitted_scene import ClassicScene
-from lippmann.scene.values.whitted_surfaces import ClassicMaterial
+from lippmann.scene.values.whitted_surfaces import Background, ClassicLight, ClassicMaterial
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
 
 NAME = "tree"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
-from lippmann.runtime.cached_property import cached_property
+from lippmann.runtime.engine_lock import cached_property
 from lippmann.scene.parsing.files import decode_text, read_bytes
 
 # One way to read any word: two ways to split digits would take time by the square of their number.

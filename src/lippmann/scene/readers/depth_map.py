@@ -21,7 +21,7 @@ from lippmann.codecs.orientation import of_picture, upright
 from lippmann.codecs.pfm import read_pfm
 from lippmann.codecs.pillow_formats import RULE, open_picture
 from lippmann.errors import MemoryLimitError, PictureError, SceneError
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import read_bytes
 
 #: Names of channels of OpenEXR that hold depth, by their own name or that of their layer, before those of any value.

@@ -16,7 +16,7 @@ from PIL import Image as Pillow
 from lippmann.codecs.orientation import lies
 from lippmann.codecs.photograph import open_photograph
 from lippmann.errors import SceneError
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import decoding, read_bytes, texels_of_codes
 from lippmann.scene.readers.depth_layers import Layers, split_layers
 from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map

@@ -10,7 +10,7 @@ import numpy as np
 
 from lippmann.codecs.icc import convert_codes, profile_of_cicp
 from lippmann.errors import PictureError, SceneError
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 from lippmann.runtime.optional_import import check_installed
 from lippmann.scene.readers.depth_map import DepthMap, without_stairs
 from lippmann.scene.values.description import Image

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lippmann.errors import SceneError, UsageError
-from lippmann.options.keywords import takes
 from lippmann.options.light import LightOptions
+from lippmann.options.option import takes
 from lippmann.options.outputs import AccessOptions
-from lippmann.options.plain import settings_of
 from lippmann.options.scene import LoadKeywords, SceneOptions, Up
+from lippmann.options.texts import settings_of
+from lippmann.scene.cloud_selection import SplatSelection, VolumeSelection
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.ply import UP_NOTE
@@ -23,7 +24,6 @@ from lippmann.scene.readers.splats.sog_folder import holds_sog
 from lippmann.scene.readers.volumes.dicom_files import DICOM, holds_dicom
 from lippmann.scene.scene import Scene, check_description, override_light
 from lippmann.scene.splat_clouds import moved
-from lippmann.scene.splat_selection import SplatSelection
 from lippmann.scene.values.description import (
     Camera,
     Color,
@@ -33,9 +33,8 @@ from lippmann.scene.values.description import (
     Matrix,
     SceneDescription,
 )
-from lippmann.scene.values.whitted_lighting import Background
 from lippmann.scene.values.whitted_scene import ClassicScene
-from lippmann.scene.volume_selection import VolumeSelection
+from lippmann.scene.values.whitted_surfaces import Background
 from lippmann.scene.volumes.grid import moved as moved_volume
 from lippmann.scene.whitted.world_frame import world_camera
 

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
-from lippmann.runtime.input_memory import check_input, input_memory_left
+from lippmann.runtime.machine import check_input, input_memory_left
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.values.description import Instance, Material, Matrix, Mesh, SceneDescription
 

@@ -18,11 +18,8 @@ from numpy.typing import NDArray
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.tokens import Words
 from lippmann.scene.parsing.triangulation import triangulate
-from lippmann.scene.values.whitted_camera import ClassicCamera
-from lippmann.scene.values.whitted_lighting import Background, ClassicLight, Shading
-from lippmann.scene.values.whitted_numbers import Color, Vector
-from lippmann.scene.values.whitted_scene import ClassicScene
-from lippmann.scene.values.whitted_surfaces import ClassicMaterial
+from lippmann.scene.values.whitted_scene import ClassicCamera, ClassicScene
+from lippmann.scene.values.whitted_surfaces import Background, ClassicLight, ClassicMaterial, Color, Shading, Vector
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
 
 _COMMENT = re.compile(r"#[^\n]*")

@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lippmann.errors import SceneError
-from lippmann.scene.values.whitted_camera import ClassicCamera, Handedness
-from lippmann.scene.values.whitted_lighting import AmbientOcclusion, Background, ClassicLight, Fog, Shading
-from lippmann.scene.values.whitted_scene import ClassicScene, Rules
+from lippmann.scene.values.whitted_scene import ClassicCamera, ClassicScene, Handedness, Rules
 from lippmann.scene.values.whitted_shapes import (
     Batch,
     Boxes,
@@ -24,7 +22,15 @@ from lippmann.scene.values.whitted_shapes import (
     Triangles,
     Tubes,
 )
-from lippmann.scene.values.whitted_surfaces import ClassicImage, ClassicMaterial
+from lippmann.scene.values.whitted_surfaces import (
+    AmbientOcclusion,
+    Background,
+    ClassicImage,
+    ClassicLight,
+    ClassicMaterial,
+    Fog,
+    Shading,
+)
 
 B = TypeVar("B", bound=Batch)
 

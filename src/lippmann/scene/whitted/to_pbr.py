@@ -29,9 +29,8 @@ from lippmann.scene.values.description import (
     SceneDescription,
     Texture,
 )
-from lippmann.scene.values.whitted_lighting import ClassicLight
 from lippmann.scene.values.whitted_scene import ClassicScene
-from lippmann.scene.values.whitted_surfaces import ClassicMaterial
+from lippmann.scene.values.whitted_surfaces import ClassicLight, ClassicMaterial
 from lippmann.scene.whitted.tessellation import Patch, patches
 from lippmann.scene.whitted.world_frame import world_bounds, world_from_scene
 

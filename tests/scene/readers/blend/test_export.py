@@ -16,7 +16,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from lippmann.errors import MemoryLimitError, SceneError
-from lippmann.runtime.input_memory import limit_inputs
+from lippmann.runtime.machine import limit_inputs
 from lippmann.scene.readers.blend import export, read_blend
 from lippmann.scene.readers.load import load_scene
 

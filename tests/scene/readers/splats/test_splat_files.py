@@ -16,7 +16,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from lippmann.errors import LippmannError, SceneError
-from lippmann.runtime import input_memory
+from lippmann.runtime import machine
 from lippmann.scene.readers.load import load_scene
 
 COUNT = 600
@@ -372,9 +372,9 @@ def test_what_unpacks_to_gigabytes_is_refused_before(tmp_path):
     (tmp_path / "bomb.sog").write_bytes(stream.getvalue())
     (tmp_path / "bomb.ply").write_bytes(header(FLOATS, 10**12) + ROW.tobytes())
     try:
-        input_memory.limit_inputs(64 << 20)
+        machine.limit_inputs(64 << 20)
         for name in ("bomb.spz", "bomb.sog", "bomb.ply"):
             with pytest.raises(LippmannError, match=name):
                 load_scene(tmp_path / name)
     finally:
-        input_memory.limit_inputs(None)
+        machine.limit_inputs(None)

@@ -12,7 +12,7 @@ import zipfile
 import pytest
 
 from lippmann.errors import LippmannError, MemoryLimitError, SceneError
-from lippmann.runtime.input_memory import limit_inputs
+from lippmann.runtime.machine import limit_inputs
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.readers.usd import process
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lippmann.errors import LippmannError, SceneError, UsageError
-from lippmann.runtime.input_memory import limit_inputs
+from lippmann.runtime.machine import limit_inputs
 from lippmann.scene.readers.load import load_scene
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lippmann.errors import MemoryLimitError, SceneError, UsageError
-from lippmann.runtime import input_memory
+from lippmann.runtime import machine
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.readers.volumes import vdb
 from lippmann.scene.readers.volumes.vdb import read_vdb
@@ -79,8 +79,8 @@ def test_damaged_files_are_one_line(tmp_path):
 
 @needs_openvdb
 def test_it_counts_against_the_memory(monkeypatch):
-    monkeypatch.setattr(input_memory, "_UNSEEN", 0)
-    monkeypatch.setattr(input_memory.machine, "available_memory", lambda: 1000)
+    monkeypatch.setattr(machine, "_UNSEEN", 0)
+    monkeypatch.setattr(machine, "available_memory", lambda: 1000)
     with pytest.raises((SceneError, MemoryLimitError), match="memory"):
         volume()
 

@@ -13,9 +13,9 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.array_parts import arrays_of
+from lippmann.device.kernel_ops import arrays_of
 from lippmann.device.types import Array
-from lippmann.runtime.collector import no_collection
+from lippmann.runtime.engine_lock import no_collection
 
 Numbers = NDArray[np.uint32]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.runtime.cached_property import cached_property
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.engine_lock import cached_property
+from lippmann.runtime.machine import check_input
 from lippmann.scene.readers.gltf.buffers import Buffers
 from lippmann.scene.readers.gltf.document import Document
 from lippmann.scene.readers.gltf.draco import DracoMeshes

@@ -8,7 +8,7 @@ import re
 from urllib.parse import unquote
 
 from lippmann.errors import SceneError
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import read_bytes, resolve
 from lippmann.scene.readers.gltf.document import DECOMPRESS, MESHOPT, Document
 from lippmann.scene.readers.gltf.json_fields import Fields

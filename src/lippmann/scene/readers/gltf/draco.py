@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
 from lippmann.runtime.child_python import python_command
-from lippmann.runtime.input_memory import input_memory_left
+from lippmann.runtime.machine import input_memory_left
 from lippmann.scene.readers.gltf.buffers import Buffers
 from lippmann.scene.readers.gltf.document import DECOMPRESS, DRACO, Document
 from lippmann.scene.readers.gltf.draco_child import HEADER

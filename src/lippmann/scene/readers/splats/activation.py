@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 from lippmann.scene.values.splats import COEFFICIENTS, FloatArray, Splats
 
 #: The harmonic of degree 0, by which colours of files are divided that store them as such.

@@ -19,7 +19,7 @@ import numpy as np
 
 from lippmann.codecs.pillow_formats import open_picture
 from lippmann.errors import LippmannError, SceneError
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import read_bytes, resolve
 from lippmann.scene.readers.splats.activation import MOST_SMALL, Bytes, activated, ask_memory, largest_left_out, sigmoid
 from lippmann.scene.readers.splats.sog_folder import META, holds_sog

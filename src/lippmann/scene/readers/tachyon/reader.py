@@ -20,10 +20,8 @@ from lippmann.scene.parsing.tokens import Words
 from lippmann.scene.readers.tachyon.files import SceneFiles
 from lippmann.scene.readers.tachyon.shapes import SHAPES, ShapeReader
 from lippmann.scene.readers.tachyon.textures import TextureTable
-from lippmann.scene.values.whitted_camera import CameraPose, ClassicCamera, Projection
-from lippmann.scene.values.whitted_lighting import AmbientOcclusion, Background, ClassicLight, Fog, Shading
-from lippmann.scene.values.whitted_numbers import Vector
-from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.values.whitted_scene import CameraPose, ClassicCamera, ClassicScene, Projection
+from lippmann.scene.values.whitted_surfaces import AmbientOcclusion, Background, ClassicLight, Fog, Shading, Vector
 from lippmann.scene.whitted.builder import ClassicSceneBuilder, unit
 
 T = TypeVar("T")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import MissingFileError, decode_image, find_file, read_bytes
 from lippmann.scene.parsing.texture_maps import unit
 from lippmann.scene.readers.environment_map import read_environment

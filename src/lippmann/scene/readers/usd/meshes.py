@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.readers.gltf.nodes import normal_matrices
 from lippmann.scene.readers.gltf.skinning import unit_normals

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
 from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
-from lippmann.runtime.input_memory import input_memory_left
+from lippmann.runtime.machine import input_memory_left
 from lippmann.scene.readers.usd.records import Record, unpack
 
 #: Seconds that reading a stage may take.

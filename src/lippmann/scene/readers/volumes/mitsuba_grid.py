@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from lippmann.errors import SceneError
-from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.volumes.description import describe_volume
 from lippmann.scene.values.description import SceneDescription

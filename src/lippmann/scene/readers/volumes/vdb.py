@@ -10,7 +10,7 @@ import numpy as np
 
 from lippmann.errors import SceneError, UsageError
 from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
-from lippmann.runtime.input_memory import check_input, input_memory_left
+from lippmann.runtime.machine import check_input, input_memory_left
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.volumes.description import describe_volume
 from lippmann.scene.readers.volumes.vdb_module import find_module

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import SceneError, UsageError
 from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
-from lippmann.runtime.input_memory import check_input, input_memory_left
+from lippmann.runtime.machine import check_input, input_memory_left
 from lippmann.runtime.optional_import import check_installed
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.volumes.description import describe_volume

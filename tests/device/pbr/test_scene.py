@@ -10,7 +10,7 @@ MASK = {"type": "mask", "opacity": 0.5, "bsdf": {"type": "diffuse"}}
 def test_surfaces_tell_and_instances_may():
     import mitsuba as mi
 
-    from lippmann.device.pbr.straight_through import is_instance, may_pass
+    from lippmann.device.pbr.scene import is_instance, may_pass
 
     wall, mask = (mi.load_dict({"type": "rectangle", "bsdf": surface}) for surface in ({"type": "diffuse"}, MASK))
     group = {"type": "shapegroup", "wall": {"type": "rectangle"}}
