@@ -102,14 +102,6 @@ def _keep_to_own_cores():
     os.sched_setaffinity(0, cores[number::count] or [cores[number % len(cores)]])
 
 
-@pytest.fixture(scope="session", autouse=True)
-def state_folder(tmp_path_factory):
-    """What the user's programs keep lies elsewhere than in the home of who runs the tests."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
-        yield
-
-
 @pytest.fixture(scope="session")
 def engine():
     """The rendering engine on the CPU."""

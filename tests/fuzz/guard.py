@@ -57,9 +57,8 @@ def judge(read: Read, data: bytes, folder: Path, seconds: float | None = None) -
     peak = _peak()
     site: tuple[str, ...] = ("result",)
     faults: list[str] = []
-    with warnings.catch_warnings(record=True) as warned, _limit(seconds):
+    with warnings.catch_warnings(record=True) as warned, _limit(seconds), limit_inputs(MEMORY // 4):
         warnings.simplefilter("always")
-        limit_inputs(MEMORY // 4)
         try:
             result = read(data, folder)
             if isinstance(result, bytes):
@@ -73,8 +72,6 @@ def judge(read: Read, data: bytes, folder: Path, seconds: float | None = None) -
         except Exception as error:  # noqa: BLE001  # which is what is looked for
             site = _site(error)
             faults.append(f"{type(error).__name__}: {str(error)[:200]} at {site[-1] if site else '?'}")
-        finally:
-            limit_inputs(None)
     faults += [f"warning: {entry.category.__name__}: {str(entry.message)[:200]}" for entry in warned]
     if _peak() - peak > MEMORY:
         faults.append(f"takes {(_peak() - peak) >> 20} MiB")

@@ -26,6 +26,7 @@ from unittest import mock
 
 import numpy as np
 import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
 from lippmann.api import render
@@ -63,7 +64,6 @@ from lippmann.viewer.request_guard import RequestGuard
 from lippmann.viewer.served_picture import PictureFile
 from lippmann.viewer.server import ViewerSite
 from lippmann.viewer.site_application import site_application
-from lippmann.viewer.timed_protocol import TimedProtocol
 
 from forms import (  # isort: skip
     body_tree,
@@ -490,9 +490,9 @@ class _Connection(asyncio.Transport):
 
 async def _talk(site: object, said: bytes) -> bytes:
     application = RequestGuard(site_application(site), "127.0.0.1")  # type: ignore[arg-type]
-    config = uvicorn.Config(application, http=TimedProtocol, lifespan="off", log_config=None, log_level="critical")
+    config = uvicorn.Config(application, http=H11Protocol, lifespan="off", log_config=None, log_level="critical")
     connection, state = _Connection(), ServerState()
-    protocol = TimedProtocol(config, state, {}, asyncio.get_running_loop())
+    protocol = H11Protocol(config, state, {}, asyncio.get_running_loop())
     connection.set_protocol(protocol)
     protocol.connection_made(connection)
     if said:  # asyncio calls for no empty bytes

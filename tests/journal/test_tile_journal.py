@@ -110,7 +110,7 @@ def test_half_files_are_swept_and_foreign_ones_left(output):
     with opened(output) as store:
         store.put(tile(2))
     folder = journal_of(output)
-    (folder / ".r0000_c0001-0123abcd.part.tile").write_bytes(b"half")
+    (folder / ".r0000_c0001-0123abcd0123abcd0123.part.tile").write_bytes(b"half")
     (folder / "notes.txt").write_text("mine")
     with opened(output) as store:
         assert store.resumed == 1
@@ -118,9 +118,10 @@ def test_half_files_are_swept_and_foreign_ones_left(output):
 
 
 def test_what_a_killed_writer_left_beside_is_swept(output):
-    for name in (".poster-0123abcd.part.tif", ".poster.tif.parts-0123abcd.old", ".poster.tif-0123abcd.part"):
+    number = "0123abcd0123abcd0123"
+    for name in (f".poster-{number}.part.tif", ".poster.tif.parts-0123abcd.old", f".poster.tif-{number}.part"):
         (output.parent / name).write_bytes(b"half")
-    others = {"poster.tif", ".poster2-0123abcd.part.tif", ".poster-0123abcd.part.png", ".poster.part.tif", "keep.tif"}
+    others = {"poster.tif", f".poster2-{number}.part.tif", f".poster-{number}.part.png", ".poster.part.tif", "keep.tif"}
     for name in others:
         (output.parent / name).write_bytes(b"whole")
     sweep_beside(output)

@@ -227,32 +227,6 @@ def test_link_stays_and_its_target_is_replaced(tmp_path):
     assert target.read_bytes() == b"new"
 
 
-def test_a_private_file_replaces_the_link_in_its_place(tmp_path):
-    target, link = tmp_path / "precious.txt", tmp_path / "job.json"
-    target.write_text("mine")
-    target.chmod(0o666)
-    for _ in range(2):
-        with atomic_write.replacing(link, private=True) as temporary:
-            assert stat.S_IMODE(temporary.stat().st_mode) == 0o600
-            temporary.write_bytes(b"new")
-        assert not link.is_symlink()
-        assert link.read_bytes() == b"new"
-        assert stat.S_IMODE(link.stat().st_mode) == 0o600
-        link.unlink()
-        link.symlink_to(target)
-    assert target.read_text() == "mine"
-
-
-def test_a_private_file_does_not_replace_a_folder(tmp_path):
-    (tmp_path / "job.json").mkdir()
-    with (
-        pytest.raises(OutputError, match="a folder of this name"),
-        atomic_write.replacing(tmp_path / "job.json", private=True),
-    ):
-        pass
-    assert names(tmp_path) == ["job.json"]
-
-
 def test_relative_path_survives_a_change_of_folder(tmp_path, monkeypatch):
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path)
@@ -371,47 +345,12 @@ def test_the_list_of_a_folder_is_a_file(tmp_path, plant):
     assert (place / "thesis.pdf").read_text() == "mine"
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files to other users")
-def test_the_list_of_a_folder_is_its_owners(tmp_path):
-    place = tmp_path / "views"
-    write_folder(place, {"a.png": "1"})
-    os.chown(place / atomic_write.CONTENTS_FILE, 12345, -1)
-    with pytest.raises(OutputError, match=r"the folder holds 'a\.png'"):
-        write_folder(place, {"a.png": "2"})
-
-
 def test_names_in_a_folder_reach_no_terminal_as_commands(tmp_path):
     (tmp_path / "views").mkdir()
     (tmp_path / "views" / "\x1b[2J").touch()
     with pytest.raises(OutputError) as raised:
         write_folder(tmp_path / "views", {"a.png": "1"})
     assert str(raised.value).isprintable()
-
-
-def test_a_folder_is_its_users_alone_until_it_is_whole(tmp_path):
-    mask = os.umask(0o002)
-    try:
-        with atomic_write.replacing_folder(tmp_path / "views") as temporary:
-            assert stat.S_IMODE(temporary.stat().st_mode) == 0o700
-            (temporary / "a.png").touch()
-    finally:
-        os.umask(mask)
-    assert stat.S_IMODE((tmp_path / "views").stat().st_mode) == 0o775
-    assert stat.S_IMODE((tmp_path / "views" / "a.png").stat().st_mode) == 0o664
-
-
-def test_file_systems_without_permissions_take_folders_and_files(tmp_path, monkeypatch):
-    """FAT refuses to keep others out."""
-    modes = []
-
-    def refused(path, mode):
-        modes.append(mode)
-        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM), str(path))
-
-    monkeypatch.setattr(Path, "chmod", refused)
-    write_folder(tmp_path / "views", {"a.png": "1"})
-    assert (tmp_path / "views" / "a.png").read_text() == "1"
-    assert modes
 
 
 def test_what_replaces_a_private_picture_is_private_from_the_first(tmp_path, monkeypatch):
@@ -437,21 +376,6 @@ def test_nobody_is_told_to_delete_what_is_his_own(tmp_path):
     (tmp_path / "views" / "notes.txt").touch()
     with pytest.raises(OutputError, match="choose a new folder, or move your files out of this one"):
         write_folder(tmp_path / "views", {"a.png": "1"})
-
-
-def test_a_folder_into_which_somebody_puts_a_file_at_once_is_not_used(tmp_path, monkeypatch):
-    (tmp_path / "precious.txt").write_text("mine")
-    mkdir = Path.mkdir
-
-    def planted(path, *words, **options):
-        mkdir(path, *words, **options)
-        (path / atomic_write.CONTENTS_FILE).symlink_to(tmp_path / "precious.txt")
-
-    monkeypatch.setattr(Path, "mkdir", planted)
-    with pytest.raises(OutputError, match="cannot be written"), atomic_write.replacing_folder(tmp_path / "views"):
-        pass
-    assert (tmp_path / "precious.txt").read_text() == "mine"
-    assert names(tmp_path) == ["precious.txt"]
 
 
 def test_file_in_the_place_of_a_folder(tmp_path):

@@ -22,9 +22,7 @@ NOTHING_FOUND = (
     "llvm.listed_files = lambda: iter(()); llvm.search_folders = lambda: []\n"
 )
 
-BY_FILE_NAME = (
-    "from lippmann.runtime.library_file import LibraryName\nllvm.name_of = lambda path: LibraryName(path.name)\n"
-)
+BY_FILE_NAME = "llvm.elf_name = lambda path: path.name\n"
 
 
 def python(code: str, **environment: str) -> subprocess.CompletedProcess[str]:

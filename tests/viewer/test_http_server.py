@@ -5,13 +5,12 @@ from __future__ import annotations
 import http.client
 import json
 import socket
-from contextlib import ExitStack, closing, suppress
+from contextlib import closing, suppress
 from http import HTTPStatus
 
 import pytest
 
 from lippmann.errors import PictureError, UsageError
-from lippmann.viewer import timed_protocol
 from lippmann.viewer.http_server import WebServer
 from lippmann.viewer.request_guard import is_loopback
 from lippmann.viewer.responses import RefusedError, Response, json_response
@@ -57,11 +56,10 @@ def ask(server, path="/", method="GET", headers=None, body=None):
 
 
 def raw(server, sent):
-    """All that comes back for these bytes, until the server ends the connection or breaks it off."""
+    """All that comes back for these bytes, until the server ends the connection or says nothing for a moment."""
     answer = b""
-    with socket.create_connection(("127.0.0.1", server.port), timeout=10) as connection, suppress(OSError):
+    with socket.create_connection(("127.0.0.1", server.port), timeout=0.3) as connection, suppress(OSError):
         connection.sendall(sent)
-        connection.shutdown(socket.SHUT_WR)
         while part := connection.recv(65536):
             answer += part
     return answer
@@ -142,10 +140,7 @@ def test_foreign_names_are_refused(server, host):
 
 @pytest.mark.parametrize("hosts", [b"", b"Host: localhost\r\nHost: evil.example\r\n"], ids=["none", "two"])
 def test_one_host_must_be_named(server, hosts):
-    answer = raw(server, b"GET / HTTP/1.1\r\n" + hosts + b"\r\n")
-    assert answer.startswith(b"HTTP/1.1 400 ")
-    assert answer.endswith(b'{"error": "Bad Request"}')
-    assert b"default-src 'none'" in answer
+    assert raw(server, b"GET / HTTP/1.1\r\n" + hosts + b"\r\n").startswith(b"HTTP/1.1 400 ")
     assert raw(server, b"GET / HTTP/1.0\r\n\r\n").startswith(b"HTTP/1.1 403 ")
 
 
@@ -178,7 +173,7 @@ def test_what_is_no_request_is_refused_and_the_server_goes_on(server, sent):
 
 def test_the_body_of_a_get_is_not_the_next_request(server):
     inner = b"GET /inner HTTP/1.1\r\nHost: localhost\r\n\r\n"
-    outer = b"GET /outer HTTP/1.1\r\nHost: localhost\r\nContent-Length: %d\r\n\r\n" % len(inner)
+    outer = b"GET /outer HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(inner)
     answer = raw(server, outer + inner)
     assert answer.count(b"HTTP/1.1 ") == 1
     assert b"inner" not in answer
@@ -282,41 +277,3 @@ def test_a_closed_server_answers_nobody_who_is_still_connected():
 
     with closing(connection), pytest.raises((http.client.HTTPException, ConnectionError)):
         ask_again()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "head",
-    [b"GET / HTTP/1.1\r\n", b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 90\r\n\r\n"],
-    ids=["head", "body"],
-)
-def test_a_request_that_never_ends_is_given_up(server, monkeypatch, head):
-    """One byte now and then, in the head or in the body, would hold a thread for ever."""
-    monkeypatch.setattr(timed_protocol, "REQUEST_TIMEOUT", 0.4)
-    with socket.create_connection((server.host, server.port), timeout=10) as connection:
-        connection.sendall(head)
-        ended, sent = False, 0
-        while not ended and sent < 100:
-            sent += 1
-            try:
-                connection.sendall(b"x")
-                connection.settimeout(0.05)
-                ended = connection.recv(1000) == b""
-            except TimeoutError:
-                continue
-            except ConnectionError:
-                ended = True
-        assert ended
-
-
-def test_connections_are_counted(server, monkeypatch):
-    monkeypatch.setattr(timed_protocol, "_MOST_CONNECTIONS", 2)
-    with ExitStack() as stack:
-        kept = [stack.enter_context(socket.create_connection((server.host, server.port), timeout=10)) for _ in range(2)]
-        for connection in kept:
-            connection.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
-            assert connection.recv(12).startswith(b"HTTP/1.1")
-        third = stack.enter_context(socket.create_connection((server.host, server.port), timeout=10))
-        third.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
-        with suppress(ConnectionError):
-            assert third.recv(12) == b""

@@ -19,7 +19,7 @@ from lippmann.codecs.types import Pixels
 from lippmann.color.primaries import REC709, xyz_from_rgb
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import PictureError
-from lippmann.runtime.private_files import check_kind
+from lippmann.runtime.regular_file import check_kind
 
 if TYPE_CHECKING:
     from PIL import Image, ImageCms

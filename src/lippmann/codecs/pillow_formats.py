@@ -17,7 +17,7 @@ import numpy as np
 from lippmann.codecs.types import Pixels
 from lippmann.errors import PictureError
 from lippmann.runtime.machine import check_input
-from lippmann.runtime.private_files import check_kind
+from lippmann.runtime.regular_file import check_kind
 
 if TYPE_CHECKING:
     from PIL import Image

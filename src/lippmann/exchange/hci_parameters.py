@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import PictureError
 from lippmann.exchange.cameras import Cameras
-from lippmann.runtime.private_files import check_kind
+from lippmann.runtime.regular_file import check_kind
 
 NAME = "parameters.cfg"
 

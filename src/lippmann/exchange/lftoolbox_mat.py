@@ -29,7 +29,7 @@ from lippmann.exchange.metadata_text import TEXT_KEY, from_note, to_note
 from lippmann.exchange.optional_import import optional
 from lippmann.runtime.atomic_write import replacing
 from lippmann.runtime.machine import check_input
-from lippmann.runtime.private_files import check_kind
+from lippmann.runtime.regular_file import check_kind
 
 LAYOUT = "lftoolbox"
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from lippmann.errors import PictureError
 from lippmann.image.metadata import KEY, Metadata, from_dict, parse_json
-from lippmann.runtime.private_files import check_kind
+from lippmann.runtime.regular_file import check_kind
 
 #: Keyword of the PNG text and name of the MATLAB variable that hold the JSON.
 TEXT_KEY = "lippmann_light_field"

@@ -38,7 +38,7 @@ from lippmann.image.views import (
 from lippmann.image.write import stored_as
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.atomic_write import replacing_folder
-from lippmann.runtime.private_files import check_kind
+from lippmann.runtime.regular_file import check_kind
 
 MANIFEST = "lippmann.json"
 

@@ -25,7 +25,7 @@ from lippmann.image.provenance import Provenance
 from lippmann.image.stored_values import Layer, Stored, Values
 from lippmann.runtime.engine_lock import cached_property
 from lippmann.runtime.machine import check_input
-from lippmann.runtime.private_files import check_kind
+from lippmann.runtime.regular_file import check_kind
 
 #: Largest number of pixels decoded at once; a file that claims more is damaged, or meant to fill the memory.
 MOST_PIXELS = 1 << 29

@@ -1,4 +1,9 @@
-"""Exclusive lock of a journal: one process at a time."""
+"""Exclusive lock of a journal: one process at a time.
+
+The system's lock is that of the journal itself, and the system releases it when a process is killed. The library
+``filelock`` locks a file of its own, which would lie beside each journal; and on file systems without locks it falls
+back to a file that a killed process leaves behind, so that its picture could not be resumed.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +11,12 @@ from pathlib import Path
 from typing import IO
 
 from lippmann.errors import OutputError
-from lippmann.runtime.private_files import open_to_append
 
 
 def locked(path: Path, where: Path) -> IO[bytes]:
     """Open a file for reading and appending, and lock it until it is closed.
 
-    The system releases the lock when the process ends. File systems without locks give an unlocked file.
+    File systems without locks give an unlocked file.
 
     Parameters
     ----------
@@ -25,12 +29,10 @@ def locked(path: Path, where: Path) -> IO[bytes]:
     ------
     OutputError
         If another process holds the lock.
-    ForeignFileError
-        If the file is a link or another user's.
     OSError
         If the file cannot be written.
     """
-    file = open_to_append(path)
+    file = path.open("a+b")
     try:
         import fcntl
     except ImportError:  # a system without such locks: two processes would do the same work twice, with the same result

@@ -2,8 +2,7 @@
 
 ``frames.journal`` begins with the fingerprint of the sequence. Each finished frame adds a line with the check sum of
 its file, after that file is in its place. A line that was cut short ends the journal; its frame is rendered again. The
-journal is written in place: it has to be the user's own file (:mod:`lippmann.runtime.private_files`), and a file with
-another beginning is never changed.
+journal is written in place; a file with another beginning is never changed.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from typing import IO, Any, TypeGuard
 from lippmann.errors import OutputError, PictureError
 from lippmann.journal.file_lock import locked
 from lippmann.journal.fingerprint import differences
-from lippmann.runtime.private_files import ForeignFileError
 
 #: Added to the sequence's name.
 ENDING = ".journal"
@@ -64,12 +62,10 @@ class FrameJournal:
         OutputError
             If another process works on the sequence, or the journal cannot be written.
         PictureError
-            If the journal is of another sequence (names the differences), or the file is no journal of the user's.
+            If the journal is of another sequence (names the differences), or the file is no journal.
         """
         try:
             file = locked(path, path)
-        except ForeignFileError as error:
-            raise _no_journal(path, f"it {error}", error.fix) from error
         except OSError as error:
             raise OutputError(f"cannot be written: {error.strerror or error}", where=str(path)) from error
         try:
@@ -167,12 +163,12 @@ def _head_of(line: bytes, path: Path) -> dict[str, object]:
     return head
 
 
-def _no_journal(path: Path, why: str, fix: str = "") -> PictureError:
+def _no_journal(path: Path, why: str) -> PictureError:
     return PictureError(
         f"this is no journal of an unfinished sequence: {why}",
         where=str(path),
         rule="finished frames are listed under this name",
-        fix=fix or "choose another name for the frames, or move what lies there",
+        fix="choose another name for the frames, or move what lies there",
     )
 
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-import stat
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from lippmann.runtime import private_files
+from lippmann.runtime.atomic_write import NUMBER
 
 JOB, LOCK = "job.json", "lock"
 #: Ending of a tile's file.
@@ -18,9 +17,7 @@ TILE = ".tile"
 _TILE_NAME = re.compile(r"r\d{4,}_c\d{4,}\.tile")
 #: Names that :func:`lippmann.runtime.atomic_write.replacing` gives to files on their way to a tile's or the job's
 #: place, and those of empty files by which a file system is tried.
-_HALF_FILE = re.compile(
-    r"\.(r\d{4,}_c\d{4,}-(?:[0-9a-f]{20}|[0-9a-f]{8})\.part\.tile|job-(?:[0-9a-f]{20}|[0-9a-f]{8})\.part\.json|[0-9a-f]{16}\.part)"
-)
+_HALF_FILE = re.compile(rf"\.(r\d{{4,}}_c\d{{4,}}-{NUMBER}\.part\.tile|job-{NUMBER}\.part\.json|[0-9a-f]{{16}}\.part)")
 
 #: Whether a name is that of a tile.
 IsTile = Callable[[str], bool]
@@ -91,12 +88,8 @@ def clear(folder: Path, tiles: IsTile, unlock: Callable[[], None] | None = None)
 
 
 def _is_part(path: Path, tiles: IsTile) -> bool:
-    """Whether a file is the journal's own: by its name, and as a regular file of the user's. A lock is empty."""
+    """Whether a file is the journal's own: a plain file of such a name. A lock is empty."""
     if path.name not in (JOB, LOCK) and not tiles(path.name) and not _HALF_FILE.fullmatch(path.name):
         return False
-    try:
-        status = os.lstat(path)
-    except OSError:
-        return False
-    is_lock_of_another = path.name == LOCK and status.st_size > 0
-    return stat.S_ISREG(status.st_mode) and not is_lock_of_another and private_files.is_own(path)
+    is_plain = path.is_file() and not path.is_symlink()
+    return is_plain and not (path.name == LOCK and path.stat().st_size > 0)

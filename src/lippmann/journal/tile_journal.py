@@ -5,8 +5,7 @@ tile, and an empty lock file. A tile's file appears whole or not at all and neve
 at any moment is a journal too. Sizes are checked when the folder is opened, check sums when a tile is read; a damaged
 tile is removed and rendered again.
 
-The folder and its files belong to the user alone (:mod:`lippmann.runtime.private_files`); links in their places are not
-followed. A folder of that name that is no journal is refused. Files that are no part of a journal stay.
+A folder of that name that is no journal is refused. Files that are no part of a journal stay.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import stat
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -27,9 +25,7 @@ from lippmann.journal.file_lock import locked
 from lippmann.journal.fingerprint import differences
 from lippmann.journal.journal_folder import JOB, LOCK, TILE, clear, foreign_names, holds_tiles, is_tile, no_tile, sweep
 from lippmann.journal.tile_file import MARK, DamagedTile, TileResult, decode, encode, whole_length
-from lippmann.runtime import private_files
-from lippmann.runtime.atomic_write import pattern_of, replacing
-from lippmann.runtime.private_files import ForeignFileError
+from lippmann.runtime.atomic_write import pattern_of, remove, replacing
 
 #: Added to the picture's name.
 ENDING = ".parts"
@@ -94,22 +90,22 @@ class TileStore:
         OutputError
             If there is a journal and ``resume`` is False, another process works on it, or it cannot be written.
         PictureError
-            If the journal is of another picture (names the differences), or the folder is no journal of the user's.
+            If the journal is of another picture (names the differences), or the folder is no journal.
         """
         folder = journal_of(output)
         _check_name(output, folder)
         job = Job(dict(fingerprint), [grid.width, grid.height, grid.side])
         _is_begun(output, folder, job, resume)  # refuses before anything is created
         with _reported(folder):
-            private_files.make_folder(folder)
-        with _reported(folder, "its lock"):
+            folder.mkdir(exist_ok=True)
+        with _reported(folder):
             lock = locked(folder / LOCK, folder)
         try:
             with _reported(folder):
                 sweep(folder)
             if not _is_begun(output, folder, job, resume):  # again: another process may have begun and ended meanwhile
                 text = json.dumps({_KEY: _VERSION, **job._asdict()}, indent=1, sort_keys=True) + "\n"
-                with replacing(folder / JOB, private=True) as temporary:
+                with replacing(folder / JOB) as temporary:
                     temporary.write_text(text, encoding="utf-8")
             return cls(folder, grid, lock)
         except BaseException:
@@ -137,7 +133,7 @@ class TileStore:
 
     def put_bytes(self, index: int, data: bytes) -> None:
         """Write tile ``index`` as encoded by :func:`lippmann.journal.tile_file.encode`; errors as for :meth:`put`."""
-        with replacing(self._path(index), private=True) as temporary:
+        with replacing(self._path(index)) as temporary:
             temporary.write_bytes(data)
 
     def get(self, index: int) -> TileResult:
@@ -146,23 +142,22 @@ class TileStore:
         Raises
         ------
         DamagedTile
-            If the tile is missing or cannot be read; or it is incomplete, a link or another user's, and is removed.
+            If the tile is missing or cannot be read; or it is incomplete, and is removed.
         """
         path, most = self._path(index), self._most_bytes(index)
         try:
-            with private_files.open_to_read(path) as file:
-                if os.fstat(file.fileno()).st_size > most:
-                    raise DamagedTile("it is larger than its pixels need")
-                result = decode(file.read(), most)
+            if not path.is_file():
+                raise DamagedTile("not found")
+            if path.stat().st_size > most:
+                raise DamagedTile("it is larger than its pixels need")
+            result = decode(path.read_bytes(), most)
             if result.index != index or result.pixels.shape[:2] != self.grid[index].shape:
                 raise DamagedTile("it is another tile")
-        except FileNotFoundError:
-            raise DamagedTile("not found") from None
         except OSError as error:
             raise DamagedTile(f"it cannot be read: {error.strerror or error}") from error
-        except (DamagedTile, ForeignFileError) as error:
+        except DamagedTile:
             self.drop(index)
-            raise DamagedTile(f"it {error}" if isinstance(error, ForeignFileError) else str(error)) from error
+            raise
         return result
 
     def drop(self, index: int) -> None:
@@ -233,20 +228,22 @@ def read_job(output: Path) -> Job | None:
     Raises
     ------
     PictureError
-        If the folder is no journal, one of another version, or not the user's alone.
+        If the folder is no journal, or one of another version.
     OutputError
         If the journal cannot be read.
     """
     folder = journal_of(output)
     try:
         with _reported(folder, read=True):
-            if not private_files.check_folder(folder):
+            if not os.path.lexists(folder):
                 return None
-            if not os.path.lexists(folder / JOB):
+            if not folder.is_dir():
+                raise _no_journal(folder, "it is no folder")
+            if not (folder / JOB).exists():
                 if foreign := foreign_names(folder, no_tile):
                     raise _no_journal(folder, f"it holds {foreign[0]!r} and no {JOB}")
                 return None  # of a run that ended before it wrote its job
-        with _reported(folder, f"its {JOB}", read=True), private_files.open_to_read(folder / JOB) as file:
+        with _reported(folder, read=True), (folder / JOB).open("rb") as file:
             job = json.loads(file.read(_MOST_JOB))
     except (ValueError, RecursionError) as error:
         raise _no_journal(folder, f"it has no readable {JOB}") from error
@@ -276,20 +273,17 @@ def _check_name(output: Path, folder: Path) -> None:
 
 
 def sweep_beside(output: Path) -> None:
-    """Remove temporary files of killed writers of ``output``; to be called only while its journal is locked.
-
-    Files of other users stay, since those may be working in the same folder.
-    """
+    """Remove temporary files of killed writers of ``output``; to be called only while its journal is locked."""
     place = output.resolve()
     # The names that lippmann.runtime.atomic_write and TileStore.finish give to what is on its way.
     half, old = pattern_of(place), re.compile(rf"\.{re.escape(place.name + ENDING)}-[0-9a-f]{{8}}\.old")
     with suppress(OSError):  # a folder that cannot be listed keeps them
         for name in os.listdir(place.parent):
             path = place.with_name(name)
-            if old.fullmatch(name) and stat.S_ISDIR(os.lstat(path).st_mode) and private_files.is_own(path):
+            if old.fullmatch(name) and path.is_dir():
                 clear(path, is_tile)
             elif half.fullmatch(name) or old.fullmatch(name):
-                private_files.remove(path)
+                remove(path)
 
 
 def _is_begun(output: Path, folder: Path, job: Job, resume: bool) -> bool:
@@ -321,12 +315,12 @@ def _put_away(folder: Path) -> str:
     return f"move {folder} away" if foreign_names(folder, is_tile) else f"delete {folder}"
 
 
-def _no_journal(folder: Path, why: str, fix: str = "") -> PictureError:
+def _no_journal(folder: Path, why: str) -> PictureError:
     return PictureError(
         f"this is no journal of an unfinished picture: {why}",
         where=str(folder),
         rule="finished tiles are kept under this name",
-        fix=fix or "choose another name for the picture, or move what lies there",
+        fix="choose another name for the picture, or move what lies there",
     )
 
 
@@ -336,27 +330,26 @@ def _is_whole(path: Path, most: int) -> bool:
     Interrupted copies and crashed disks cut files off.
     """
     try:
-        with private_files.open_to_read(path) as file:
-            size = os.fstat(file.fileno()).st_size
-            return size <= most and whole_length(file.read(len(MARK) + 12)) == size
-    except (OSError, ForeignFileError):
+        size = path.stat().st_size if path.is_file() else most + 1
+        if size > most:
+            return False
+        with path.open("rb") as file:
+            return whole_length(file.read(len(MARK) + 12)) == size
+    except OSError:
         return False
 
 
 class _reported:  # noqa: N801 - reads as a statement
-    """Turn an :class:`OSError` about the journal into an :class:`OutputError`, a foreign file into a line about it."""
+    """Turn an :class:`OSError` about the journal into an :class:`OutputError`."""
 
-    def __init__(self, folder: Path, thing: str = "it", *, read: bool = False) -> None:
+    def __init__(self, folder: Path, *, read: bool = False) -> None:
         self._folder = folder
-        self._thing = thing
         self._done = "read" if read else "written"
 
     def __enter__(self) -> None:
         return None
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, ForeignFileError):
-            raise _no_journal(self._folder, f"{self._thing} {error}", error.fix) from error
         if isinstance(error, OSError):
             reason = error.strerror or str(error)
             raise OutputError(f"cannot be {self._done}: {reason}", where=str(self._folder)) from error

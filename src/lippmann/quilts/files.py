@@ -27,7 +27,7 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import MOST_SIDE, Quilt, QuiltLayout, check_size, layout_of_name, names_layout
 from lippmann.quilts.quilt_metadata import metadata_of_text, quilt_text
 from lippmann.runtime.atomic_write import replacing_folder
-from lippmann.runtime.private_files import check_kind
+from lippmann.runtime.regular_file import check_kind
 
 #: Endings of the picture files that are read; JPEG is not written.
 _JPEG = (".jpg", ".jpeg")

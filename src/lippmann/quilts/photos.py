@@ -25,7 +25,7 @@ from lippmann.errors import PictureError, UsageError
 from lippmann.image.read import MOST_PIXELS
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import Quilt, QuiltLayout
-from lippmann.runtime.private_files import check_kind
+from lippmann.runtime.regular_file import check_kind
 
 if TYPE_CHECKING:
     from PIL import Image

@@ -3,9 +3,8 @@
 A file or folder is written under a temporary name beside its path, flushed to disk, and renamed. A failure (full disk,
 error in the writer, Ctrl-C) leaves the path as it was.
 
-Temporary names hold random digits and are created exclusively, so that no link can be planted under them. What a killed
-writer left under such a name is removed by the next one (:func:`sweep`). In a folder
-without a sticky bit that other users may write to, these can still replace temporary files, as they can the output.
+What a killed writer left under such a name is removed by the next one (:func:`sweep`).
+``tempfile`` names them no better: its files are their owner's alone, and here they get the permissions of an output.
 """
 
 from __future__ import annotations
@@ -26,9 +25,7 @@ from pathlib import Path
 
 from lippmann.errors import OutputError
 from lippmann.printable import one_line
-from lippmann.runtime import private_files
 from lippmann.runtime.folder_list import CONTENTS_FILE, listed, write_list
-from lippmann.runtime.private_files import FILE_MODE, without_following
 
 #: Bytes of a name that are kept.
 _KEPT = 64
@@ -36,8 +33,8 @@ _KEPT = 64
 #: What names of files cannot hold.
 _NOT_ON_DISK = dict.fromkeys(map(ord, '/\\:*?"<>|' if os.name == "nt" else "/"), "_")
 
-#: The number, for patterns: machine, process, random digits; or what older versions wrote.
-NUMBER = r"(?:[0-9a-f]{20}|[0-9a-f]{8})"
+#: The number, for patterns: machine, process, random digits.
+NUMBER = "[0-9a-f]{20}"
 
 
 def temporary_file(place: Path) -> Path:
@@ -58,13 +55,13 @@ def pattern_of(place: Path) -> re.Pattern[str]:
 
 
 def sweep(place: Path) -> None:
-    """Remove what writers of ``place`` left that ran on this machine and are no more; what other users left stays."""
+    """Remove what writers of ``place`` left that ran on this machine and are no more."""
     pattern = pattern_of(place)
     with suppress(OSError):  # a folder that cannot be listed keeps them
         for name in os.listdir(place.parent):
             match = pattern.fullmatch(name)
             if match and _is_dead(match["number"] or match["other"]):
-                private_files.remove(place.with_name(name))
+                remove(place.with_name(name))
 
 
 @contextmanager
@@ -87,13 +84,22 @@ def scratch_folder(prefix: str, above: str | None = None) -> Iterator[str]:
     with suppress(OSError):
         for name in os.listdir(above):
             if name.startswith(prefix) and _is_dead(name.removeprefix(prefix)[:20]):
-                private_files.remove(Path(above, name))
+                remove(Path(above, name))
     with tempfile.TemporaryDirectory(prefix=f"{prefix}{_number()}-", dir=above, ignore_cleanup_errors=True) as folder:
         yield folder
 
 
+def remove(path: Path) -> None:
+    """Remove a file, a link or a folder; errors are ignored, links are not followed."""
+    with suppress(OSError):
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink()
+
+
 def _is_dead(number: str) -> bool:
-    if not re.fullmatch("[0-9a-f]{20}", number) or not number.startswith(_machine()):
+    if not re.fullmatch(NUMBER, number) or not number.startswith(_machine()):
         return False
     import psutil
 
@@ -137,7 +143,7 @@ _REASONS = {
 
 
 @contextmanager
-def replacing(path: Path, *, private: bool = False) -> Iterator[Path]:
+def replacing(path: Path) -> Iterator[Path]:
     """Write a file atomically: yield a temporary path, which is renamed to ``path`` when the block succeeds.
 
     The temporary file has the same suffix and exists already, empty, with the permissions of the file that it replaces,
@@ -147,9 +153,6 @@ def replacing(path: Path, *, private: bool = False) -> Iterator[Path]:
     ----------
     path:
         The file. A symbolic link is followed: its target is replaced.
-    private:
-        For file names that the program chooses in a folder of its own: only the user may read the file, and a symbolic
-        link is itself replaced.
 
     Raises
     ------
@@ -157,13 +160,12 @@ def replacing(path: Path, *, private: bool = False) -> Iterator[Path]:
         If ``path`` cannot be written, or the block raises an :class:`OSError` about the temporary file. Other
         exceptions pass through.
     """
-    place = path.absolute() if private else _place(path)
+    place = _place(path)
     temporary = temporary_file(place)
     with _reported(path, temporary):
-        if not private:
-            sweep(place)
+        sweep(place)
         try:
-            _create(temporary, like=None if private else place)
+            _create(temporary, like=place)
             yield temporary
             _flush(temporary)
             os.replace(temporary, place)
@@ -193,13 +195,12 @@ def replacing_folder(path: Path) -> Iterator[Path]:
     with _reported(path, temporary):
         sweep(place)
         try:
-            mode = _make_folder(temporary)
+            temporary.mkdir()
             yield temporary
             names = sorted(_files(temporary))
             write_list(temporary, names)
             for name in (*names, CONTENTS_FILE):
                 _flush(temporary / name)
-            _set_mode(temporary, mode)
             _refuse_foreign_files(place, path)  # again: the block may have taken hours
             _exchange(temporary, place)
             _flush_folder(place.parent)
@@ -261,13 +262,13 @@ def _mode(path: Path) -> int | None:
         return None
 
 
-def _create(temporary: Path, *, like: Path | None) -> None:
-    """Create an empty file with the permissions of ``like``, else the default ones; private if ``like`` is None."""
-    replaces = like is not None and like.exists()
-    mode = FILE_MODE if like is None or replaces else 0o666  # less the user's umask
-    descriptor = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY | without_following(), mode)
+def _create(temporary: Path, *, like: Path) -> None:
+    """Create an empty file with the permissions of ``like``, else the default ones."""
+    replaces = like.exists()
+    mode = 0o600 if replaces else 0o666  # less the user's umask
+    descriptor = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode)
     try:
-        if like is not None and replaces:
+        if replaces:
             if not os.access(like, os.W_OK):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
             os.chmod(descriptor if os.chmod in os.supports_fd else temporary, stat.S_IMODE(like.stat().st_mode))
@@ -278,24 +279,9 @@ def _create(temporary: Path, *, like: Path | None) -> None:
         os.close(descriptor)
 
 
-def _make_folder(temporary: Path) -> int:
-    """Create a folder that is private while it is written; the permissions that it gets afterwards."""
-    temporary.mkdir()
-    mode = stat.S_IMODE(temporary.stat().st_mode)
-    _set_mode(temporary, mode & ~0o077)
-    if os.listdir(temporary):  # a user of the same group wrote to it before the previous line
-        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(temporary))
-    return mode
-
-
-def _set_mode(folder: Path, mode: int) -> None:
-    with suppress(OSError):  # some file systems keep no permissions
-        folder.chmod(mode)
-
-
 def _flush(path: Path) -> None:
     """Flush ``path`` to disk, so that a crash after the rename cannot leave an empty file."""
-    descriptor = os.open(path, os.O_RDONLY | without_following())
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     except OSError as error:

@@ -1,7 +1,6 @@
-"""Shared libraries as files, without loading them: ELF, Mach-O (macOS) and PE (Windows); and where LLVM may lie.
+"""What a shared library of Linux calls itself, read from its ELF file without loading it; and where LLVM may lie.
 
-Sources of the formats: System V ABI, "Object Files" and "Dynamic Linking"; Apple's ``mach-o/loader.h`` and
-``mach-o/fat.h``; Microsoft, "PE Format".
+Source of the format: System V ABI, "Object Files" and "Dynamic Linking".
 """
 
 from __future__ import annotations
@@ -15,56 +14,28 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
 # ELF: kinds of segments (PT_LOAD, PT_DYNAMIC) and of entries of the dynamic section (DT_STRTAB, DT_SONAME).
 _LOADED_SEGMENT, _DYNAMIC_SEGMENT = 1, 2
 _STRINGS_ENTRY, _NAME_ENTRY = 5, 14
 
-# Mach-O: a 64-bit file, several of them in one, a shared library (MH_DYLIB), its name (LC_ID_DYLIB), processors.
-_MACH_O, _MACH_O_FAT, _MACH_O_LIBRARY, _MACH_O_NAME = 0xFEEDFACF, 0xCAFEBABE, 6, 0xD
-_MACH_O_PROCESSORS = {"x86_64": 0x01000007, "arm64": 0x0100000C}
-_MOST_SLICES, _MOST_COMMANDS = 16, 1000
-
-# PE: 64-bit optional header, and the flag of a library (IMAGE_FILE_DLL).
-_PE_64_BITS, _PE_LIBRARY = 0x20B, 0x2000
-
 _Read = Callable[[int, int], bytes]
 
 
-class LibraryName(NamedTuple):
-    """What a library calls itself.
-
-    Attributes
-    ----------
-    name:
-        The name that the linker gave it (ELF ``SONAME``, Mach-O install name); else the name of its file.
-    version:
-        The version in its header, such as ``(19, 1, 7)``; empty where the format or the file holds none.
-    """
-
-    name: str
-    version: tuple[int, ...] = ()
-
-
-def name_of(
-    path: Path, system: str = sys.platform, *, python: Path | None = None, processor: str | None = None
-) -> LibraryName:
-    """The name and version that a shared library states.
+def elf_name(path: Path, python: Path | None = None) -> str:
+    """The name that the linker gave a library (``SONAME``), else that of its file.
 
     Parameters
     ----------
     path:
         The file.
-    system:
-        ``sys.platform`` of the machine: ``linux``, ``darwin`` or ``win32``; another one has ELF files.
-    python, processor:
-        The program that is to load the library, and ``platform.machine()``; by default the running ones.
+    python:
+        The program that is to load the library; by default the running one.
 
     Raises
     ------
     ValueError, struct.error
-        If the file is no 64-bit shared library of the system's format for this processor, or a damaged one.
+        If the file is no 64-bit shared library for this processor, or a damaged one.
     OSError
         If a file cannot be read.
     """
@@ -78,11 +49,7 @@ def name_of(
             file.seek(offset)
             return file.read(size)
 
-        if system == "darwin":
-            return _mach_o_name(read, path, processor or platform.machine())
-        if system == "win32":
-            return _pe_name(read, path, python)
-        return LibraryName(_elf_name(read, path, length, python))
+        return _elf_name(read, path, length, python)
 
 
 def _elf_name(read: _Read, path: Path, length: int, python: Path) -> str:
@@ -103,58 +70,6 @@ def _elf_name(read: _Read, path: Path, length: int, python: Path) -> str:
         raise ValueError("the name lies outside the file")
     start = address - load[3] + load[2]
     return _text(read(start, min(256, length - start)))
-
-
-def _mach_o_name(read: _Read, path: Path, processor: str) -> LibraryName:
-    wanted = _MACH_O_PROCESSORS.get(processor)
-    start = 0
-    if struct.unpack(">I", read(0, 4))[0] == _MACH_O_FAT:
-        count = struct.unpack(">I", read(4, 4))[0]
-        if count > _MOST_SLICES:
-            raise ValueError("more processors than there are")
-        slices = [struct.unpack(">IIIII", read(8 + 20 * i, 20)) for i in range(count)]
-        start = next((s[2] for s in slices if s[0] == wanted), 0)
-    magic, kind, _, file_type, count, _ = struct.unpack("<6I", read(start, 24))
-    if magic != _MACH_O or kind != wanted or file_type != _MACH_O_LIBRARY or count > _MOST_COMMANDS:
-        raise ValueError("not a 64-bit library for this processor")
-    offset = start + 32
-    for _ in range(count):
-        command, size = struct.unpack("<II", read(offset, 8))
-        if command == _MACH_O_NAME:
-            name_at, _, packed, _ = struct.unpack("<4I", read(offset + 8, 16))
-            name = _text(read(offset + name_at, max(0, size - name_at)) + b"\0")
-            version = packed >> 16, packed >> 8 & 0xFF, packed & 0xFF
-            return LibraryName(name.rpartition("/")[2] or path.name, version if packed >> 16 > 1 else ())
-        if size < 8:
-            raise ValueError("a command without a length")
-        offset += size
-    return LibraryName(path.name)
-
-
-def _pe_name(read: _Read, path: Path, python: Path) -> LibraryName:
-    machine, flags = _pe_header(read)
-    with python.open("rb") as file:
-
-        def read_python(offset: int, size: int) -> bytes:
-            file.seek(offset)
-            return file.read(size)
-
-        wanted, _ = _pe_header(read_python)
-    if machine != wanted or not flags & _PE_LIBRARY:
-        raise ValueError("not a 64-bit library for this processor")
-    return LibraryName(path.name)
-
-
-def _pe_header(read: _Read) -> tuple[int, int]:
-    """Machine code and flags of a 64-bit PE file."""
-    if read(0, 2) != b"MZ":
-        raise ValueError("not a PE file")
-    at = struct.unpack("<I", read(60, 4))[0]
-    head = read(at, 26)
-    if head[:4] != b"PE\0\0" or struct.unpack_from("<H", head, 24)[0] != _PE_64_BITS:
-        raise ValueError("not a 64-bit PE file")
-    machine, flags = struct.unpack_from("<H", head, 4)[0], struct.unpack_from("<H", head, 22)[0]
-    return machine, flags
 
 
 def _text(data: bytes) -> str:

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from lippmann.errors import EngineError
 from lippmann.runtime.child_python import python_command
-from lippmann.runtime.library_file import VERSION_IN_NAME, Host, name_of
+from lippmann.runtime.library_file import VERSION_IN_NAME, Host, elf_name
 from lippmann.runtime.llvm_install import remedy
 
 #: Environment variable with the path of Dr.Jit's library; users may set it to force one.
@@ -97,7 +97,8 @@ def inspect(path: Path) -> Library:
     if path.is_dir():
         return Library(path, problem="is a folder, not a library")
     try:
-        name, stated = name_of(path)
+        # A system without ELF files: what their names do not say is asked of the libraries.
+        name = path.name if sys.platform in ("darwin", "win32") else elf_name(path)
     except FileNotFoundError:
         return Library(path, problem="not found")
     except OSError as error:
@@ -105,7 +106,7 @@ def inspect(path: Path) -> Library:
     except (ValueError, struct.error):
         return Library(path, problem="is not a shared library, or a damaged one")
     match = VERSION_IN_NAME.match(name)
-    version = tuple(int(part) for part in match[1].split(".")) if match else stated or _ask(path)
+    version = tuple(int(part) for part in match[1].split(".")) if match else _ask(path)
     if not version:
         return Library(path, problem="is not an LLVM library, or cannot be loaded")
     if version[0] < OLDEST:

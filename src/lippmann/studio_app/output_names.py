@@ -13,7 +13,6 @@ from lippmann.journal.file_lock import locked
 from lippmann.journal.frame_journal import ENDING as FRAMES_ENDING
 from lippmann.journal.tile_journal import journal_of, read_job
 from lippmann.runtime.atomic_write import disk_name
-from lippmann.runtime.private_files import ForeignFileError
 
 #: Bytes of a name without its number and ending: endings of journals and temporary files are added to it.
 _MOST_STEM = 150
@@ -93,7 +92,7 @@ def _claim(output: Path) -> OutputClaim | None:
     file = _claim_file(output)
     try:
         lock = locked(file, output)
-    except (OutputError, ForeignFileError):  # held by another studio, perhaps by that of another user
+    except OutputError:  # held by another studio
         return None
     except OSError as error:
         raise OutputError(f"cannot be written: {error.strerror or error}", where=str(output)) from None

@@ -22,7 +22,7 @@ from typing import Any
 from lippmann.errors import UsageError
 from lippmann.options.option import default_of, options_of
 from lippmann.options.texts import from_plain, toml_of
-from lippmann.runtime.private_files import check_kind
+from lippmann.runtime.regular_file import check_kind
 from lippmann.studio_app.state import FILES, StudioState
 
 if sys.version_info >= (3, 11):

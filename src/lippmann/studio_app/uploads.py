@@ -18,7 +18,6 @@ import anyio
 from starlette.requests import ClientDisconnect, Request
 
 from lippmann.errors import SceneError
-from lippmann.runtime import private_files
 from lippmann.runtime.atomic_write import disk_name, reason_and_fix, sweep, temporary_folder
 from lippmann.scene.readers.load import unknown_kind
 from lippmann.studio_app.dropped_scene import ENVIRONMENTS, main_file
@@ -106,9 +105,9 @@ class Uploads:
         is_new = False
         part = temporary_folder(self._folder / "drop")
         try:
-            private_files.make_folder(self._folder)
+            self._folder.mkdir(mode=0o700, exist_ok=True)
             sweep(self._folder / "drop")
-            part.mkdir(mode=private_files.FOLDER_MODE)
+            part.mkdir()
             body = _Body(request.stream())
             if name:
                 names, sizes = [name], [length]
@@ -130,7 +129,7 @@ class Uploads:
             if not folder.is_dir():
                 part.rename(folder)
                 is_new = True
-        except (OSError, ClientDisconnect, private_files.ForeignFileError) as error:
+        except (OSError, ClientDisconnect) as error:
             raise _refusal(error) from None
         finally:
             shutil.rmtree(part, ignore_errors=True)
@@ -215,8 +214,6 @@ def _refusal(error: Exception) -> Exception:
         return ConnectionAbortedError()
     if isinstance(error, FileExistsError):
         return RefusedError(HTTPStatus.BAD_REQUEST, "two of the files have the same name")
-    if isinstance(error, private_files.ForeignFileError):
-        return RefusedError(HTTPStatus.INSUFFICIENT_STORAGE, f"the folder for dropped files {error}")
     assert isinstance(error, OSError)
     said = "; ".join(filter(None, reason_and_fix(error)))
     return RefusedError(HTTPStatus.INSUFFICIENT_STORAGE, f"the file cannot be kept: {said}")

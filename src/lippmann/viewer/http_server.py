@@ -16,12 +16,13 @@ from lippmann.viewer.request_guard import Application, RequestGuard
 from lippmann.viewer.responses import Site
 from lippmann.viewer.secret_folder import SecretFolder
 from lippmann.viewer.site_application import site_application
-from lippmann.viewer.timed_protocol import IDLE_TIMEOUT, TimedProtocol
 
 LOOPBACK = "127.0.0.1"
 
 #: Limit on a message that a page sends by WebSocket, in bytes.
 _MAX_MESSAGE = 1 << 16
+#: Seconds after which an idle connection is closed.
+_IDLE_TIMEOUT = 60
 #: Seconds until open connections are ended by force when a server is closed, and until its thread is left alone.
 _GRACE, _PATIENCE = 1, 5.0
 
@@ -71,7 +72,7 @@ class WebServer:
         self._server = uvicorn.Server(
             uvicorn.Config(
                 RequestGuard(application, host, framed_by),
-                http=TimedProtocol,
+                http="h11",
                 ws=WebSocketsSansIOProtocol,
                 ws_max_size=_MAX_MESSAGE,
                 ws_per_message_deflate=False,  # pictures do not get smaller
@@ -82,7 +83,7 @@ class WebServer:
                 access_log=False,
                 server_header=False,
                 proxy_headers=False,
-                timeout_keep_alive=IDLE_TIMEOUT,
+                timeout_keep_alive=_IDLE_TIMEOUT,
                 timeout_graceful_shutdown=_GRACE,
             )
         )

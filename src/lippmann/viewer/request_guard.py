@@ -28,9 +28,6 @@ Application = Callable[[Scope, Receive, Send], Awaitable[None]]
 #: Headers of a request at most, and bytes of them with the path; browsers send about twenty.
 _MOST_HEADERS, _MOST_HEAD_BYTES = 100, 1 << 15
 
-#: Seconds that a client has to take a part of a response.
-_SEND_TIMEOUT = 60.0
-
 _METHODS = ("GET", "HEAD", "POST")
 
 _HEADERS = {
@@ -99,7 +96,7 @@ class RequestGuard:
 
 
 class _Sender:
-    """``send`` of ASGI with the headers of every response and a limit of time for a client that takes nothing."""
+    """``send`` of ASGI with the headers of every response."""
 
     def __init__(self, send: Send, framed_by: tuple[str, ...]) -> None:
         self._send = send
@@ -112,7 +109,7 @@ class _Sender:
             extra = [(n.encode(), v.encode()) for n, v in _HEADERS.items() if n.lower().encode() not in named]
             message = {**message, "headers": _embeddable([*message["headers"], *extra], self._framed_by)}
         self.has_begun = True
-        await asyncio.wait_for(self._send(message), _SEND_TIMEOUT)
+        await self._send(message)
 
 
 def _embeddable(headers: list[tuple[bytes, bytes]], framed_by: tuple[str, ...]) -> list[tuple[bytes, bytes]]:

@@ -17,7 +17,7 @@ import numpy as np
 from lippmann.errors import UsageError
 from lippmann.image.picture import Picture
 from lippmann.image.stored_values import FloatArray
-from lippmann.runtime.private_files import check_kind
+from lippmann.runtime.regular_file import check_kind
 from lippmann.viewing.replay import Eye, Filter, checked_eye, default_eye, replay
 
 #: How a pair becomes one picture: side by side at full or half width, or for red-cyan glasses.

@@ -49,7 +49,7 @@ from lippmann.display.formats.print_sheet import print_of_texts
 from lippmann.display.formats.recorded_depth import default_aperture
 from lippmann.display.validation import MILLIMETRES, Arguments, length, positive, stripe
 from lippmann.errors import DisplayError
-from lippmann.runtime.private_files import check_kind
+from lippmann.runtime.regular_file import check_kind
 
 #: Kinds of displays, before the colon.
 KINDS = ("print", "monitor")

@@ -19,7 +19,7 @@ from lippmann.codecs.orientation import as_stored, of_picture
 from lippmann.codecs.pillow_formats import RULE, codes_of, is_allowed, open_picture
 from lippmann.errors import MemoryLimitError, PictureError, SceneError
 from lippmann.runtime.machine import check_input
-from lippmann.runtime.private_files import check_kind
+from lippmann.runtime.regular_file import check_kind
 from lippmann.scene.values.description import Image
 
 if TYPE_CHECKING:

@@ -107,12 +107,8 @@ def test_what_takes_more_memory_than_allowed_is_refused(read):
         f'def Mesh "m" {{\npoint3f[] points = {points}\nint[] faceVertexCounts = {[4] * len(faces)}\n'
         f"int[] faceVertexIndices = [{corners}]\n}}\n"
     )
-    try:
-        limit_inputs(400 << 20)
-        with pytest.raises(MemoryLimitError, match="refined, takes"):
-            read(body)
-    finally:
-        limit_inputs(None)
+    with limit_inputs(400 << 20), pytest.raises(MemoryLimitError, match="refined, takes"):
+        read(body)
 
 
 @pytest.mark.slow

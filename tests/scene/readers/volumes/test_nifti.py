@@ -105,12 +105,8 @@ def test_damaged_files_are_refused_in_one_line(tmp_path):
 def test_what_unpacks_to_more_than_the_memory_is_refused(tmp_path):
     save_nifti(tmp_path / "a.nii.gz", np.zeros((300, 300, 300), np.int16))
     assert (tmp_path / "a.nii.gz").stat().st_size < 1 << 20
-    limit_inputs(40 << 20)
-    try:
-        with pytest.raises(LippmannError, match="300 x 300 x 300 voxels"):
-            load_scene(tmp_path / "a.nii.gz")
-    finally:
-        limit_inputs(None)
+    with limit_inputs(40 << 20), pytest.raises(LippmannError, match="300 x 300 x 300 voxels"):
+        load_scene(tmp_path / "a.nii.gz")
 
 
 def test_without_the_library_the_line_says_how_to_get_it(tmp_path, monkeypatch):

@@ -6,7 +6,7 @@ import socket
 import pytest
 
 from lippmann.errors import SceneError
-from lippmann.runtime.private_files import check_kind, other_kind
+from lippmann.runtime.regular_file import check_kind, other_kind
 
 
 def test_files_and_nothing_are_no_other_kind(tmp_path):
