@@ -34,14 +34,14 @@ Denoise, *pooled* shares its light as well.
 
 
 def _few(few: dict[str, Any]) -> str:
-    """How far off estimates of very few samples are: what their margins rest on."""
+    """How far off estimates of very few samples are: why goals wait for more."""
     rows = [
-        f"| {samples} | {one['psnr']:.1f} dB | {one['worst']:.1f} dB | {one['margin']:g} dB | {one['pictures']} |"
+        f"| {samples} | {one['psnr']:.1f} dB | {one['worst']:.1f} dB | {one['pictures']} |"
         for samples, one in few["summary"].items()
     ]
-    head = """With fewer than 16 samples plain pictures are trusted only beyond a margin. By how much what they say of
-themselves was too good, at most:
+    head = """Goals do not trust plain pictures of fewer than 16 samples. By how much what they say of themselves was
+too good, at most:
 
-| samples | PSNR | worst micro-image | margin | pictures |
-|---|---|---|---|---|"""
+| samples | PSNR | worst micro-image | pictures |
+|---|---|---|---|"""
     return "\n".join([head, *rows]) + "\n"

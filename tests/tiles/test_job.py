@@ -103,8 +103,9 @@ def test_tiles_hold_what_the_file_will(engine):
 
 @pytest.mark.parametrize("layout", ["lenticular", "square", "hexagonal"])
 def test_the_sums_of_tiles_give_the_estimate_of_the_whole(engine, layout):
-    from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, ErrorSums, PixelErrors
-    from lippmann.rendering.estimate.psnr import PictureEstimator, estimate_of_sums
+    from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
+    from lippmann.rendering.estimate.pixel_errors import ErrorSums, PixelErrors
+    from lippmann.rendering.estimate.psnr import estimate_plain
     from lippmann.tiles.tile_render import LENSES, SUMS, lens_sums
 
     display = Display("test", Panel(90, 70, 0.25), LensArray(layout, 1.9), gap=6.8, aperture_distance=5.0)
@@ -113,12 +114,12 @@ def test_the_sums_of_tiles_give_the_estimate_of_the_whole(engine, layout):
     grid = display.lens_grid
     sums = ErrorSums.none(grid.rows * grid.columns)
     for window in TileGrid(90, 70, 32):
-        errors = PixelErrors(values[window.slices], outliers[window.slices] * 0.5, OWN_NOISE)
+        errors = PixelErrors(values[window.slices], outliers[window.slices] * 0.5)
         found = lens_sums(display, window, errors)
         for name in SUMS:
             getattr(sums, name)[found[LENSES]] += found[name]
-    whole = PictureEstimator(display).estimate(PixelErrors(values, outliers * 0.5, OWN_NOISE))
-    assert estimate_of_sums(sums, (grid.rows, grid.columns), OWN_NOISE).to_dict() == whole.to_dict()
+    whole = PictureEstimator(display).estimate(PixelErrors(values, outliers * 0.5), 64)
+    assert estimate_plain(sums, (grid.rows, grid.columns)).to_dict() == whole.to_dict()
 
 
 # ---- What a job is made of -------------------------------------------------------------------------------------

@@ -192,13 +192,13 @@ def test_an_interrupted_run_gives_the_same_file(settings, ending, tmp_path, monk
 
 @pytest.mark.usefixtures("engine")
 def test_the_sums_of_tiles_give_the_estimate_of_the_whole():
-    from lippmann.rendering.estimate.denoised_psnr import DenoisedEstimator, estimate_denoised
-    from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, OWN_NOISE, ErrorSums, PixelErrors
+    from lippmann.rendering.estimate.denoised_psnr import PictureEstimator, estimate_denoised
+    from lippmann.rendering.estimate.pixel_errors import ErrorSums, PixelErrors
     from lippmann.tiles.tile_render import LENSES, OF_SAMPLES, SUMS, lens_sums
 
     random = np.random.default_rng(0)
     values, noisy, outliers, apart = (random.exponential(0.01, (128, 128)).astype(np.float32) for _ in range(4))
-    errors = PixelErrors(values - 0.005, None, CROSS_NOISE, PixelErrors(noisy, outliers * 0.1, OWN_NOISE), apart * 0.1)
+    errors = PixelErrors(values - 0.005, None, PixelErrors(noisy, outliers * 0.1), apart * 0.1)
     made, lenses = job(DENOISED), DISPLAY.lens_grid
     sums = {before: ErrorSums.none(lenses.columns) for before in ("", OF_SAMPLES)}
     for window in made.grid:
@@ -206,7 +206,7 @@ def test_the_sums_of_tiles_give_the_estimate_of_the_whole():
         for before, each in sums.items():
             for name in SUMS:
                 getattr(each, name)[found[LENSES]] += found[before + name]
-    whole = DenoisedEstimator(DISPLAY).estimate(errors)
+    whole = PictureEstimator(DISPLAY).estimate(errors, 64)
     assert estimate_denoised(sums[""], sums[OF_SAMPLES], (1, lenses.columns)).to_dict() == whole.to_dict()
 
 

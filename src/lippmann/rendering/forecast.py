@@ -351,8 +351,6 @@ def _denoise_seconds(session: Session, source: DisplayRays | WindowRays, placeme
 
 def _working_bytes(source: DisplayRays | WindowRays, session: Session) -> int:
     """What batches, wavefront and denoiser take at the peak, see :mod:`~lippmann.rendering.film.sample_batches`."""
-    from lippmann.rendering.film.sample_batches import MOST_BATCHES
-
     request, limit = session.request, session.memory
     pixels = source.width * source.height * (3 if request.keeps_colors(source.display) else 1)
     lanes = cut_wavefronts(source.width, source.height, request.samples, channels=source.channels, memory=limit).lanes
@@ -360,11 +358,11 @@ def _working_bytes(source: DisplayRays | WindowRays, session: Session) -> int:
     if why_no_estimate(request) is not None:
         kept = 0
     elif request.denoises:
-        kept = pixels * memory_model.batches(MOST_BATCHES)
+        kept = pixels * memory_model.batches(memory_model.MOST_BATCHES)
     else:
         # Batches are kept for a band of rows only, of half of what the picture leaves.
         left = limit - pixels * (memory_model.PICTURE + memory_model.ERROR_MAPS)
-        kept = min(pixels * memory_model.batches(MOST_BATCHES), max(0, left) // 2)
+        kept = min(pixels * memory_model.batches(memory_model.MOST_BATCHES), max(0, left) // 2)
     if request.denoises:
         kept += min(pixels * memory_model.DENOISER, memory_model.DENOISER_MOST)
     return min(kept + wave, limit)

@@ -4,25 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from lippmann.rendering.estimate.psnr import FEWEST_AMONG_MIRRORS, Estimate, stated_among_mirrors
+from lippmann.rendering.estimate.psnr import Estimate
+from lippmann.rendering.estimate.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
 
 
-def stated_error(estimate: Estimate | None, samples: int, choices: Mapping[str, object]) -> dict[str, object] | None:
+def stated_error(estimate: Estimate | None, choices: Mapping[str, object]) -> dict[str, object] | None:
     """The estimate as files hold it; None where light is missing that no difference between samples tells of.
 
     Parameters
     ----------
     estimate:
         None where there is none.
-    samples:
-        Of each pixel.
     choices:
         What was chosen for the picture, by the names of its options, and found: ``caustics`` here.
     """
     if estimate is None or _misses_caustics(choices):
         return None
-    return (stated_among_mirrors(estimate, samples) if is_among_mirrors(choices) else estimate).to_dict()
+    return estimate.to_dict()
 
 
 def is_among_mirrors(choices: Mapping[str, object]) -> bool:
@@ -36,7 +35,7 @@ def is_among_mirrors(choices: Mapping[str, object]) -> bool:
 def light_notes(
     request: RenderRequest, estimate: Estimate | None, samples: int, choices: Mapping[str, object]
 ) -> tuple[str, ...]:
-    """Sentences on the light of a picture that was made by ``request``; the rest as of :func:`stated_error`."""
+    """Sentences on the light of a picture that was made by ``request``; ``samples`` are those of each pixel."""
     notes = []
     if request.exposure == "auto" and "exposure" in choices:
         notes.append(f"exposure {choices['exposure']:+.2f} EV: physical light, its median at mid-grey")
@@ -48,10 +47,10 @@ def light_notes(
             "no estimate of the error: paths hardly find what mirrors, glass or gloss throw onto other surfaces from "
             "emitters as small as here; photons bring it (caustics)"
         )
-    if estimate is not None and samples < FEWEST_AMONG_MIRRORS and is_among_mirrors(choices):
+    if estimate is not None and samples < TUNING.few_among_mirrors and is_among_mirrors(choices):
         notes.append(
-            f"fewer than {FEWEST_AMONG_MIRRORS} samples may all have missed bright light among mirrors: intervals of "
-            "the PSNR reach down farther"
+            f"fewer than {TUNING.few_among_mirrors} samples may all have missed bright light among mirrors: intervals "
+            "of the PSNR reach down farther"
         )
     if request.clamp_indirect is not None:
         notes.append(

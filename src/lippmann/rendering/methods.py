@@ -11,19 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.options.choices import Method
-from lippmann.rendering.adaptive.extra_samples import extra_samples
 from lippmann.rendering.adaptive.goal import Goal, goal_of
-from lippmann.rendering.adaptive.stopping import Costs, Outcome, reach
+from lippmann.rendering.adaptive.stopping import Outcome, reach
 from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.denoise.cost_model import effort_of, traced_work
-from lippmann.rendering.denoise.dual_buffer import Denoised
+from lippmann.rendering.denoise.dual_buffer import Denoised, clean_light, remove_excess
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
-from lippmann.rendering.denoise.light_apart import clean_light, remove_excess
 from lippmann.rendering.denoise.outlines import exchange_coverage
 from lippmann.rendering.denoise.subpixels import SubpixelBatches
-from lippmann.rendering.estimate.denoised_psnr import DenoisedEstimator
+from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
-from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts, PictureEstimator
+from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts
 from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
 from lippmann.rendering.film.wavefront import Frame, RayTotals, trace_frame
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
@@ -31,8 +29,7 @@ from lippmann.rendering.job import Job, Traced
 from lippmann.rendering.light_statements import is_among_mirrors
 from lippmann.rendering.reprojection.common.point_image import STATUS_LAYER, TRACED
 from lippmann.rendering.request.preconditions import why_no_estimate
-from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator
-from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.integrator import ReusableIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays
 
 Floats = NDArray[np.float32]
@@ -55,9 +52,8 @@ def trace_samples(job: Job) -> Traced:
         return _denoised_whole(job, _one_stream(job, why))
     if job.treatment is not None:
         return _denoised_part(job)
-    if job.request.is_open_ended:
-        return _samples_for_goal(job)
-    return _fixed_samples(job) if job.request.denoise == "none" else _denoised_samples(job)
+    is_plain = job.request.denoise == "none" and not job.request.is_open_ended
+    return _fixed_samples(job) if is_plain else _in_rounds(job)
 
 
 def trace_reused(job: Job) -> Traced:
@@ -114,48 +110,28 @@ def _fixed_samples(job: Job) -> Traced:
         progress=job.progress,
     )
     frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
-    return Traced(frame, job.request.samples, _estimator(job).estimate(errors))
+    return Traced(frame, job.request.samples, _estimator(job).estimate(errors, job.request.samples))
 
 
-def _is_costly(integrator: Integrator) -> bool:
-    """Whether each sample comes with chains, or looks up photons."""
-    if not isinstance(integrator, PathIntegrator):
-        return False
-    return integrator.light.photons is not None or integrator.light.chains is not None
-
-
-def _denoised_samples(job: Job) -> Traced:
-    """So many samples, denoised; more where the number was left open and the picture is not clean with them."""
-    batches = _batches(job)
-    denoiser = _denoiser(job, batches)
-    picture = _denoised(job, batches, denoiser)
-    estimator = _estimator(job, DenoisedEstimator)
-    reserve, samples = job.request.spp_reserve, job.request.samples
-    while samples:
-        batches.add(samples, job.progress)
-        errors = picture.squared_error()
-        estimate = estimator.estimate(errors)
-        samples, reserve = extra_samples(estimate, batches.samples, reserve), None
-    return _traced(job, batches, picture, denoiser, errors=errors, estimate=estimate)
-
-
-def _samples_for_goal(job: Job) -> Traced:
-    """As many samples as the goal takes: plain ones where the noise is to stay, else always denoised ones."""
+def _in_rounds(job: Job) -> Traced:
+    """As many samples as the goal takes, denoised unless the noise is to stay."""
     batches = _batches(job)
     denoiser = None if job.request.denoise == "none" else _denoiser(job, batches)
-    if denoiser is None:
-        picture: FullInBatches | Denoised = batches
-        estimator = _estimator(job)
-        costs = Costs(estimator.first)
-    else:
-        picture = _denoised(job, batches, denoiser)
-        estimator = _estimator(job, DenoisedEstimator)
-        is_early = goal_of(job.request).is_modest or _is_costly(job.integrator)
-        first = TUNING.first_look_costly if is_early else TUNING.first_look
-        costs = Costs(first, TUNING.denoised_slope, 0.0 if job.request.max_time is None else denoiser.probe())
+    picture = batches if denoiser is None else _denoised(job, batches, denoiser)
     goal = _timed_goal(job)
-    outcome = reach(goal, batches, picture, estimator, costs, job.progress)
-    if outcome.estimate is None and goal.seconds_left(time.perf_counter() - (goal.began or 0.0)) < costs.assessment:
+    assessment = 0.0 if denoiser is None or goal.max_time is None else denoiser.probe()
+    first = TUNING.first_plain if denoiser is None else TUNING.first_denoised
+    outcome = reach(
+        goal,
+        batches,
+        picture,
+        _estimator(job),
+        first=first if job.request.is_open_ended else job.request.samples,
+        slope=1.0 if denoiser is None else TUNING.denoised_slope,
+        assessment=assessment,
+        progress=job.progress,
+    )
+    if outcome.estimate is None and goal.seconds_left(time.perf_counter() - (goal.began or 0.0)) < assessment:
         # The time is up after one sample, and denoising takes longer than what is left.
         picture, denoiser = batches, None
     notes = _end_notes(goal, outcome)
@@ -214,33 +190,23 @@ def _denoised_part(job: Job) -> Traced:
 
 
 def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Denoised:
-    share = denoiser.share if denoiser.shares_afterwards else None
-    return Denoised(
-        batches, denoiser.denoise, job.request.transfer, job.session.engine.threads, share, denoiser.coverage
-    )
+    return Denoised(batches, denoiser, job.request.transfer, job.session.engine.threads, denoiser.coverage)
 
 
 def _rays_per_pixel(job: Job, rays: RayTotals) -> float:
     return traced_work(rays.primary, rays.shadow, rays.secondary) / (job.traced.width * job.traced.height)
 
 
-def _estimator(job: Job, kind: type[PictureEstimator] = PictureEstimator) -> PictureEstimator:
+def _estimator(job: Job) -> PictureEstimator:
     """Judges a display's picture by its micro-images, a quilt by its views."""
-    estimator = _estimator_of_parts(job, kind)
-    if is_among_mirrors(job.session.choices):
-        estimator.expect_mirrors()
-    return estimator
-
-
-def _estimator_of_parts(job: Job, kind: type[PictureEstimator]) -> PictureEstimator:
-    source = job.source
+    source, parts = job.source, None
     if isinstance(source, QuiltRays):
         window, (width, height) = source.window, source.view_size
         known = width * height - window.pixels
-        return kind(Parts.views(source.columns, source.rows, (window.width, window.height), known))
-    if isinstance(source, WindowRays):
-        return kind(Parts.micro_images(source.display, source.window))
-    return kind(source.display)
+        parts = Parts.views(source.columns, source.rows, (window.width, window.height), known)
+    elif isinstance(source, WindowRays):
+        parts = Parts.micro_images(source.display, source.window)
+    return PictureEstimator(parts or source.display, is_among_mirrors(job.session.choices))
 
 
 def _reused(job: Job) -> Traced:
@@ -277,8 +243,7 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     noisy = frame.pixels
     if frame.coverage is not None and (further := denoiser.coverage()) is not None:
         noisy = exchange_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)
-    (cleaned,) = clean_light(noisy, frame.seen, denoiser, None)
-    cleaned = remove_excess(cleaned, frame.excess)
+    cleaned = remove_excess(clean_light(noisy, frame.seen, denoiser), frame.excess)
     frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
     return replace(traced, options=_denoiser_options(denoiser), seconds={"denoise": denoiser.seconds})
 
@@ -308,7 +273,7 @@ def _denoiser_options(denoiser: GuidedDenoiser) -> dict[str, object]:
 def _end_notes(goal: Goal, outcome: Outcome) -> tuple[str, ...]:
     if outcome.estimate is None:
         return ("no estimate of the error: there was time for one sample per pixel only",)
-    if outcome.end == "quality" or not goal.has_quality:
+    if outcome.end == "quality" or not goal.has_quality or not goal.is_promise:
         return ()
     what = "the time is up" if outcome.end == "time" else "the samples are spent"
     return (f"{what} before the quality asked for was reached: {goal.describe_shortfall(outcome.estimate)}",)

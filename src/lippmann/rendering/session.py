@@ -282,7 +282,7 @@ class Session:
             pixel_shares=frame.shares,
             rays={"primary": rays.primary, "shadow": rays.shadow, "secondary": rays.secondary},
             seconds=_stage_seconds(self.watch, frame),
-            estimate=stated_error(estimate, samples, self.choices),
+            estimate=stated_error(estimate, self.choices),
             options={**options, **self.choices, **self._plan_options(), "settings": self._settings()},
             notes=(
                 *self.notes,

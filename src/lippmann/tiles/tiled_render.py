@@ -36,10 +36,11 @@ from lippmann.journal.tile_journal import TileStore, read_job, sweep_beside
 from lippmann.options.choices import tone_map_of
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise import oidn
-from lippmann.rendering.estimate.denoised_psnr import estimate_denoised
-from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, ErrorSums
-from lippmann.rendering.estimate.psnr import Estimate, estimate_of_sums
+from lippmann.rendering.estimate.denoised_psnr import estimate_sums
+from lippmann.rendering.estimate.pixel_errors import ErrorSums
+from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.film import memory_model
+from lippmann.rendering.light_statements import is_among_mirrors
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import memory_limit
 from lippmann.runtime import engine as engines
@@ -252,10 +253,9 @@ def _summed(prepared: Prepared, store: TileStore) -> Provenance:
     estimate: Estimate | None = None
     if prepared.no_estimate is not None:
         notes |= {prepared.no_estimate: None}
-    elif prepared.treatment is None:
-        estimate = estimate_of_sums(sums[""], size, OWN_NOISE)
     else:
-        estimate = estimate_denoised(sums[""], sums[OF_SAMPLES], size)
+        mirrors = is_among_mirrors(prepared.session.choices)
+        estimate = estimate_sums(sums[""], sums.get(OF_SAMPLES), size, job.request.samples, mirrors)
     # Only the size of these pixels is asked for; they take no memory.
     frame = Frame(np.broadcast_to(np.float32(0), (job.grid.height, job.grid.width, 3)), rays)
     return prepared.session.provenance(

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import pytest
 
+from lippmann.api import load_scene
 from lippmann.display import Display
 from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
-from lippmann.rendering.adaptive.goal import Goal
-from lippmann.rendering.estimate.denoised_psnr import DenoisedEstimator
-from lippmann.rendering.estimate.psnr import (
-    AMONG_MIRRORS,
-    FEW_AMONG_MIRRORS,
-    NO_MARGIN,
-    Estimate,
-    Margin,
-    PictureEstimator,
-)
+from lippmann.rendering.adaptive.goal import Goal, goal_of
+from lippmann.rendering.adaptive.tuning import TUNING
+from lippmann.rendering.estimate.psnr import Estimate
+from lippmann.rendering.request.plan import resolve
+from lippmann.rendering.request.render_request import RenderRequest
 
 SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
 
@@ -29,21 +28,25 @@ def test_missing_is_by_the_likely_value_and_by_the_low_end():
     assert Goal(quality=44).missing(wide) <= 0
 
 
-def test_among_mirrors_few_samples_need_a_margin_of_their_own_for_the_worst():
-    plain, denoised = PictureEstimator(SHOWN), DenoisedEstimator(SHOWN)
-    assert plain.margin(8) == Margin(4.0, 4.0)
-    assert denoised.margin(2) == NO_MARGIN
-    for each in (plain, denoised):
-        each.expect_mirrors()
-        assert each.fewest == 16
-        assert each.margin(16) == NO_MARGIN
-    assert (plain.first, denoised.first) == (8, 2)
-    assert plain.margin(8) == Margin(4.0, 8.0)
-    assert denoised.margin(8) == AMONG_MIRRORS
-    assert denoised.margin(2) == denoised.margin(4) == FEW_AMONG_MIRRORS
-    assert FEW_AMONG_MIRRORS.whole > AMONG_MIRRORS.whole
+def test_a_quality_of_the_whole_asks_for_micro_images_too():
     estimate = Estimate(38.0, 37.0, 39.0, 26.0, 25.0, 27.0, (0, 0))
     assert Goal(quality=35).missing(estimate) == pytest.approx(-3)
     # The worst micro-image may have 12 dB less than the whole.
-    assert Goal(quality=35).missing(estimate, AMONG_MIRRORS) == pytest.approx(23 + 5 - 26)
-    assert Goal(quality=35).missing(estimate, Margin(2.0, 0.0)) == pytest.approx(-1)
+    assert Goal(quality=39).missing(estimate) == pytest.approx(1)
+    assert Goal(quality=38).missing(replace(estimate, worst=25.5)) == pytest.approx(0.5)
+
+
+def test_a_default_picture_is_to_be_clean_by_the_likely_value():
+    request = RenderRequest(method="pooled", denoise="oidn", spp=8)
+    assert goal_of(request) == Goal(spp=8)
+    with_reserve = resolve(RenderRequest(), load_scene("teapot"), SHOWN)
+    goal = goal_of(with_reserve)
+    assert goal == Goal(TUNING.clean, TUNING.clean_worst, spp=with_reserve.spp_reserve, is_promise=False)
+    wide = Estimate(TUNING.clean, 20.0, 50.0, TUNING.clean_worst, 5.0, 40.0, (0, 0))
+    assert goal.missing(wide) == 0
+    # However good the picture is as a whole.
+    assert goal.missing(replace(wide, psnr=50.0, worst=TUNING.clean_worst - 2)) == pytest.approx(2)
+
+
+def test_without_a_quality_nothing_is_missing():
+    assert Goal(spp=8).missing(Estimate(5.0, 4.0, 6.0, 1.0, 0.0, 2.0, (0, 0))) == -math.inf

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from lippmann.color.transfer import encode_srgb
-from lippmann.rendering.denoise.dual_buffer import UNTOLD_OUTLIERS, Denoised
-from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
+from lippmann.rendering.denoise.dual_buffer import Denoised
+from lippmann.rendering.denoise.tuning import TUNING
+from lippmann.rendering.estimate.pixel_errors import PixelErrors
 
 SHAPE = (256, 256, 3)
 
@@ -61,7 +60,7 @@ class Noise:
 
     def squared_error(self):
         difference = np.square(self._halves[0] - self._halves[1]).mean(axis=2) / 4
-        return PixelErrors(difference, None, OWN_NOISE, blur=self.blurred)
+        return PixelErrors(difference, blur=self.blurred)
 
 
 def blur(picture, turned=False):
@@ -77,7 +76,6 @@ def true_error(picture, truth):
 def told_and_true(renderer, denoise):
     denoised = Denoised(renderer, denoise, "srgb")
     told = denoised.squared_error()
-    assert told.noise is CROSS_NOISE
     return float(told.values.mean()), true_error(denoised.picture(), renderer.truth)
 
 
@@ -119,8 +117,7 @@ def test_what_the_halves_differ_by_is_known():
     assert 0.01 < float(blurred.apart.mean()) / float(told.apart.mean()) < 0.3
 
 
-@pytest.mark.parametrize("shares", [False, True])
-def test_seen_light_goes_past_the_denoiser_and_past_what_is_shared(shares, as_denoised):
+def test_seen_light_goes_past_the_denoiser(as_denoised):
     """A highlight of one pixel, which a blur would wipe out."""
     renderer = Noise()
     highlights = [np.zeros_like(half) for half in renderer.traced_halves()]
@@ -134,11 +131,11 @@ def test_seen_light_goes_past_the_denoiser_and_past_what_is_shared(shares, as_de
         return blur(picture)
 
     renderer.of_seen = tuple(highlights)
-    picture = Denoised(renderer, denoise, "srgb", share=blur if shares else None).picture()
+    picture = Denoised(renderer, denoise, "srgb").picture()
     assert max(given) < 2
     assert picture[100, 100] == pytest.approx(renderer.truth[100, 100] + 5.2, rel=0.05)
     renderer.samples = 1
-    alone = Denoised(renderer, denoise, "srgb", share=blur if shares else None).picture()
+    alone = Denoised(renderer, denoise, "srgb").picture()
     assert alone[100, 100] == pytest.approx(renderer.truth[100, 100] + 5.0, rel=0.05)
 
 
@@ -217,38 +214,6 @@ def test_what_is_still_far_beyond_white_without_its_noise_is_as_bright_as_the_sa
     assert picture[45:55, 45:55] == pytest.approx(shown[45:55, 45:55])
 
 
-def test_outliers_of_seen_light_are_told():
-    """What one half alone has met of it, where the samples' batches say so, too."""
-    renderer = Noise()
-    renderer.samples = 64
-    hits = [np.zeros_like(half) for half in renderer.traced_halves()]
-    hits[0][100, 100] = 0.4
-    for light, half in zip(hits, renderer.traced_halves(), strict=True):
-        light[50, 50] = 0.3
-        half += light
-    whole = renderer.squared_error
-
-    def outliers_at(*places):
-        outliers = np.zeros(SHAPE[:2], np.float32)
-        for place in places:
-            outliers[place] = 1.0
-        renderer.squared_error = lambda: replace(whole(), outliers=outliers)
-        return Denoised(renderer, blur, "linear").squared_error()
-
-    assert outliers_at((100, 100)).outliers is None  # seen light is not kept apart
-    renderer.of_seen = tuple(hits)
-    renderer.of_excess = np.zeros_like(hits[0])
-    told = outliers_at((100, 100), (50, 50))
-    assert told.outliers[100, 100] == pytest.approx(0.25 * 0.4**2, rel=1e-3)
-    assert told.outliers.sum() == pytest.approx(told.outliers[100, 100])
-    assert outliers_at((50, 50)).outliers.sum() == 0
-    # Of 0.4, that is 0.2 of the mean, a half is left out.
-    renderer.of_excess[100, 100] = 0.1
-    assert outliers_at((100, 100)).outliers[100, 100] == pytest.approx(0.25 * 0.2**2, rel=1e-3)
-    renderer.of_excess[100, 100] = 0.3
-    assert outliers_at((100, 100)).outliers.sum() == 0
-
-
 @pytest.mark.parametrize(("samples", "hidden"), [(4, True), (64, False)])
 def test_a_pixel_that_both_halves_hit_hard_does_not_hide_what_is_wrong_elsewhere(samples, hidden, as_denoised):
     """A caustic's rare light: the product of two hits is larger than any error of a code. Of few samples it counts."""
@@ -268,7 +233,7 @@ def test_of_few_samples_any_hit_may_be_an_outlier(samples, all_may_be):
     told = Denoised(renderer, blur, "srgb").squared_error().samples
     assert (told.outliers is not None) == all_may_be
     if all_may_be:
-        assert np.array_equal(told.outliers, np.float32(UNTOLD_OUTLIERS) * told.values)
+        assert np.array_equal(told.outliers, np.float32(TUNING.untold_outliers) * told.values)
 
 
 def test_more_samples_are_cleaned_anew():

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lippmann.rendering.estimate.bias_posterior import OUTLIER_RATIO, USUAL_RATIO, likely_error
+from lippmann.rendering.estimate.denoised_psnr import likely_error
+from lippmann.rendering.estimate.tuning import TUNING
 
 ENDS = np.array([0.025, 0.5, 0.975])
 chances = st.floats(1e-8, 1e-2)
@@ -29,7 +30,7 @@ def test_what_is_measured_well_is_the_error(by_chance, ratio, outliers):
 def test_where_nothing_is_measured_the_usual_ratio_stands(by_chance, outliers):
     found = likely_error(by_chance, 0.0, 1e6 * by_chance, outliers)
     assert found.quantiles(0.5) == pytest.approx(
-        (1 + USUAL_RATIO ** (1 - outliers) * OUTLIER_RATIO**outliers) * by_chance, rel=0.02
+        (1 + TUNING.usual_ratio ** (1 - outliers) * TUNING.outlier_ratio**outliers) * by_chance, rel=0.02
     )
 
 

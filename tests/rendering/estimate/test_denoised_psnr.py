@@ -13,8 +13,8 @@ from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.image.micro_images import lens_indices
 from lippmann.metrics.mse_psnr import micro_image_means, psnr
-from lippmann.rendering.estimate.denoised_psnr import DenoisedEstimator
-from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
+from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
+from lippmann.rendering.estimate.pixel_errors import PixelErrors
 
 SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
 
@@ -31,8 +31,8 @@ def made(seed, noise=0.05, left=0.01, spread=0.5, ratio=3.0):
     first, second = (alike + left * math.sqrt(2 / (1 + ratio)) * chance for chance in (first, second))
     apart = (np.square(first - second) / 4).astype(np.float32)
     judged = ((noise * a - first) * (noise * b - second)).astype(np.float32) + apart
-    samples = PixelErrors(np.square(noise * of_samples).astype(np.float32), None, OWN_NOISE)
-    return PixelErrors(judged, None, CROSS_NOISE, samples, apart), np.square((first + second) / 2)
+    samples = PixelErrors(np.square(noise * of_samples).astype(np.float32))
+    return PixelErrors(judged, None, samples, apart), np.square((first + second) / 2)
 
 
 def truth_of(true):
@@ -43,11 +43,11 @@ def truth_of(true):
 @pytest.mark.parametrize("ratio", [0.3, 3, 10])
 @pytest.mark.parametrize("noise", [0.005, 0.05, 0.2])
 def test_intervals_hold_the_truth_however_noisy_the_judges_are(noise, ratio):
-    estimator = DenoisedEstimator(SHOWN)
+    estimator = PictureEstimator(SHOWN)
     inside = np.zeros(2)
     for seed in range(40):
         errors, true = made(seed, noise, ratio=ratio)
-        found, truth = estimator.estimate(errors), truth_of(true)
+        found, truth = estimator.estimate(errors, 64), truth_of(true)
         inside += np.less_equal([found.psnr_low, found.worst_low], truth)
         inside -= np.greater(truth, [found.psnr_high, found.worst_high])
     assert (inside >= 37).all()
@@ -57,7 +57,7 @@ def test_a_negative_measurement_is_no_perfect_picture():
     """Strong noise can push what is measured below zero; what the halves differ by is wrong all the same."""
     errors, _ = made(1, noise=0.2)
     values = errors.values - np.float32(2 * errors.values.std() / 64)
-    found = DenoisedEstimator(SHOWN).estimate(replace(errors, values=values))
+    found = PictureEstimator(SHOWN).estimate(replace(errors, values=values), 64)
     assert values.mean() < 0
     assert found.psnr < psnr(float(errors.apart.mean()))
     assert found.psnr_low < psnr(3 * float(errors.apart.mean()))
@@ -67,14 +67,14 @@ def test_halves_that_agree_though_their_samples_do_not_are_not_believed_to_be_ri
     """As if a denoiser made the same of everything."""
     errors, _ = made(1, noise=0.2)
     same = np.zeros_like(errors.apart)
-    found = DenoisedEstimator(SHOWN).estimate(replace(errors, values=errors.values - errors.apart, apart=same))
+    found = PictureEstimator(SHOWN).estimate(replace(errors, values=errors.values - errors.apart, apart=same), 64)
     assert found.psnr < psnr(1e-4 * float(errors.samples.values.mean()))
 
 
 def test_what_is_measured_well_is_believed_whatever_is_usual():
     """Stripes that both halves have lost: they agree, and the samples show them."""
     errors, true = made(4, noise=0.01, ratio=30.0)
-    found = DenoisedEstimator(SHOWN).estimate(errors)
+    found = PictureEstimator(SHOWN).estimate(errors, 64)
     assert found.psnr == pytest.approx(truth_of(true)[0], abs=0.5)
     assert found.psnr_high < found.psnr + 4.5
 
@@ -83,7 +83,7 @@ def test_where_the_halves_differ_the_picture_is_not_believed_to_be_good():
     errors, _ = made(3, noise=0.06, spread=0.0)
     harder = errors.apart.copy()
     harder[24:32, 40:48] *= 30
-    found = DenoisedEstimator(SHOWN).estimate(replace(errors, apart=harder))
+    found = PictureEstimator(SHOWN).estimate(replace(errors, apart=harder), 64)
     assert found.worst_lens == (5, 3)
     assert found.worst < found.psnr - 6
 
@@ -92,28 +92,11 @@ def test_where_the_halves_differ_the_picture_is_not_believed_to_be_good():
 def test_outliers_are_doubted_where_nothing_else_is_known(noise, least, most):
     """Where few paths find the light, both halves lack it; but what is measured well is known."""
     errors, _ = made(2, noise)
-    calm = DenoisedEstimator(SHOWN).estimate(errors)
+    calm = PictureEstimator(SHOWN).estimate(errors, 64)
     alone = replace(errors.samples, outliers=errors.samples.values)
-    found = DenoisedEstimator(SHOWN).estimate(replace(errors, samples=alone))
+    found = PictureEstimator(SHOWN).estimate(replace(errors, samples=alone), 64)
     for name in ("psnr", "psnr_low", "worst", "worst_low"):
         assert least < getattr(calm, name) - getattr(found, name) < most
-
-
-def test_outliers_of_seen_light_widen_the_interval_downward():
-    """One half has met what the other has not; there is none where that is no part of what the halves differ by."""
-    errors, _ = made(5)
-    estimator = DenoisedEstimator(SHOWN)
-    plain = estimator.estimate(errors)
-    some, all_of_it = (
-        estimator.estimate(replace(errors, outliers=(share * errors.apart).astype(np.float32))) for share in (0.2, 1.0)
-    )
-    assert plain.psnr_low > some.psnr_low > all_of_it.psnr_low > plain.psnr_low - 3
-    assert plain.worst_low >= some.worst_low > all_of_it.worst_low > plain.worst_low - 3
-    for each in (some, all_of_it):
-        assert (each.psnr, each.psnr_high) == (plain.psnr, plain.psnr_high)
-        assert abs(each.worst - plain.worst) < 1.0
-    none = estimator.estimate(replace(errors, outliers=np.zeros_like(errors.apart)))
-    assert none == plain
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -123,7 +106,7 @@ def test_a_few_pixels_that_are_badly_wrong_make_a_worst_micro_image(seed):
     errors.values[10, 20:23] += 0.15
     true[10, 20:23] += 0.15
     worst = truth_of(true)[1]
-    found = DenoisedEstimator(SHOWN).estimate(errors)
+    found = PictureEstimator(SHOWN).estimate(errors, 64)
     assert found.worst_lens == (2, 1)
     assert found.worst_low < worst < found.worst_high
     assert found.worst < worst + 6
@@ -133,16 +116,16 @@ def test_a_few_pixels_that_are_badly_wrong_make_a_worst_micro_image(seed):
 def test_single_strong_hits_are_no_worst_micro_image(seed):
     """Both halves have met the rare light in one pixel by chance: its samples' errors show it, too."""
     errors, _ = made(seed, noise=0.01, spread=0.1)
-    calm = DenoisedEstimator(SHOWN).estimate(errors)
+    calm = PictureEstimator(SHOWN).estimate(errors, 64)
     errors.values[10, 20] += 0.15
     errors.samples.values[10, 20] += 0.15
-    assert DenoisedEstimator(SHOWN).estimate(errors).worst > calm.worst - 6
+    assert PictureEstimator(SHOWN).estimate(errors, 64).worst > calm.worst - 6
 
 
 def test_what_may_not_be_there_widens_the_interval_of_the_whole_to_the_better_side_only():
     errors, _ = made(1, noise=0.005)
-    calm = DenoisedEstimator(SHOWN).estimate(errors)
-    told = DenoisedEstimator(SHOWN).estimate(replace(errors, blur=np.float32(0.5 * 9 / 8) * errors.values))
+    calm = PictureEstimator(SHOWN).estimate(errors, 64)
+    told = PictureEstimator(SHOWN).estimate(replace(errors, blur=np.float32(0.5) * errors.values), 64)
     assert told.psnr_high > calm.psnr_high + 2
     assert (told.psnr, told.psnr_low, told.worst) == (calm.psnr, calm.psnr_low, calm.worst)
 
@@ -156,9 +139,9 @@ def test_micro_images_of_few_pixels_may_be_worse_than_expected():
     low = {}
     for name, display in (("cut", cut), ("whole", SHOWN)):
         random = np.random.default_rng(4)
-        even = PixelErrors(np.full((64, 64), 2.5e-3, np.float32), None, OWN_NOISE)
+        even = PixelErrors(np.full((64, 64), 2.5e-3, np.float32))
         judged = np.float32(1e-4) * (1 + 0.1 * random.standard_normal((64, 64)).astype(np.float32))
         apart = np.full((64, 64), 3e-5, np.float32)
-        found = DenoisedEstimator(display).estimate(PixelErrors(judged, None, CROSS_NOISE, even, apart))
+        found = PictureEstimator(display).estimate(PixelErrors(judged, None, even, apart), 64)
         low[name] = found.worst_low
     assert low["cut"] < low["whole"] - 3

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -129,7 +128,7 @@ def test_every_sample_of_both_streams_is_taken_once(engine, rounds, shares, memo
 @pytest.mark.parametrize("subpixels", [False, True])
 def test_the_mean_is_that_of_full_and_the_error_what_it_says(integrator, subpixels):
     from lippmann.color.transfer import encode_srgb
-    from lippmann.rendering.estimate.psnr import PictureEstimator
+    from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
@@ -140,7 +139,7 @@ def test_the_mean_is_that_of_full_and_the_error_what_it_says(integrator, subpixe
     for samples in (8, 8, 48):
         renderer.add(samples)
         errors = np.square(encode_srgb(renderer.picture()) - reference)
-        found = estimator.estimate(renderer.squared_error())
+        found = estimator.estimate(renderer.squared_error(), 64)
         assert found.psnr_low <= -10 * np.log10(errors.mean()) <= found.psnr_high
     worst = errors.mean(axis=2).reshape(4, 8, 4, 8).mean(axis=(1, 3)).max()
     assert found.worst_low <= -10 * np.log10(worst) <= found.worst_high
@@ -150,11 +149,11 @@ def test_the_mean_is_that_of_full_and_the_error_what_it_says(integrator, subpixe
 def test_a_quality_that_is_asked_for_is_kept(integrator):
     from lippmann.color.transfer import encode_srgb
     from lippmann.rendering.adaptive.goal import Goal
-    from lippmann.rendering.adaptive.stopping import Costs, reach
-    from lippmann.rendering.estimate.psnr import PictureEstimator
+    from lippmann.rendering.adaptive.stopping import reach
+    from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 
     renderer = batches(integrator, seed=5)
-    outcome = reach(Goal(quality_worst=30), renderer, renderer, PictureEstimator(SHOWN), Costs(4))
+    outcome = reach(Goal(quality_worst=30), renderer, renderer, PictureEstimator(SHOWN), first=16)
     long = batches(integrator, seed=6)
     long.add(768)
     errors = np.square(encode_srgb(renderer.picture()) - encode_srgb(long.picture())).mean(axis=2)
@@ -185,20 +184,6 @@ def test_fewer_batches_are_kept_where_memory_is_short_and_none_where_it_is_too_s
     assert small.squared_error().values.mean() == pytest.approx(plenty.squared_error().values.mean(), rel=0.5)
     with pytest.raises(MemoryLimitError, match="its own error"):
         batches(integrator, memory=100_000)
-
-
-def test_a_probe_tells_the_time_and_leaves_no_trace(integrator):
-    renderer, untouched = batches(integrator), batches(integrator)
-    started = time.perf_counter()
-    seconds = renderer.probe()
-    # So small a picture is probed as a whole.
-    assert 0 < seconds <= time.perf_counter() - started
-    assert (renderer.samples, renderer.rays.primary) == (0, 0)
-    for one in (renderer, untouched):
-        one.add(4)
-    assert np.array_equal(renderer.picture(), untouched.picture())
-    assert renderer.rays == untouched.rays
-    assert renderer.seconds_trace > 0
 
 
 def test_samples_of_one_pass_are_taken_together():

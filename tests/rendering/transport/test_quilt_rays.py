@@ -181,15 +181,16 @@ def test_the_rest_of_the_sides_is_black_and_the_views_tell_their_error():
 
 def test_estimates_are_those_of_the_views():
     """One view is far noisier than the others, and is named."""
-    from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
-    from lippmann.rendering.estimate.psnr import Parts, PictureEstimator
+    from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
+    from lippmann.rendering.estimate.pixel_errors import PixelErrors
+    from lippmann.rendering.estimate.psnr import Parts
 
     parts = Parts.views(3, 4, (20, 10))
     assert parts.owner[-1, 0] == 0
     assert parts.owner[0, -1] == 11
     errors = np.random.default_rng(1).chisquare(1, (40, 60)).astype(np.float32) * 1e-4
     errors[10:20, 20:40] *= 30
-    found = PictureEstimator(parts).estimate(PixelErrors(errors, None, OWN_NOISE))
+    found = PictureEstimator(parts).estimate(PixelErrors(errors), 64)
     assert found.worst_lens == (7, 0)
     assert found.worst == pytest.approx(-10 * math.log10(3e-3), abs=1.5)
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from lippmann.rendering.adaptive.tuning import TUNING
-from lippmann.rendering.estimate.psnr import NO_MARGIN, Estimate, Margin
+from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.request.render_request import RenderRequest
 
 
@@ -25,6 +25,9 @@ class Goal:
         Seconds.
     spp:
         Samples per pixel; at least two, fewer tell no error.
+    is_promise:
+        Whether a user asked for the quality: it is then missed by more than ``TUNING.tolerance`` with a probability of
+        2.5 % only. Else the likely value counts.
     part:
         What a part of the picture that is assessed by itself is called.
     began:
@@ -37,48 +40,20 @@ class Goal:
     quality_worst: float | None = None
     max_time: float | None = None
     spp: int | None = None
+    is_promise: bool = True
     part: str = "micro-image"
     began: float | None = None
     reserve: float = 0.0
 
     @property
     def has_quality(self) -> bool:
-        """Whether some quality is asked for."""
+        """Whether some quality is to be reached."""
         return self.quality is not None or self.quality_worst is not None
 
     @property
-    def is_modest(self) -> bool:
-        """Whether no more is asked for than a default picture has anyway."""
-        return self.quality is not None and self.quality_worst is None and self.quality <= TUNING.modest_quality
-
-    def seconds_left(self, spent: float) -> float:
-        """Of ``max_time``, which is set, what is left after so many seconds and the reserve; below 0 if it is up."""
-        assert self.max_time is not None
-        return self.max_time - self.reserve - spent
-
-    def missing(self, estimate: Estimate, margin: Margin = NO_MARGIN) -> float:
-        """How many dB the picture is short of the quality and a ``margin``; at most 0 if it has both.
-
-        It has the quality where that is the likely one, and is missed by more than ``TUNING.tolerance`` only with a
-        probability of 2.5 %.
-        """
-        short = [-math.inf]
-        if self.quality is not None:
-            has = min(estimate.psnr, estimate.psnr_low + TUNING.tolerance)
-            short.append(self.quality + margin.whole - has)
-        if self.least_worst is not None:
-            has = min(estimate.worst, estimate.worst_low + TUNING.tolerance)
-            short.append(self.least_worst + margin.worst - has)
-        return max(short)
-
-    def likely_missing(self, estimate: Estimate) -> float:
-        """How many dB the likely PSNR is short, whatever its interval: that gets narrower as samples grow."""
-        short = [-math.inf]
-        if self.quality is not None:
-            short.append(self.quality - estimate.psnr)
-        if self.least_worst is not None:
-            short.append(self.least_worst - estimate.worst)
-        return max(short)
+    def most(self) -> int:
+        """Samples per pixel at which it is given up."""
+        return min(self.spp or TUNING.most, TUNING.most)
 
     @property
     def least_worst(self) -> float | None:
@@ -87,6 +62,18 @@ class Goal:
         if self.quality is not None:
             bounds.append(self.quality - TUNING.most_below)
         return max(bounds, default=None)
+
+    def seconds_left(self, spent: float) -> float:
+        """What is left of ``max_time`` after so many seconds and the reserve; infinite without a limit."""
+        return math.inf if self.max_time is None else self.max_time - self.reserve - spent
+
+    def missing(self, estimate: Estimate) -> float:
+        """How many dB the picture is short of the quality; at most 0 if it has it, minus infinity if none is asked."""
+        short = -math.inf
+        for _, value, low, asked in self._asked(estimate):
+            has = min(value, low + TUNING.tolerance) if self.is_promise else value
+            short = max(short, asked - has)
+        return short
 
     def describe(self, estimate: Estimate) -> str:
         """Where the picture stands, for a progress report."""
@@ -99,17 +86,21 @@ class Goal:
     def describe_shortfall(self, estimate: Estimate) -> str:
         """What a picture lacks that ended short of the goal; no figure is rounded up to what was asked for."""
         shortfalls = []
-        for what, value, low, asked in (
-            ("the picture", estimate.psnr, estimate.psnr_low, self.quality),
-            (f"the worst {self.part}", estimate.worst, estimate.worst_low, self.least_worst),
-        ):
-            if asked is None:
-                continue
+        for what, value, low, asked in self._asked(estimate):
             if value < asked:
                 shortfalls.append(f"{what} is estimated at {_floor(value):.1f} of {asked:g} dB")
             elif low < asked - TUNING.tolerance:
                 shortfalls.append(f"{what} is likely there, but may have {_floor(low):.1f} of {asked:g} dB")
         return ", ".join(shortfalls) or "too few samples to be sure"
+
+    def _asked(self, estimate: Estimate) -> list[tuple[str, float, float, float]]:
+        """Of the picture and of its worst part, where a quality is asked of them: its name, its PSNR, the lower end of
+        the interval, and what is asked."""
+        both = [
+            ("the picture", estimate.psnr, estimate.psnr_low, self.quality),
+            (f"the worst {self.part}", estimate.worst, estimate.worst_low, self.least_worst),
+        ]
+        return [(what, value, low, asked) for what, value, low, asked in both if asked is not None]
 
 
 def _floor(value: float) -> float:
@@ -117,5 +108,9 @@ def _floor(value: float) -> float:
 
 
 def goal_of(request: RenderRequest) -> Goal:
-    """When a picture of this request is to stop."""
-    return Goal(request.quality, request.quality_worst, request.max_time, request.spp)
+    """When a picture of this request is to stop: a default one takes of its reserve until it is clean."""
+    if request.is_open_ended:
+        return Goal(request.quality, request.quality_worst, request.max_time, request.spp)
+    if request.spp_reserve is None:
+        return Goal(spp=request.samples)
+    return Goal(TUNING.clean, TUNING.clean_worst, spp=request.spp_reserve, is_promise=False)

@@ -89,18 +89,11 @@ class GuidedDenoiser:
         self.seconds = 0.0
         self.used: Effort = "fast"
 
-    @property
-    def shares_afterwards(self) -> bool:
-        """Whether clean light is shared; views of a quilt share it before it is clean."""
-        return self._shares and not isinstance(self._source, QuiltRays)
+    def __call__(self, pixels: Floats, turned: bool = False) -> Floats:
+        """A picture without its noise, which has shared its light: views of a quilt before it is clean.
 
-    def __call__(self, pixels: Floats) -> Floats:
-        """A picture without its noise, which has shared its light."""
-        clean = self.denoise(pixels)
-        return self.share(clean) if self.shares_afterwards else clean
-
-    def denoise(self, pixels: Floats, turned: bool = False) -> Floats:
-        """A picture without its noise; ``turned`` is that of :func:`~lippmann.rendering.denoise.oidn.denoise`."""
+        ``turned`` is that of :func:`~lippmann.rendering.denoise.oidn.denoise`.
+        """
         started = time.perf_counter()
         self._progress(Progress("denoise", 0, 1))
         self.used = self._effort()
@@ -109,13 +102,15 @@ class GuidedDenoiser:
             pixels = share_views(pixels, self._source, guides)
         # The network overshoots below black beside bright edges.
         cleaned = np.maximum(self._cleaned(pixels, guides, turned), np.float32(0))
+        if self._shares and not isinstance(self._source, QuiltRays):
+            cleaned = self._share(cleaned)
         self._progress(Progress("denoise", 1, 1))
         self.seconds += time.perf_counter() - started
         return cleaned
 
-    def share(self, clean: Floats) -> Floats:
+    def _share(self, clean: Floats) -> Floats:
         """A clean picture that has shared its light."""
-        started, source = time.perf_counter(), self._source
+        source = self._source
         assert not isinstance(source, QuiltRays)
         if self._lenses is None:
             window = None if isinstance(source, DisplayRays) else source.window
@@ -123,7 +118,7 @@ class GuidedDenoiser:
                 self._lenses = lens_numbers_in_full_color(source.display, window)
             else:
                 self._lenses = lens_numbers(source.display, window, subpixels=source.channels == 3)
-        shared = share_light(
+        return share_light(
             clean,
             source.display,
             self.guides(),
@@ -131,8 +126,6 @@ class GuidedDenoiser:
             lenses=self._lenses,
             columns=3 if isinstance(source, SubpixelRays) else 1,
         )
-        self.seconds += time.perf_counter() - started
-        return shared
 
     def coverage(self) -> tuple[Coverage, Coverage] | None:
         """By either half of the rays of the guides that the next picture is cleaned with."""

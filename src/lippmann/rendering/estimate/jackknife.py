@@ -27,16 +27,9 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import Transfer
 from lippmann.device.kernel_ops import encode
 from lippmann.device.types import Bool, Color3f, Float
+from lippmann.rendering.estimate.tuning import TUNING
 
 Floats = NDArray[np.float32]
-
-#: A hit is an outlier if it makes up this part of the largest share of what the batches differ by that one can have,
-#: ``(batches - 1) / batches``, and moves the code by as much as ...
-OUTLIER_SHARE = 0.8 * 8 / 7
-#: ... this: below it the curve is nearly straight, and what is missing elsewhere is small as well.
-OUTLIER_STEP = 0.15
-#: Of fewer batches any hit may be an outlier, and none is told to be.
-OUTLIERS_TOLD_FROM = 4
 
 
 def error_of_batches(sums: Floats, taken: Sequence[int], transfer: Transfer) -> tuple[Floats, Floats]:
@@ -102,9 +95,9 @@ class _Batches:
             error += size * (self.count - count) / self.count
             spread += size
             largest = dr.maximum(largest, size)
-        decides = largest > OUTLIER_SHARE * (weight - 1) / weight * spread
-        decides &= largest > OUTLIER_STEP * OUTLIER_STEP / 3
-        decides &= weight >= OUTLIERS_TOLD_FROM
+        decides = largest > TUNING.outlier_share * (weight - 1) / weight * spread
+        decides &= largest > TUNING.outlier_step**2 / 3
+        decides &= weight >= TUNING.outliers_told_from
         return error, dr.select(decides, error, 0)
 
     def evenness(self) -> Float:

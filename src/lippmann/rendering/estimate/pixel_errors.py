@@ -14,32 +14,9 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
-#: The share of an outlier's estimate that is no estimate but the error itself.
-OUTLIERS_CERTAIN = 0.7
-#: The share by which the blur of caustics is told too high where light is smooth, see
-#: :mod:`lippmann.rendering.film.caustic_blur`; and that by which no error is less than stated.
-BLUR_TOO_MUCH, MOST_LESS = 8 / 9, 0.9
-
-
-@dataclass(frozen=True)
-class NoiseShares:
-    """What a pixel's estimate x says about variances, as multiples of the mean of x^2.
-
-    ``estimate``: of the estimate about the expected error; ``picture``: of the true error about the expected one. What
-    is independent from pixel to pixel adds up over a region.
-    """
-
-    estimate: float
-    picture: float
-
-
-#: Estimates by the difference of two independent halves of a picture. For normal noise of variance s its square is
-#: distributed as chi^2 with one degree of freedom: its own variance is 2 s^2, that of the true error 2 s^2 as well, and
-#: its mean square 3 s^2.
-OWN_NOISE = NoiseShares(2 / 3, 2 / 3)
-#: Products (p - a)(p - b) of a picture p with two unpooled pictures independent of it and of each other: they estimate
-#: the very error that p has, and a and b are all that is random.
-CROSS_NOISE = NoiseShares(1.0, 0.0)
+#: The largest share of an error that is left out as blur of caustics that may be less than stated, see
+#: :mod:`lippmann.rendering.film.caustic_blur`.
+MOST_LESS = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +30,6 @@ class PixelErrors:
     outliers:
         ``(H, W)`` float32 of at least 0: the part of ``values`` that rests on outliers; None if there is no
         such thing. Of a denoised picture it is a part of ``apart``.
-    noise:
-        How uncertain ``values`` are.
     samples:
         Of a denoised picture: the errors of the samples that it was made of.
     apart:
@@ -67,7 +42,6 @@ class PixelErrors:
 
     values: Floats
     outliers: Floats | None = None
-    noise: NoiseShares = CROSS_NOISE
     samples: PixelErrors | None = None
     apart: Floats | None = None
     blur: Floats | None = None
@@ -78,7 +52,7 @@ class PixelErrors:
             None if values is None else values[inside] for values in (self.outliers, self.apart, self.blur)
         )
         samples = None if self.samples is None else self.samples.part(inside)
-        return PixelErrors(self.values[inside], outliers, self.noise, samples, apart, blur)
+        return PixelErrors(self.values[inside], outliers, samples, apart, blur)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +78,7 @@ class ErrorSums:
         uncertain = values = errors.values.astype(np.float64).ravel()
         self.values[:] += self._sum(owner, values)
         if errors.outliers is not None:
-            outliers = errors.outliers.astype(np.float64).ravel()
-            self.outliers[:] += self._sum(owner, outliers)
-            if errors.apart is None:
-                # An outlier shows in the picture as it does in the estimate.
-                uncertain = values - OUTLIERS_CERTAIN * outliers
+            self.outliers[:] += self._sum(owner, errors.outliers.astype(np.float64).ravel())
         if errors.apart is not None:
             apart = errors.apart.astype(np.float64).ravel()
             self.apart[:] += self._sum(owner, apart)
@@ -135,7 +105,7 @@ class ErrorSums:
 
 
 def _share_less(blur: Real | float, error: Real | float) -> Real | np.float64:
-    share: Real | np.float64 = np.clip(BLUR_TOO_MUCH * blur / error, 0, MOST_LESS)
+    share: Real | np.float64 = np.clip(blur / error, 0, MOST_LESS)
     return share
 
 

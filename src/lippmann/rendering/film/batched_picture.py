@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import Transfer, coding_slope
 from lippmann.errors import UsageError
 from lippmann.rendering.estimate.jackknife import error_of_batches
-from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
+from lippmann.rendering.estimate.pixel_errors import PixelErrors
 from lippmann.rendering.film.coverage import Coverage
 from lippmann.rendering.film.wavefront_plan import Run
 
@@ -152,7 +152,7 @@ class BatchedPicture:
             blur = self.squared_blur()
             if blur is not None:
                 error += blur
-            self._errors = PixelErrors(error, outliers.reshape(shape), OWN_NOISE, blur=blur)
+            self._errors = PixelErrors(error, outliers.reshape(shape), blur=blur)
         return self._errors
 
     def squared_blur(self) -> Floats | None:

@@ -16,6 +16,9 @@ PREFERRED_LANES, PREFERRED_LANES_OF_GPU = 1 << 20, 1 << 22
 #: Fewer lanes than this leave the threads idle while kernels start.
 SMALLEST_LANES = 1 << 14
 
+#: Batches of samples where the memory allows: their number limits how well rare bright light is told from steady noise.
+MOST_BATCHES = 8
+
 #: A float32 number, and one for each colour.
 _FLOAT = 4
 _RGB = 3 * _FLOAT
@@ -56,8 +59,8 @@ def photons(emissions: int, passes: int) -> int:
     return 2 * min(passes, 2) * emissions * PHOTON
 
 
-#: A pixel of a tile: eight batches and a wavefront; with what denoising adds, a pixel of a tile with its margin.
-TILE = batches(8) + BYTES_PER_LANE
+#: A pixel of a tile: its batches and a wavefront; with what denoising adds, a pixel of a tile with its margin.
+TILE = batches(MOST_BATCHES) + BYTES_PER_LANE
 DENOISED_TILE = 832
 
 

@@ -23,7 +23,7 @@ from lippmann.device.sobol import SEED_STEP, SampleStream
 from lippmann.device.types import UInt32
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.progress import Progress, ProgressCallback, of_part, silent
-from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
+from lippmann.rendering.estimate.pixel_errors import PixelErrors
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.batched_picture import STREAMS, BatchedPicture
 from lippmann.rendering.film.caustic_blur import SquaredBlur
@@ -42,9 +42,6 @@ from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource, pixel_number
 
 Floats = NDArray[np.float32]
-
-#: Batches where the memory allows: their number limits how well rare bright light is told from steady noise.
-MOST_BATCHES = 8
 
 
 class FullInBatches(BatchedPicture):
@@ -137,36 +134,6 @@ class FullInBatches(BatchedPicture):
         self.seconds_compile += compiled
         self.seconds_trace += time.perf_counter() - started - compiled
 
-    def probe(self) -> float:
-        """Seconds that one sample of every pixel takes, by a few samples that are not kept."""
-        rays, self.rays = self.rays, RayTotals()
-        started = time.perf_counter()
-        try:
-            with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
-                self._seconds_of(64)  # a single sample would have a kernel of its own
-                compiled = compile_seconds()
-            seconds = self._probed()
-        finally:
-            self.rays = rays
-        self.seconds_compile += compiled
-        self.seconds_trace += time.perf_counter() - started - compiled
-        return seconds
-
-    def _probed(self) -> float:
-        launch = min(self._seconds_of(64) for _ in range(3))
-        pixels = min(1 << 16, self._sums.shape[1], max(1, self._lanes // self._source.channels))
-        spent = self._seconds_of(pixels)
-        # However it is measured, the launch takes its part of a small picture's time.
-        return max(spent - launch, 0.1 * spent) * self._sums.shape[1] / pixels
-
-    def _seconds_of(self, pixels: int) -> float:
-        """Of one sample of each of so many pixels, if the picture has them."""
-        pixels = min(pixels, self._sums.shape[1])
-        started = time.perf_counter()
-        run = Run(0, pixels, (0,), (0,), 1, self._sums.shape[1] // pixels)
-        self._trace(self._integrator, run, self.samples + 1)
-        return time.perf_counter() - started
-
     def _runs(self, samples: int) -> Iterator[Run]:
         """Wavefronts that take ``samples`` more of every pixel."""
         number, per_stream = self.batches, self._batches_of_stream
@@ -258,7 +225,7 @@ def trace_in_batches(
     frame = Frame(whole)
     left = memory - height * width * (memory_model.PICTURE + memory_model.ERROR_MAPS)
     # Half of what is left for the batches, half for the wavefronts.
-    most = max(1, left // 2 // (width * memory_model.batches(MOST_BATCHES)))
+    most = max(1, left // 2 // (width * memory_model.batches(memory_model.MOST_BATCHES)))
     bands = -(-height // most)
     rows = -(-height // bands)
     for first in range(0, height, rows):
@@ -281,7 +248,7 @@ def trace_in_batches(
         frame.rays += band.rays
         frame.seconds_compile += band.seconds_compile
         frame.seconds_trace += band.seconds_trace
-    return frame, PixelErrors(error, outliers, OWN_NOISE, blur=blur)
+    return frame, PixelErrors(error, outliers, blur=blur)
 
 
 def _alternate(number: int) -> tuple[int, ...]:
@@ -292,7 +259,7 @@ def _alternate(number: int) -> tuple[int, ...]:
 
 def _sizes(pixels: int, channels: int, memory: int, further: int) -> tuple[int, int]:
     """How many batches are kept beside ``further`` bytes of a pixel, and the lanes of a wavefront."""
-    for batches in (MOST_BATCHES, MOST_BATCHES // 2, STREAMS):
+    for batches in (memory_model.MOST_BATCHES, memory_model.MOST_BATCHES // 2, STREAMS):
         kept = pixels * (memory_model.batches(batches) + further)
         needed = min(memory_model.SMALLEST_LANES, pixels * channels * batches)
         fits = memory >= kept + needed * memory_model.BYTES_PER_LANE

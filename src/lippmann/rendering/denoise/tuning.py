@@ -1,0 +1,38 @@
+"""Tuned constants of denoising, each with its unit, the benchmark that set it and what others cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class DenoiseTuning:
+    """Constants of the network's use, and of what goes past it.
+
+    Attributes
+    ----------
+    far_beyond_white:
+        Linear value above which light goes past the network, white being 1: it would make the pixels around white, too
+        (docs/research/seen-light.md).
+    reaches:
+        Pixels to each side over which halves are compared, in a near and in a far neighbourhood.
+    far_above:
+        A pixel that is brighter than its samples by so many times the halves' mean difference nearby is so by no
+        accident: then the step of its code counts.
+    hidden, of_samples:
+        Codes by which samples are off that hide what is wrong in their pixel. With fewer than ``of_samples`` a single
+        one is farther off, and more likely all there is of its light: less is left out then (``estimate_coverage.py``).
+    untold_outliers:
+        Share of the samples' error that is taken to rest on outliers where too few batches tell them
+        (docs/research/first-statements.md).
+    """
+
+    far_beyond_white: float = 8.0
+    reaches: tuple[int, int] = (2, 8)
+    far_above: float = 4.0
+    hidden: float = 8.0
+    of_samples: int = 16
+    untold_outliers: float = 0.25
+
+
+TUNING = DenoiseTuning()
