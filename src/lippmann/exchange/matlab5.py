@@ -1,6 +1,7 @@
 """Arrays of numbers in MAT-files of version 5 to 7 (MathWorks, "MAT-File Format", 2023; "Level 5 MAT-File Format").
 
-Read here, and not by a library's native reader, which damaged files bring down.
+Read here: at files of which a few bytes are damaged the native reader of SciPy 1.17 (``scipy.io.loadmat``) ends the
+process by a segmentation fault.
 """
 
 from __future__ import annotations

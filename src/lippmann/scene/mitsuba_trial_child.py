@@ -1,47 +1,26 @@
-"""The process in which Mitsuba loads a scene for the first time: what brings it down ends nothing else.
-
-Reads requests from standard input, each a length and JSON, and answers each by a line of JSON. It ends when the input
-does, or when nothing is asked of it for a while.
-"""
+"""The process in which Mitsuba loads a scene for the first time: what brings it down ends nothing else."""
 
 from __future__ import annotations
 
 import json
-import os
 import re
-import select
-import struct
-import sys
 from typing import Any
 
-LENGTH = struct.Struct("<Q")
-#: Seconds without a request after which the process ends, and its memory is free.
-_IDLE_SECONDS = 5.0
+from lippmann.runtime.helper_process import limit_memory, serve
+
 #: What C++ calls it when memory is short, in messages of Mitsuba's.
 NO_ROOM = re.compile("bad_alloc|bad_array_new_length|length_error")
 NO_MEMORY = "more memory than there is would be needed"
 
 
 def main() -> None:
-    """Answer requests: ``variant``, ``text`` of a scene, and ``memory`` in bytes that may be taken."""
-    answers = os.fdopen(os.dup(1), "w")
-    silence = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(silence, 1)  # what libraries print is no answer
-    os.dup2(silence, 2)
-    requests = sys.stdin.buffer
-    while _is_asked():
-        head = requests.read(LENGTH.size)
-        if len(head) < LENGTH.size:
-            return
-        request = json.loads(requests.read(*LENGTH.unpack(head)))
-        answers.write(json.dumps(_try(request["variant"], request["text"], request["memory"])) + "\n")
-        answers.flush()
+    """Answer requests, JSON with ``variant``, ``text`` of a scene, and ``memory`` in bytes that may be taken."""
+    serve(_answer)
 
 
-def _is_asked() -> bool:
-    if os.name == "nt":  # which waits for sockets alone
-        return True
-    return bool(select.select([0], [], [], _IDLE_SECONDS)[0])
+def _answer(data: bytes) -> bytes:
+    request = json.loads(data)
+    return json.dumps(_try(request["variant"], request["text"], request["memory"])).encode()
 
 
 def _try(variant: str, text: str, memory: int) -> dict[str, str]:
@@ -52,7 +31,7 @@ def _try(variant: str, text: str, memory: int) -> dict[str, str]:
 
     from lippmann.runtime.engine import search_package_alone
 
-    _limit_memory(memory)
+    limit_memory(memory)
     mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)
     search_package_alone(mi)
@@ -83,12 +62,3 @@ def fault_of_meshes(mi: Any, scene: Any) -> str | None:
         if faces.max() >= vertices:
             return f"a mesh names vertex {int(faces.max())}; it has {vertices}"
     return None
-
-
-def _limit_memory(memory: int) -> None:
-    try:
-        import resource
-    except ImportError:  # there is none on Windows
-        return
-    _, most = resource.getrlimit(resource.RLIMIT_DATA)
-    resource.setrlimit(resource.RLIMIT_DATA, (memory if most < 0 else min(memory, most), most))

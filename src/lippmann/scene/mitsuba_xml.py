@@ -5,6 +5,9 @@ resolved once, by the rules of Mitsuba 3.9's own parser (``src/core/parser.cpp``
 of elements without parameters, includes and search paths, and the files that the scene reads. The same list of files
 serves loading, the check of folders, fingerprints and clusters. Mitsuba is given absolute paths and plugins of its own
 package only, so that no scene can make it look anywhere else.
+
+Mitsuba's parser (``mitsuba.parser``, 3.9) does not take its place: it opens includes by absolute paths and by ``..``
+wherever they lie, and elements inside elements, 200 000 deep, end the process.
 """
 
 from __future__ import annotations
