@@ -22,7 +22,7 @@ from xml.parsers import expat
 
 from lippmann.errors import SceneError
 from lippmann.scene.mitsuba_plugins import check_material, check_plugin
-from lippmann.scene.parsing.files import find_file, find_folder, read_bytes
+from lippmann.scene.parsing.files import NamedFiles, read_bytes
 
 #: Included files inside included files, as Mitsuba allows by default.
 MOST_INCLUDE_LEVELS = 15
@@ -112,7 +112,7 @@ def read_mitsuba_xml(path: Path, *, allow_outside: bool = False) -> MitsubaXml:
         A file is missing, is no XML or no scene, names a plugin or material that Mitsuba does not have, or names a
         file that is not found or, without ``allow_outside``, not in the scene's folder.
     """
-    reader = _Reader(path.parent, allow_outside)
+    reader = _Reader(NamedFiles(path.parent, allow_outside))
     root = reader.file(path, {}, [], "", level=0)
     if root.tag != "scene":
         raise SceneError(f"is XML of a '{root.tag[:40]}'", where=path.name, rule="a Mitsuba file holds a 'scene'")
@@ -120,13 +120,12 @@ def read_mitsuba_xml(path: Path, *, allow_outside: bool = False) -> MitsubaXml:
 
 
 class _Reader:
-    """Reads one scene: ``folder`` is that of its file, in which all others must lie."""
+    """Reads one scene: ``named`` are the files that it may name, ``folder`` is that of its own."""
 
-    def __init__(self, folder: Path, allow_outside: bool) -> None:
-        self.folder = folder
-        self.allow_outside = allow_outside
+    def __init__(self, named: NamedFiles) -> None:
+        self.named, self.folder = named, named.folder
         self.files: dict[str, Path] = {}
-        self._scene_folders = [folder]  # where files of all kinds but spectra are looked up
+        self._scene_folders = [self.folder]  # where files of all kinds but spectra are looked up
         self._includes = self._elements = 0
         self._version: tuple[str, bool] | None = None
 
@@ -157,7 +156,7 @@ class _Reader:
             elif child.tag == "path":
                 value = self._substitute(child, known).get("value")
                 near = [path.parent, *paths, *folders, self.folder]
-                paths.insert(0, self._find_folder(value, near, child._origin))
+                paths.insert(0, self.named.find_folder(value, where=child._origin, what="search path", folders=near))
         if level == 0:
             self._scene_folders = [*paths, self.folder]
         return self._element(raw, path, parameters, [*paths, *folders], level, is_root=True)
@@ -258,12 +257,7 @@ class _Reader:
         return key
 
     def _find(self, name: str, folders: list[Path], where: str) -> Path:
-        return find_file(name, folders, self.folder, where=where, what="file", allow_outside=self.allow_outside)
-
-    def _find_folder(self, name: str, folders: list[Path], where: str) -> Path:
-        return find_folder(
-            name, folders, self.folder, where=where, what="search path", allow_outside=self.allow_outside
-        )
+        return self.named.find(name, where=where, what="file", folders=folders)
 
 
 def parse_xml(data: bytes, where: str) -> XmlElement:

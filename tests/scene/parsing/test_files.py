@@ -7,12 +7,11 @@ import pytest
 from PIL import Image as Pillow
 
 from lippmann.errors import SceneError
-from lippmann.scene.parsing.files import MissingFileError, decode_image, decode_text, read_bytes, read_image, resolve
+from lippmann.scene.parsing.files import MissingFileError, NamedFiles, decode_image, decode_text, read_bytes, read_image
 
 
-def find(folder, name, **options):
-    options = {"where": "scene.obj:3", "what": "texture", "allow_outside": False} | options
-    return resolve(folder, name, **options)
+def find(folder, name, *, anywhere=False, what="texture"):
+    return NamedFiles(folder, anywhere).find(name, where="scene.obj:3", what=what)
 
 
 @pytest.fixture
@@ -36,7 +35,7 @@ def test_outside_files_need_leave(folder):
         find(folder, "../secret.txt")
     with pytest.raises(SceneError, match="lies outside"):
         find(folder, str(folder.parent / "secret.txt"))
-    assert find(folder, "../secret.txt", allow_outside=True).samefile(folder.parent / "secret.txt")
+    assert find(folder, "../secret.txt", anywhere=True).samefile(folder.parent / "secret.txt")
 
 
 def test_a_path_of_another_machine_means_the_file_beside_the_scene(folder):
@@ -125,4 +124,4 @@ def test_links_lead_outside_no_more_than_names_do(folder):
             find(folder, name)
     with pytest.raises(SceneError, match="not found"):
         find(folder, "circle")
-    assert find(folder, "link.txt", allow_outside=True).samefile(folder.parent / "secret.txt")
+    assert find(folder, "link.txt", anywhere=True).samefile(folder.parent / "secret.txt")

@@ -9,6 +9,7 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import TYPE_CHECKING
 
@@ -87,91 +88,86 @@ def decode_text(data: bytes, where: str) -> str:
         return data.decode("latin-1")
 
 
-def resolve(folder: Path, name: str, *, where: str, what: str, allow_outside: bool) -> Path:
-    """The file that ``name`` means, seen from ``folder``, in which it must lie; see :func:`find_file`."""
-    return find_file(name, [folder], folder, where=where, what=what, allow_outside=allow_outside)
+@dataclass(frozen=True)
+class NamedFiles:
+    """The files that a scene file may name: those of its folder and below, links followed.
 
+    Exporters on Windows write backslashes and absolute paths; a path that leads out of the folder is taken to mean the
+    file of that name inside it. Errors tell nothing of what lies outside.
 
-def resolve_line(folder: Path, body: str, *, where: str, what: str, allow_outside: bool) -> Path:
-    """The file that the rest of a line names: all of it, spaces and all, or what stands before a comment.
-
-    Raises
-    ------
-    MissingFileError, SceneError
-        See :func:`find_file`.
+    Attributes
+    ----------
+    folder:
+        The scene file's folder.
+    anywhere:
+        Whether the scene file is trusted to name any file of the machine.
     """
-    plain = uncommented(body)
-    name = body if plain == body or is_file(folder / body) else plain
-    return resolve(folder, name, where=where, what=what, allow_outside=allow_outside)
+
+    folder: Path
+    anywhere: bool = False
+
+    def find(self, name: str, *, where: str, what: str, folders: Sequence[Path] = ()) -> Path:
+        """The file that ``name`` means, seen from the first of ``folders`` that has it; by default the scene's own.
+
+        Parameters
+        ----------
+        where:
+            File and line that speak of ``name``, for the error.
+        what:
+            The kind of file, such as "texture".
+
+        Raises
+        ------
+        MissingFileError
+            No such file.
+        SceneError
+            It may not be named.
+        """
+        plain = name.replace("\\", "/")
+        absolute = _is_absolute(name)
+        folders = folders or (self.folder,)
+        candidates = [Path(plain)] if absolute else [folder / plain for folder in folders]
+        inside = [candidate for candidate in candidates if _lies_in(candidate, self.folder)]
+        allowed = candidates if self.anywhere else inside
+        for candidate in allowed:
+            if is_file(candidate):
+                return candidate
+        if absolute or not inside:
+            for folder in folders:
+                beside = folder / PurePosixPath(plain).name
+                if is_file(beside) and self.admits(beside):
+                    return beside
+        if not allowed and any(_lies_in(candidate, self.folder) is False for candidate in candidates):
+            raise _outside(name, where, what)
+        raise MissingFileError(
+            f"{what} '{name}' not found", where=where, fix=_near_miss(allowed[0], asset=True) if allowed else ""
+        )
+
+    def find_on_line(self, body: str, *, where: str, what: str) -> Path:
+        """The file that the rest of a line names: all of it, spaces and all, or what stands before a comment."""
+        plain = uncommented(body)
+        return self.find(body if plain == body or is_file(self.folder / body) else plain, where=where, what=what)
+
+    def find_folder(self, name: str, *, where: str, what: str, folders: Sequence[Path]) -> Path:
+        """The folder that ``name`` means, seen from the first of ``folders`` that has it; errors as of :meth:`find`."""
+        plain = name.replace("\\", "/")
+        candidates = [Path(plain)] if _is_absolute(name) else [folder / plain for folder in folders]
+        allowed = [candidate for candidate in candidates if self.admits(candidate)]
+        if not allowed:
+            raise _outside(name, where, what)
+        for candidate in allowed:
+            if is_folder(candidate):
+                return candidate
+        raise SceneError(f"{what} '{name}' not found", where=where, rule="it must be a folder")
+
+    def admits(self, path: Path) -> bool:
+        """Whether the scene file may name a file, wherever links lead."""
+        return self.anywhere or bool(_lies_in(path, self.folder))
 
 
 def uncommented(body: str) -> str:
     """The rest of a line without the comment at its end: ``#`` begins one only after a space."""
     return re.split(r"\s#", body, maxsplit=1)[0].rstrip()
-
-
-def find_file(
-    name: str, folders: Sequence[Path], scene_folder: Path, *, where: str, what: str, allow_outside: bool
-) -> Path:
-    """The file that ``name`` means, seen from the first of ``folders`` that has it.
-
-    Exporters on Windows write backslashes and absolute paths; a path that leads out of ``scene_folder`` is taken to
-    mean the file of that name inside one of the folders, unless ``allow_outside`` trusts the scene file to name any
-    file of the machine. Errors tell nothing of what lies outside.
-
-    Parameters
-    ----------
-    where:
-        File and line that speak of ``name``, for the error.
-    what:
-        The kind of file, such as "texture".
-
-    Raises
-    ------
-    MissingFileError
-        No such file.
-    SceneError
-        It lies outside ``scene_folder`` and ``allow_outside`` is false.
-    """
-    plain = name.replace("\\", "/")
-    absolute = _is_absolute(name)
-    candidates = [Path(plain)] if absolute else [folder / plain for folder in folders]
-    inside = [candidate for candidate in candidates if _lies_in(candidate, scene_folder)]
-    allowed = candidates if allow_outside else inside
-    for candidate in allowed:
-        if is_file(candidate):
-            return candidate
-    if absolute or not inside:
-        for folder in folders:
-            beside = folder / PurePosixPath(plain).name
-            if is_file(beside) and (allow_outside or _lies_in(beside, scene_folder)):
-                return beside
-    if not allowed and any(_lies_in(candidate, scene_folder) is False for candidate in candidates):
-        raise _outside(name, where, what)
-    raise MissingFileError(
-        f"{what} '{name}' not found", where=where, fix=_near_miss(allowed[0], asset=True) if allowed else ""
-    )
-
-
-def find_folder(
-    name: str, folders: Sequence[Path], scene_folder: Path, *, where: str, what: str, allow_outside: bool
-) -> Path:
-    """The folder that ``name`` means, seen from the first of ``folders`` that has it.
-
-    Raises
-    ------
-    SceneError
-        No such folder, or it lies outside ``scene_folder`` and ``allow_outside`` is false.
-    """
-    plain = name.replace("\\", "/")
-    candidates = [Path(plain)] if _is_absolute(name) else [folder / plain for folder in folders]
-    inside = [candidate for candidate in candidates if allow_outside or _lies_in(candidate, scene_folder)]
-    if not inside:
-        raise _outside(name, where, what)
-    for candidate in inside:
-        if is_folder(candidate):
-            return candidate
-    raise SceneError(f"{what} '{name}' not found", where=where, rule="it must be a folder")
 
 
 def _outside(name: str, where: str, what: str) -> SceneError:

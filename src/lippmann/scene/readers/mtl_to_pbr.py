@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.scene.parsing import texture_maps
-from lippmann.scene.parsing.files import read_image, resolve_line
+from lippmann.scene.parsing.files import NamedFiles, read_image
 from lippmann.scene.readers.mtl import MapReference, MtlRecord
 from lippmann.scene.values.description import Color, Image, Material, Texture, Wrap
 
@@ -33,9 +33,8 @@ class MaterialMapper:
         Statements that were ignored, one line each.
     """
 
-    def __init__(self, folder: Path, *, allow_outside: bool) -> None:
-        self._folder = folder
-        self._allow_outside = allow_outside
+    def __init__(self, named: NamedFiles) -> None:
+        self._named = named
         self._images: dict[Path, Image] = {}
         self.notes: list[str] = []
 
@@ -205,9 +204,7 @@ class MaterialMapper:
         return _clip(color, 1.0 if clip else np.inf)
 
     def _texture(self, reference: MapReference, *, srgb: bool) -> Texture:
-        path = resolve_line(
-            self._folder, reference.file, where=reference.where, what="texture", allow_outside=self._allow_outside
-        )
+        path = self._named.find_on_line(reference.file, where=reference.where, what="texture")
         if path not in self._images:
             self._images[path] = read_image(path, where=reference.where)
         ignored = sorted(set(reference.options) & {"-mm", "-t", "-cc"})

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
-from lippmann.scene.parsing.files import MissingFileError, decode_text, is_file, read_bytes, resolve, uncommented
+from lippmann.scene.parsing.files import MissingFileError, NamedFiles, decode_text, is_file, read_bytes, uncommented
 from lippmann.scene.parsing.points_lines import as_material
 from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.readers.mtl import MtlRecord, parse_mtl
@@ -95,8 +95,9 @@ def read_obj(path: Path, *, allow_outside: bool = False) -> SceneDescription:
         fix = "points are drawn where 'p' names them" if statements.positions.bodies else "is it an OBJ file?"
         raise SceneError("holds no faces, lines or points", where=where, fix=fix)
     geometry = _assemble(statements, where)
-    records, missing = _read_libraries(statements.libraries, path, allow_outside)
-    mapper = MaterialMapper(path.parent, allow_outside=allow_outside)
+    named = NamedFiles(path.parent, allow_outside)
+    records, missing = _read_libraries(statements.libraries, where, named)
+    mapper = MaterialMapper(named)
     meshes: list[Mesh] = []
     materials: list[Material] = []
     notes = [f"{count} {what} are not rendered" for what, count in statements.ignored.items()]
@@ -339,7 +340,7 @@ def _mesh(geometry: _Geometry, rows: Integers, name: str, material: int) -> Mesh
     )
 
 
-def _read_libraries(libraries: Lines, path: Path, allow_outside: bool) -> tuple[dict[str, MtlRecord], list[str]]:
+def _read_libraries(libraries: Lines, file: str, named: NamedFiles) -> tuple[dict[str, MtlRecord], list[str]]:
     """All materials of all libraries, the first of each name, and notes on the libraries that are not there."""
     records: dict[str, MtlRecord] = {}
     notes: list[str] = []
@@ -349,17 +350,17 @@ def _read_libraries(libraries: Lines, path: Path, allow_outside: bool) -> tuple[
         if not body or body in seen:
             continue
         seen.add(body)
-        where = f"{path.name}:{number}"
+        where = f"{file}:{number}"
         # One name with spaces, or several names: only the folder can tell.
         plain = uncommented(body)
-        whole = next((name for name in (body, plain) if is_file(path.parent / name)), None)
+        whole = next((name for name in (body, plain) if is_file(named.folder / name)), None)
         for name in [whole] if whole else plain.split():
             looked_for += 1
             if looked_for > _MOST_LIBRARIES:
                 rule = f"at most {_MOST_LIBRARIES} are looked for"
                 raise SceneError("names too many material libraries", where=where, rule=rule, fix="join them")
             try:
-                library = resolve(path.parent, name, where=where, what="material library", allow_outside=allow_outside)
+                library = named.find(name, where=where, what="material library")
             except MissingFileError as error:
                 hint = f" ({error.fix})" if error.fix else ""
                 notes.append(f"{where}: {error.what}{hint}: its materials are plain grey")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
-from lippmann.scene.parsing.files import read_bytes, read_image, resolve
+from lippmann.scene.parsing.files import NamedFiles, read_bytes, read_image
 from lippmann.scene.parsing.ply_body import Columns, Integers, Lists, Numbers, read_body
 from lippmann.scene.parsing.ply_header import Element, read_header
 from lippmann.scene.parsing.triangulation import triangulate
@@ -77,7 +77,7 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
         notes.append("colours of faces are not shown: vertices have their own")
     textures: list[Texture | None] = []
     for name in header.textures:
-        image = resolve(path.parent, name, where=where, what="texture", allow_outside=allow_outside)
+        image = NamedFiles(path.parent, allow_outside).find(name, where=where, what="texture")
         textures.append(Texture(read_image(image, where=where), srgb=True))
     if textures and not mesh.uvs:
         notes.append("the texture is not used: the file gives no texture coordinates")

@@ -9,7 +9,7 @@ from urllib.parse import unquote
 
 from lippmann.errors import SceneError
 from lippmann.runtime.machine import check_input
-from lippmann.scene.parsing.files import read_bytes, resolve
+from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.gltf.document import DECOMPRESS, MESHOPT, Document
 from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.readers.gltf.meshopt import MeshoptError, decompress
@@ -41,7 +41,7 @@ def read_uri(document: Document, uri: str, place: str, what: str) -> tuple[bytes
             fix="save it beside the scene and name it there",
         )
     name = unquote(uri)
-    path = resolve(document.folder, name, where=document.file, what=what, allow_outside=document.allow_outside)
+    path = document.named.find(name, where=document.file, what=what)
     return read_bytes(path), name
 
 

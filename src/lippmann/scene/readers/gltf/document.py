@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from lippmann.errors import SceneError, UsageError
-from lippmann.scene.parsing.files import read_bytes
+from lippmann.scene.parsing.files import NamedFiles, read_bytes
 from lippmann.scene.readers.gltf.json_fields import Fields
 
 Kind = Literal[
@@ -120,13 +120,12 @@ def _line(remark: str, places: list[str]) -> str:
 class Document:
     """The JSON of a glTF file, its top-level lists by kind, and its binary chunk (glb only).
 
-    ``folder`` holds the files that the document names; ``allow_outside`` lets it name files elsewhere.
-    ``variant`` is the number of the material variant that is shown; None for the materials of no variant.
+    ``named`` are the files that the document may name. ``variant`` is the number of the material variant that is
+    shown; None for the materials of no variant.
     """
 
     file: str
-    folder: Path
-    allow_outside: bool
+    named: NamedFiles
     root: Fields
     binary_chunk: memoryview | None
     variant: int | None = None
@@ -198,7 +197,8 @@ def open_document(path: Path, *, allow_outside: bool, variants: Mapping[str, str
     else:
         text, binary_chunk = memoryview(data), None
     root = _parse(text, path.name)
-    document = Document(path.name, path.parent, allow_outside, root, binary_chunk, _variant(root, variants or {}))
+    named = NamedFiles(path.parent, allow_outside)
+    document = Document(path.name, named, root, binary_chunk, _variant(root, variants or {}))
     _check_version(root)
     return document
 

@@ -20,7 +20,7 @@ import numpy as np
 from lippmann.codecs.pillow_formats import open_picture
 from lippmann.errors import LippmannError, SceneError
 from lippmann.runtime.machine import check_input
-from lippmann.scene.parsing.files import read_bytes, resolve
+from lippmann.scene.parsing.files import NamedFiles, read_bytes
 from lippmann.scene.readers.splats.activation import MOST_SMALL, Bytes, activated, ask_memory, largest_left_out, sigmoid
 from lippmann.scene.readers.splats.sog_folder import META, holds_sog
 from lippmann.scene.values.description import SceneDescription
@@ -50,7 +50,7 @@ def read_sog(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     where = path.name or str(path)
     if holds_sog(path):
         folder = path if path.is_dir() else path.parent
-        return _read(_Folder(where, folder, allow_outside), folder.resolve().name)
+        return _read(_Folder(where, NamedFiles(folder, allow_outside)), folder.resolve().name)
     try:
         with zipfile.ZipFile(io.BytesIO(read_bytes(path))) as archive:
             return _read(_Bundle(where, archive), path.stem)
@@ -119,11 +119,10 @@ class _Bundle(_Files):
 
 @dataclass(frozen=True)
 class _Folder(_Files):
-    folder: Path
-    allow_outside: bool
+    named: NamedFiles
 
     def read(self, name: str, most: int | None = None) -> bytes:
-        path = resolve(self.folder, name, where=self.where, what="picture", allow_outside=self.allow_outside)
+        path = self.named.find(name, where=self.where, what="picture")
         self._check_size(name, path.stat().st_size, most)
         return read_bytes(path)
 

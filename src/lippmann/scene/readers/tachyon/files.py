@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lippmann.errors import SceneError
-from lippmann.scene.parsing.files import decode_image, read_bytes, resolve
+from lippmann.scene.parsing.files import NamedFiles, decode_image, read_bytes
 from lippmann.scene.parsing.tokens import Words
 from lippmann.scene.values.whitted_surfaces import ClassicImage
 
@@ -21,13 +21,12 @@ class SceneFiles:
     """Finds and reads files beside the scene.
 
     A name counts from the folder of the file that holds it, then from the folder of the scene itself (Tachyon knows
-    the working directory alone). Nothing outside the scene's folder is read unless ``allow_outside``. What all named
-    files together may hold is limited, because a short scene can name a long file many times.
+    the working directory alone). What all named files together may hold is limited, because a short scene can name a
+    long file many times.
     """
 
-    def __init__(self, scene: Path, *, allow_outside: bool) -> None:
-        self.folder = scene.parent
-        self._allow_outside = allow_outside
+    def __init__(self, named: NamedFiles) -> None:
+        self._named, self.folder = named, named.folder
         self._words_left = _MOST_WORDS
         self._texels_left = _MOST_TEXELS
 
@@ -41,11 +40,11 @@ class SceneFiles:
         """
         try:
             beside = holder.parent != self.folder and (holder.parent / name).is_file()
-        except (OSError, ValueError):  # no name of a file, as ``resolve`` will say
+        except (OSError, ValueError):  # no name of a file, as the look-up will say
             beside = False
         if beside:
             name = os.path.relpath(holder.parent / name, self.folder)
-        return resolve(self.folder, name, where=where, what=what, allow_outside=self._allow_outside)
+        return self._named.find(name, where=where, what=what)
 
     def relative_name(self, path: Path) -> str:
         """A file's name as errors give it: seen from the scene's folder."""

@@ -16,6 +16,7 @@ from typing import Literal, TypeVar
 import numpy as np
 
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.parsing.tokens import Words
 from lippmann.scene.readers.tachyon.files import SceneFiles
 from lippmann.scene.readers.tachyon.shapes import SHAPES, ShapeReader
@@ -75,7 +76,7 @@ def read_tachyon(path: str | Path, *, allow_outside: bool = False) -> ClassicSce
         without any primitive.
     """
     path = Path(path)
-    reader = _SceneReader(path, SceneFiles(path, allow_outside=allow_outside))
+    reader = _SceneReader(path, SceneFiles(NamedFiles(path.parent, allow_outside)))
     return reader.read()
 
 

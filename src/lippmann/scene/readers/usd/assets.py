@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.runtime.machine import check_input
-from lippmann.scene.parsing.files import MissingFileError, decode_image, find_file, read_bytes
+from lippmann.scene.parsing.files import MissingFileError, NamedFiles, decode_image, read_bytes
 from lippmann.scene.parsing.texture_maps import unit
 from lippmann.scene.readers.environment_map import read_environment
 from lippmann.scene.readers.usd.records import Record
@@ -61,7 +61,7 @@ class Assets:
     """The pictures of a stage, each decoded once."""
 
     stage: Path
-    allow_outside: bool
+    named: NamedFiles
     notes: dict[str, None] = field(default_factory=dict)
     _images: dict[str, Image | None] = field(default_factory=dict)
 
@@ -120,21 +120,14 @@ class Assets:
         if "[" in asset["found"]:
             return None
         folders = [Path(asset["folder"] or self.stage.parent), self.stage.parent]
-        return find_file(
-            asset["name"],
-            folders,
-            self.stage.resolve().parent,
-            where=self.stage.name,
-            what="texture",
-            allow_outside=self.allow_outside,
-        )
+        return self.named.find(asset["name"], where=self.stage.name, what="texture", folders=folders)
 
     def _bytes(self, asset: Record) -> bytes:
         path = self._path(asset)
         if path is not None:
             return read_bytes(path)
         outer, *inner = asset["found"].rstrip("]").split("[")
-        if not self.allow_outside and not Path(outer).resolve().is_relative_to(self.stage.resolve().parent):
+        if not self.named.admits(Path(outer)):
             raise SceneError(f"texture '{asset['name']}' lies outside the scene's folder", where=self.stage.name)
         return self._packed(Path(outer), inner[:_DEEPEST])
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.readers.usd.assets import Assets
 from lippmann.scene.readers.usd.process import ask_stage
 from lippmann.scene.readers.usd.reader import check_file, describe
@@ -51,7 +52,7 @@ class MovingStage:
         self._path = path
         self._variants = dict(variants or {})
         self._allow_outside = allow_outside
-        self._assets = Assets(path, allow_outside)
+        self._assets = Assets(path, NamedFiles(path.resolve().parent, allow_outside))
         tree, _ = self._ask(0.0)
         if tree["duration"] <= 0.0:
             raise SceneError(

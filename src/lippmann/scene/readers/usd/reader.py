@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
-from lippmann.scene.parsing.files import read_bytes
+from lippmann.scene.parsing.files import NamedFiles, read_bytes
 from lippmann.scene.readers.usd.assets import Assets, check_package
 from lippmann.scene.readers.usd.lights import LightReader, camera_of
 from lippmann.scene.readers.usd.materials import Surface, SurfaceReader
@@ -47,7 +47,7 @@ def read_usd(path: Path, *, allow_outside: bool = False, variants: Mapping[str, 
     tree, arrays = ask_stage(path, variants or {}, None, allow_outside=allow_outside)
     if tree["duration"] > 0.0:
         tree["notes"].append("time samples are not played without frames=...; the stage is shown at its beginning")
-    return describe(tree, arrays, path, Assets(path, allow_outside))
+    return describe(tree, arrays, path, Assets(path, NamedFiles(path.resolve().parent, allow_outside)))
 
 
 def check_file(path: Path) -> None:
