@@ -81,6 +81,7 @@ ORDER = (
     "studio_app",
     "sequences",
     "api",
+    "plugins",
     "",
     "cli.shared",
     "cli.commands",
@@ -107,6 +108,7 @@ LOADS_ENGINE = ("device", "rendering")
 ENTRANCES = (
     "",
     "api",
+    "plugins",
     "cli",
     "runtime.engine",
     "journal",
@@ -305,6 +307,33 @@ def test_only_the_modules_that_render_use_the_engine():
     assert places([found for found in foreign if not inside(found.importer, USES_ENGINE)]) == []
     at_import = [found for found in foreign if not found.inside_function]
     assert places([found for found in at_import if not inside(found.importer, LOADS_ENGINE)]) == []
+
+
+#: Formats with heavy libraries: a folder each, the libraries that it alone imports, and who may come in by its door.
+#: Readers are named in the registry, and so loaded when a file of theirs is read.
+HEAVY: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "scene.readers.blend": (("bpy", "mathutils"), ()),
+    "scene.readers.heif": (("pillow_heif",), ("scene.readers.depth_photo",)),
+    "scene.readers.molecules": (("gemmi",), ()),
+    "scene.readers.usd": (("pxr",), ()),
+    "scene.readers.volumes": (("nibabel", "pydicom", "openvdb", "pyopenvdb"), ()),
+    "scene.readers.vtk": (("pyvista", "vtkmodules", "vtk"), ()),
+    "cluster": (("distributed", "dask", "bokeh", "cryptography"), ("cli.commands.cluster",)),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("folder", HEAVY)
+def test_a_heavy_format_is_a_folder_with_one_door(folder):
+    libraries, guests = HEAVY[folder]
+    outside = [found for found in imports() if not inside(found.importer, (folder,))]
+    entering = [found for found in outside if found.ours is not None and inside(found.ours, (folder,))]
+    lazy = [
+        found for found in entering if found.importer in guests and (found.inside_function or found.for_annotations)
+    ]
+    assert places([found for found in entering if found not in lazy]) == []
+    foreign = [found for found in outside if found.imported.partition(".")[0] in libraries]
+    assert places(foreign) == []
 
 
 def loaded_with(module: str) -> set[str]:

@@ -26,8 +26,8 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 DOORS = {
     "cluster": ("cryptography, distributed", "lippmann.cluster.connection"),
     "exchange": ("h5py, zarr", "lippmann.exchange"),
-    "heif": ("pillow_heif", "lippmann.scene.readers.heif_photo"),
-    "molecules": ("gemmi", "lippmann.scene.readers.molecule"),
+    "heif": ("pillow_heif", "lippmann.scene.readers.heif.photo"),
+    "molecules": ("gemmi", "lippmann.scene.readers.molecules.reader"),
     "notebook": ("anywidget", "lippmann.viewer.widget"),
     "usd": ("pxr", "lippmann.scene.readers.usd"),
     "volumes": ("nibabel, pydicom", "lippmann.scene.readers.volumes"),

@@ -24,7 +24,7 @@ from lippmann.scene.readers.gltf import read_gltf
 from lippmann.scene.readers.obj import read_obj
 from lippmann.scene.readers.ply import read_ply
 from lippmann.scene.readers.tachyon.reader import read_tachyon
-from lippmann.scene.readers.trimesh_pyvista import from_trimesh
+from lippmann.scene.readers.trimesh_objects import from_trimesh
 
 EPS = b"""%!PS-Adobe-3.0 EPSF-3.0
 %%BoundingBox: 0 0 4 4

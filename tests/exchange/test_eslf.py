@@ -59,7 +59,7 @@ def test_another_program_s_file(tmp_path, display):
     with pytest.raises(PictureError, match=r"say display=..., with 14 x 14 pixels per lens and 3 x 2 lenses"):
         found.image()
     made = display("square", lenses=(6, 4), pixels=7)
-    again = read_eslf(tmp_path / "x.png", lens=(7, 7))
+    again = read_eslf(tmp_path / "x.png", grid=(7, 7))
     assert again.shape == (7, 7, 4, 6)
     shown = again.image(made, where="a/x.png", layout="eslf")
     assert shown.display == made
@@ -103,7 +103,7 @@ def test_wrong_and_half_files_are_refused(display, picture, tmp_path):
     path.write_bytes(whole[: len(whole) // 2])
     assert "this PNG is damaged" in refused()
     path.write_bytes(whole)
-    assert "has 12 x 9 pixels; with 5 x 3 pixels per lens" in refused(lens=(5, 3))
+    assert "has 12 x 9 pixels; with 5 x 3 pixels per lens" in refused(grid=(5, 3))
     with pytest.raises(PictureError, match="hexagonal lenses; ESLF takes"):
         write_eslf(light_field_of(picture(display("hexagonal")), "uint8"), display("hexagonal"), path)
     assert path.read_bytes() == whole

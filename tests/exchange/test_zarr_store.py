@@ -21,7 +21,7 @@ TYPES = st.sampled_from(["uint8", "uint16", "float16", "float32"])
 
 def there_and_back(image, folder, stored):
     shutil.rmtree(folder, ignore_errors=True)
-    write_zarr(light_field_of(image, stored), folder)
+    write_zarr(light_field_of(image, stored), image.display, folder)
     return read_zarr(folder)
 
 

@@ -44,7 +44,7 @@ _INDEX_CODECS = ("bytes", "transpose", "crc32c")
 _TYPE_2 = re.compile(r"[|<>](b1|[iu][1248]|f[248])")
 _TYPES_3 = (
     "bool",
-    *(f"{kind}int{bits}" for kind in ("", "u") for bits in (8, 16, 32, 64)),
+    *("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"),
     "float16",
     "float32",
     "float64",

@@ -66,20 +66,20 @@ def write_eslf(light_field: LightField, display: Display, path: Path) -> None:
         temporary.write_bytes(encode_png(picture, text=text, srgb=light_field.transfer == "srgb"))
 
 
-def read_eslf(path: Path, *, lens: tuple[int, int] | None = None) -> LightField:
+def read_eslf(path: Path, *, grid: tuple[int, int] | None = None) -> LightField:
     """Read a light field from one PNG of micro-images.
 
     Parameters
     ----------
     path:
         The file.
-    lens:
+    grid:
         Pixels under a lens, across and down. None: those of the display that the file names, else 14 x 14.
 
     Raises
     ------
     PictureError
-        If the file is missing, damaged or no PNG in colour, or its sides are no multiples of ``lens``.
+        If the file is missing, damaged or no PNG in colour, or its sides are no multiples of ``grid``.
     """
     header = open_file(path)
     if header.format != "png":
@@ -89,8 +89,8 @@ def read_eslf(path: Path, *, lens: tuple[int, int] | None = None) -> LightField:
         raise PictureError("is the native picture of a display", where=str(path), rule=rule)
     note = read_png_header(path).text.get(TEXT_KEY, "")
     metadata = from_note(note, LAYOUT, str(path))
-    across, down = LENS if lens is None else lens
-    if lens is None and metadata is not None:
+    across, down = LENS if grid is None else grid
+    if grid is None and metadata is not None:
         down, across = view_shape(metadata.display)[:2]
     if header.width % across or header.height % down:
         rule = f"with {across} x {down} pixels per lens its sides must be multiples of these"

@@ -5,42 +5,20 @@ Axes, names and units of a layout are defined in that layout's own module.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import cast
 
 from lippmann.display import Display
 from lippmann.errors import OutputError, PictureError, UsageError
-from lippmann.exchange.eslf import read_eslf, write_eslf
-from lippmann.exchange.hci import read_hci, write_hci
 from lippmann.exchange.hci_parameters import NAME as HCI_PARAMETERS
-from lippmann.exchange.lftoolbox_mat import read_matlab, write_matlab
-from lippmann.exchange.light_field import DEPTH, WEIGHT, LightField, light_field_of, view_shape
-from lippmann.exchange.view_folder import is_composable, read_view_folder, write_view_folder
-from lippmann.exchange.zarr_store import read_zarr, write_zarr
+from lippmann.exchange.light_field import DEPTH, LightField, light_field_of, view_shape
+from lippmann.exchange.registry import EXPORTS, LAYOUTS, Export, Layout
+from lippmann.exchange.view_folder import is_composable
 from lippmann.image import IntegralImage, compose
 from lippmann.image.stored_values import Stored
 from lippmann.progress import ProgressCallback, silent
-
-LayoutName = Literal["hci", "lftoolbox", "eslf", "zarr", "views"]
-LAYOUTS: tuple[LayoutName, ...] = get_args(LayoutName)
-
-_CODES: Mapping[int, Stored] = {8: "uint8", 16: "uint16"}
-
-#: Type of the values by layout and bits.
-_BITS: Mapping[LayoutName, Mapping[int, Stored]] = {
-    "hci": _CODES,
-    "lftoolbox": {**_CODES, 32: "float32"},
-    "eslf": _CODES,
-    "zarr": {**_CODES, 32: "float32"},
-    "views": {**_CODES, 32: "float32"},
-}
-#: Endings of the layouts that are one file instead of a folder.
-_ENDING: Mapping[LayoutName, str] = {"lftoolbox": ".mat", "eslf": ".png"}
-
-#: Maps that a layout holds; Zarr holds all.
-_MAPS: Mapping[LayoutName, tuple[str, ...]] = {"hci": (DEPTH,), "lftoolbox": (WEIGHT,), "eslf": (WEIGHT,), "views": ()}
+from lippmann.runtime.plugins import Plugin, function_of
 
 
 @dataclass(frozen=True)
@@ -62,7 +40,7 @@ class Exported:
     notes: tuple[str, ...]
 
 
-def stored_in(layout: LayoutName, image_stored: Stored, bits: int | None) -> Stored:
+def stored_in(layout: str, image_stored: Stored, bits: int | None) -> Stored:
     """Type in which a layout stores a picture's values.
 
     Parameters
@@ -80,7 +58,7 @@ def stored_in(layout: LayoutName, image_stored: Stored, bits: int | None) -> Sto
     OutputError
         If the layout has no values of ``bits`` bits.
     """
-    known = _BITS[layout]
+    known = _layout(layout).bits
     if bits is not None:
         if bits not in known:
             rule = f"{layout} has {', '.join(map(str, known))}"
@@ -93,11 +71,11 @@ def stored_in(layout: LayoutName, image_stored: Stored, bits: int | None) -> Sto
 
 def with_ending(layout: str, path: Path) -> Path:
     """``path`` with the ending that the layout's files have, where it has none."""
-    return path if path.suffix else path.with_suffix(_ENDING.get(_layout_name(layout), ""))
+    return path if path.suffix else path.with_suffix(_layout(layout).ending)
 
 
-def check_target(layout: str, path: Path) -> LayoutName:
-    """``layout`` as a :data:`LayoutName`, once ``path`` is known to have an ending that fits it.
+def check_target(layout: str, path: Path) -> None:
+    """Check that a path has an ending that fits the layout.
 
     Raises
     ------
@@ -106,16 +84,14 @@ def check_target(layout: str, path: Path) -> LayoutName:
     OutputError
         If the path has another ending than the layout's files.
     """
-    name = _layout_name(layout)
-    ending = _ENDING.get(name)
-    if ending is not None and path.suffix.lower() != ending:
-        raise OutputError(f"the ending is '{path.suffix}'", where=str(path), rule=f"{name} files end in {ending}")
-    return name
+    ending = _layout(layout).ending
+    if ending and path.suffix.lower() != ending:
+        raise OutputError(f"the ending is '{path.suffix}'", where=str(path), rule=f"{layout} files end in {ending}")
 
 
-def is_folder(layout: LayoutName) -> bool:
+def is_folder(layout: str) -> bool:
     """Whether the layout is a folder; otherwise it is one file."""
-    return layout not in _ENDING
+    return not _layout(layout).ending
 
 
 def export_image(
@@ -136,8 +112,8 @@ def export_image(
     path:
         The file or folder; appears whole or not at all.
     layout:
-        ``hci`` (4D Light Field Benchmark), ``lftoolbox`` (MATLAB file), ``eslf`` (PNG of micro-images), ``zarr`` or
-        ``views`` (folder of pictures).
+        ``hci`` (4D Light Field Benchmark), ``lftoolbox`` (MATLAB file), ``eslf`` (PNG of micro-images), ``zarr``,
+        ``views`` (folder of pictures), or one of another package.
     bits:
         Bits per value: 8 or 16 for codes, 32 for floats in ``lftoolbox``, ``zarr`` and ``views``. None: as the picture
         is stored.
@@ -156,22 +132,16 @@ def export_image(
     OutputError
         If the layout has no such ``bits``, or ``path`` cannot be written or has the wrong ending.
     """
-    name = check_target(layout, path)
-    if distance is not None and name != "hci":
-        raise UsageError(f"does not apply to {name}", parameter="distance", fix="leave it out")
-    light_field = light_field_of(image, stored_in(name, image.stored, bits))
-    display = image.display
-    if name == "hci":
-        write_hci(light_field, display, path, distance=distance, progress=progress)
-    elif name == "lftoolbox":
-        write_matlab(light_field, display, path)
-    elif name == "eslf":
-        write_eslf(light_field, display, path)
-    elif name == "zarr":
-        write_zarr(light_field, path, progress=progress)
-    else:
-        write_view_folder(light_field, display, path, progress=progress)
-    return Exported(light_field.stored, light_field.shape, tuple(_notes(image, name)))
+    check_target(layout, path)
+    plugin, found = _plugin(layout), _layout(layout)
+    if distance is not None and "distance" not in found.write_options:
+        raise UsageError(f"does not apply to {layout}", parameter="distance", fix="leave it out")
+    light_field = light_field_of(image, stored_in(layout, image.stored, bits))
+    values = {"distance": distance, "progress": progress}
+    chosen = {name: value for name, value in values.items() if name in found.write_options}
+    with plugin.guarded(OutputError, str(path)):
+        function_of(found.write)(light_field, image.display, path, **chosen)
+    return Exported(light_field.stored, light_field.shape, tuple(_notes(image, layout)))
 
 
 def import_image(
@@ -184,8 +154,8 @@ def import_image(
     path:
         The file or folder.
     layout:
-        ``hci``, ``lftoolbox``, ``eslf``, ``zarr`` or ``views``. None: recognized by the ending, or by the files of the
-        folder.
+        ``hci``, ``lftoolbox``, ``eslf``, ``zarr``, ``views``, or one of another package. None: recognized by the
+        ending, or by the files of the folder.
     display:
         The display of the picture; its views must match the file's in number and size. None: the display that the file
         names or describes.
@@ -203,7 +173,7 @@ def import_image(
     PictureError
         If a file is missing or damaged, the views do not match the display, or there is no display.
     """
-    name = recognize(path) if layout is None else _layout_name(layout)
+    name = recognize(path) if layout is None else layout
     if name == "views" and is_composable(path):
         if display is not None:
             raise PictureError("names its own display", where=str(path), fix="leave display=... out")
@@ -212,7 +182,7 @@ def import_image(
     return light_field.image(display, where=str(path), layout=name), light_field.notes
 
 
-def recognize(path: Path) -> LayoutName:
+def recognize(path: Path) -> str:
     """The layout of a file, by its ending, or of a folder, by the files in it.
 
     Raises
@@ -228,37 +198,57 @@ def recognize(path: Path) -> LayoutName:
         return "views"
     if not path.exists():
         raise PictureError("not found", where=str(path))
-    for name, ending in _ENDING.items():
-        if path.suffix.lower() == ending:
-            return name
+    ending = path.suffix.lower() or None  # of folders none
+    own = [name for name in LAYOUTS if _layout(name).ending == ending]
+    if found := own or [name for name in _names() if _layout(name).ending == ending]:
+        return found[0]
     raise PictureError("the layout is not recognized", where=str(path), fix="say layout=...")
 
 
-def _layout_name(text: str) -> LayoutName:
-    if text not in LAYOUTS:
-        raise UsageError.unknown("layout", text, LAYOUTS, parameter="layout")
-    return text
+def _plugin(name: str) -> Plugin[Export]:
+    found = EXPORTS.find(name)
+    if found is None or not isinstance(found.value, Layout):
+        raise UsageError.unknown("layout", name, _names(), parameter="layout", fix=EXPORTS.problems)
+    return found
 
 
-def _read(path: Path, name: LayoutName, display: Display | None, progress: ProgressCallback) -> LightField:
+def _names() -> list[str]:
+    """All layouts, those of plugins too."""
+    return [each for each in EXPORTS.claims() if not each.startswith(".")]
+
+
+def _layout(name: str) -> Layout:
+    """A layout by its name.
+
+    Raises
+    ------
+    UsageError
+        If it is unknown.
+    """
+    return cast("Layout", _plugin(name).value)
+
+
+def _read(path: Path, name: str, display: Display | None, progress: ProgressCallback) -> LightField:
+    plugin, layout = _plugin(name), _layout(name)
+    if layout.read is None:
+        raise PictureError(f"files of {name} are not read", where=str(path), rule=f"the plugin {plugin} writes them")
     shape = None if display is None else view_shape(display)
-    across_and_down = None if shape is None else (shape[1], shape[0])
-    if name == "hci":
-        return read_hci(path, progress=progress)
-    if name == "lftoolbox":
-        return read_matlab(path)
-    if name == "eslf":
-        return read_eslf(path, lens=across_and_down)
-    if name == "zarr":
-        return read_zarr(path, progress=progress)
-    return read_view_folder(path, grid=across_and_down, progress=progress)
+    values = {"grid": None if shape is None else (shape[1], shape[0]), "progress": progress}
+    chosen = {option: value for option, value in values.items() if option in layout.read_options}
+    with plugin.guarded(PictureError, str(path)):
+        found = function_of(layout.read)(path, **chosen)
+    if not isinstance(found, LightField):
+        what = f"the plugin {plugin} made a {type(found).__name__} of it"
+        raise PictureError(what, where=str(path), rule="a layout is read as a LightField")
+    return found
 
 
-def _notes(image: IntegralImage, name: LayoutName) -> list[str]:
+def _notes(image: IntegralImage, name: str) -> list[str]:
     notes = []
     if name == "hci" and DEPTH not in image.maps:
         notes.append("no ground truth is written: the picture has no layer depth")
-    omitted = sorted(set(image.maps) - set(_MAPS.get(name, image.maps)))
+    held = _layout(name).maps
+    omitted = [] if held is None else sorted(set(image.maps) - {*held})
     if omitted:
         notes.append(f"{name} cannot hold the layers {', '.join(omitted)}")
     return notes

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from lippmann.codecs.zarr_metadata import ArrayMetadata
 from lippmann.codecs.zarr_reader import node_kind, open_array, read_array_metadata, read_attributes
+from lippmann.display import Display
 from lippmann.errors import PictureError
 from lippmann.exchange.light_field import LightField, check_shape
 from lippmann.exchange.metadata_text import from_note, to_note
@@ -47,13 +48,15 @@ _CHUNK = 1 << 20
 _TYPES = (np.bool_, np.uint8, np.uint16, np.uint32, np.float16, np.float32)
 
 
-def write_zarr(light_field: LightField, folder: Path, *, progress: ProgressCallback = silent) -> None:
+def write_zarr(light_field: LightField, display: Display, folder: Path, *, progress: ProgressCallback = silent) -> None:
     """Write a Zarr group, losslessly compressed.
 
     Parameters
     ----------
     light_field:
         The views with all their maps.
+    display:
+        The display whose views these are, which their metadata name.
     folder:
         The folder; appears whole or not at all.
     progress:
@@ -66,6 +69,7 @@ def write_zarr(light_field: LightField, folder: Path, *, progress: ProgressCallb
     OutputError
         If the folder cannot be written.
     """
+    del display
     zarr = optional("zarr")
     arrays: dict[str, NDArray[Any]] = {_VIEWS: light_field.values}
     arrays |= {f"{_MAPS}/{name}": values for name, values in light_field.maps.items()}

@@ -21,8 +21,10 @@ Caustics = Literal["auto", "photons", "paths", "none"]
 
 #: The methods that reuse points of one micro-image in others.
 REUSING: tuple[Method, ...] = ("lens-view", "interpolated")
-#: Integrators that gather light; the others name a property of a surface.
+#: Integrators that gather light and may be reused; those of plugins gather light, too.
 LIGHT: tuple[Integrator, ...] = ("classic", "path", "direct")
+#: Integrators that tell a property of a surface, which has no noise.
+PROPERTIES: tuple[Integrator, ...] = ("normal", "depth", "position", "albedo")
 #: Those whose light can be pooled.
 POOLED_LIGHT: tuple[Integrator, ...] = ("path", "direct")
 
@@ -36,3 +38,11 @@ _DATA = (".exr", ".tif", ".tiff", ".zarr")
 def tone_map_of(kind: ToneMap, output: Path) -> ToneMap:
     """The tone map of a picture that is written to ``output``: left open, files for data keep light as it is."""
     return "none" if kind == "auto" and output.suffix.lower() in _DATA else kind
+
+
+def default_depth(integrator: str) -> int:
+    """Surfaces of a path where none are asked for."""
+    from lippmann.options.integrators import INTEGRATORS
+
+    plugin = INTEGRATORS.find(integrator)
+    return 1 if plugin is None else plugin.value.depth

@@ -57,6 +57,8 @@ class Option:
         Whether it names a file.
     flag:
         Name on the command line, where it is not the field's.
+    door:
+        ``"module:name"`` of the :class:`~lippmann.runtime.plugins.Door` whose further words are taken, too.
     """
 
     help: str
@@ -72,6 +74,7 @@ class Option:
     words: Any = None
     is_file: bool = False
     flag: str = ""
+    door: str = ""
 
     @property
     def help_in_flags(self) -> str:
@@ -108,7 +111,18 @@ class Option:
         elif int in kinds or float in kinds:
             self._check_number(name, value, int in kinds)
         elif choices:
+            self._check_word(name, value, choices)
+
+    def _check_word(self, name: str, value: object, choices: list[str]) -> None:
+        """Only words that are no choices are looked for among those of plugins."""
+        if not self.door:
             raise UsageError.unknown(name, value, choices, parameter=name)
+        from pkgutil import resolve_name
+
+        door = resolve_name(self.door)
+        if door.find(value) is None:
+            known = [*dict.fromkeys((*choices, *door.claims()))]
+            raise UsageError.unknown(name, value, known, parameter=name, fix=door.problems)
 
     def _check_number(self, name: str, value: object, is_whole: bool) -> None:
         kind: type = int if is_whole else Real

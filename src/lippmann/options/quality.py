@@ -44,6 +44,7 @@ class QualityOptions(Options):
         "auto",
         "path (all light), direct (emitters and sky only), classic (Whitted ray tracing: light of Tachyon and NFF "
         "scenes), or normal, depth, position, albedo of the first surface. By default what the scene was made for.",
+        door="lippmann.options.integrators:INTEGRATORS",
     )
     depth: int | None = _scene(
         None,

@@ -9,16 +9,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from lippmann._version import VERSION
 from lippmann.display import Display
 from lippmann.display.sheet_layout import trimmed
-from lippmann.errors import UsageError
+from lippmann.errors import EngineError, UsageError
 from lippmann.image.provenance import Provenance
-from lippmann.options.choices import POOLED_LIGHT, REUSING
+from lippmann.options.choices import LIGHT, POOLED_LIGHT, REUSING
+from lippmann.options.integrators import INTEGRATORS
 from lippmann.options.option import Options
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.quality import QualityOptions
@@ -33,6 +34,7 @@ from lippmann.rendering.request.region_of_interest import even_background
 from lippmann.rendering.request.render_request import Choice, RenderRequest
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
+from lippmann.runtime.plugins import function_of
 from lippmann.scene.camera_placement import CameraView, VisibleDepth
 from lippmann.scene.matrices import rotation_of
 from lippmann.scene.placement import Placement, place
@@ -45,7 +47,6 @@ if TYPE_CHECKING:
     from lippmann.rendering.film.wavefront import Frame
     from lippmann.rendering.transport.integrator import Integrator
     from lippmann.rendering.transport.ray_source import RaySource
-    from lippmann.rendering.transport.surface_property import SurfaceProperty
 
 #: Share of the free memory that is used where no limit is given.
 DEFAULT_MEMORY_SHARE = 0.6
@@ -307,7 +308,7 @@ class Session:
     def _warn_of_emptiness(self, frame: Frame, work: int, has_pixels: bool) -> tuple[str, ...]:
         from lippmann.rendering.film.seen_share import seen_share, warn_of_emptiness
 
-        if self.request.integrator not in ("path", "direct", "classic"):
+        if self.request.integrator not in LIGHT:
             return ()
         background = even_background(self.built, self.request)
         scene = getattr(self.built, "mitsuba", None)
@@ -405,31 +406,46 @@ def make_integrator(built: BuiltScene | BuiltClassic, request: RenderRequest, fr
 
     ``frame_from_world`` is that of :meth:`Session.integrator`.
     """
-    from lippmann.device.whitted.scene import BuiltClassic
-    from lippmann.rendering.transport.path import PathIntegrator
-    from lippmann.rendering.transport.scene_features import make_scene_features
-    from lippmann.rendering.transport.surface_property import SurfaceIntegrator
-    from lippmann.rendering.transport.volume_path import VolumePathIntegrator
+    plugin = INTEGRATORS.find(request.integrator)
+    assert plugin is not None  # options know no others
+    with plugin.guarded(EngineError):
+        integrator: Integrator = function_of(plugin.value.make)(built, request, frame_from_world)
+    return integrator
+
+
+def make_whitted(built: BuiltClassic, request: RenderRequest, frame_from_world: Matrix) -> Integrator:
+    """Whitted ray tracing."""
     from lippmann.rendering.transport.whitted import WhittedIntegrator
 
-    if isinstance(built, BuiltClassic):
-        return WhittedIntegrator(built, request.surfaces)
-    if request.integrator in ("path", "direct"):
-        if built.has_media:
-            if request.clamp_indirect is not None:
-                rule = "this scene has participating media, whose light is not clamped"
-                raise UsageError("does not apply", parameter="clamp_indirect", rule=rule, fix="leave it out")
-            if request.caustics not in ("auto", "paths"):
-                rule = "this scene has participating media, through which photons are not traced"
-                raise UsageError(
-                    f"'{request.caustics}' does not apply", parameter="caustics", rule=rule, fix="leave it out"
-                )
-            return VolumePathIntegrator(built.mitsuba, request.surfaces, request.integrator, built.background)
-        features = make_scene_features(
-            built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
-        )
-        return PathIntegrator(built.mitsuba, features, request.surfaces, name=request.integrator)
-    return SurfaceIntegrator(built.mitsuba, cast("SurfaceProperty", request.integrator), frame_from_world)
+    return WhittedIntegrator(built, request.surfaces)
+
+
+def make_path(built: BuiltScene, request: RenderRequest, frame_from_world: Matrix) -> Integrator:
+    """Path tracing, through participating media where there are some."""
+    from lippmann.rendering.transport.path import PathIntegrator
+    from lippmann.rendering.transport.scene_features import make_scene_features
+    from lippmann.rendering.transport.volume_path import VolumePathIntegrator
+
+    if built.has_media:
+        media, leave = "this scene has participating media", "leave it out"
+        if request.clamp_indirect is not None:
+            rule = f"{media}, whose light is not clamped"
+            raise UsageError("does not apply", parameter="clamp_indirect", rule=rule, fix=leave)
+        if request.caustics not in ("auto", "paths"):
+            rule = f"{media}, through which photons are not traced"
+            raise UsageError(f"'{request.caustics}' does not apply", parameter="caustics", rule=rule, fix=leave)
+        return VolumePathIntegrator(built.mitsuba, request.surfaces, request.integrator, built.background)
+    features = make_scene_features(
+        built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
+    )
+    return PathIntegrator(built.mitsuba, features, request.surfaces, name=request.integrator)
+
+
+def make_surface(built: BuiltScene, request: RenderRequest, frame_from_world: Matrix) -> Integrator:
+    """A property of the first surface."""
+    from lippmann.rendering.transport.surface_property import SurfaceIntegrator
+
+    return SurfaceIntegrator(built.mitsuba, request.integrator, frame_from_world)
 
 
 def _stage_seconds(watch: Stopwatch, frame: Frame) -> dict[str, float]:

@@ -7,27 +7,23 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from lippmann.display import Display
-from lippmann.errors import UsageError
+from lippmann.errors import SceneError, UsageError
 from lippmann.options.light import LightOptions
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.scene import SceneOptions
+from lippmann.runtime.plugins import function_of
 from lippmann.scene.matrices import Bounds
 from lippmann.scene.placement import Placement
-from lippmann.scene.readers.load import STAGES, kind_of_file, read_scene
+from lippmann.scene.readers.load import kind_of_file, read_scene
+from lippmann.scene.readers.registry import READERS, MovingScene
 from lippmann.scene.scene import Scene, check_description, find_camera, override_light
 from lippmann.scene.values.description import Camera, Matrix, SceneDescription
 from lippmann.scene.values.whitted_scene import CameraPose, ClassicScene
 from lippmann.scene.whitted.world_frame import world_camera
-
-if TYPE_CHECKING:
-    from lippmann.scene.readers.blend.moving import MovingBlend
-    from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
-    from lippmann.scene.readers.usd.moving_stage import MovingStage
 
 #: Frames of an animation per second where nothing is said.
 FRAMES_PER_SECOND = 24.0
@@ -94,9 +90,7 @@ class AnimatedFile(Motion):
     Raises
     ------
     SceneError
-        As :class:`lippmann.scene.readers.gltf_animation.animated_file.MovingGltf`,
-        :class:`lippmann.scene.readers.usd.moving_stage.MovingStage` and
-        :class:`lippmann.scene.readers.blend.moving.MovingBlend`.
+        As the reader of the file, and where nothing moves.
     """
 
     def __init__(
@@ -150,18 +144,15 @@ class AnimatedFile(Motion):
 
 def _open_moving(
     path: Path, animation: str | None, allow_outside: bool, variants: Mapping[str, str] | None
-) -> MovingBlend | MovingGltf | MovingStage:
-    if kind_of_file(path) == ".blend":
-        from lippmann.scene.readers.blend.moving import MovingBlend
-
-        return MovingBlend(path, animation=animation, allow_outside=allow_outside)
-    if kind_of_file(path) in STAGES:
-        from lippmann.scene.readers.usd.moving_stage import MovingStage
-
-        return MovingStage(path, animation=animation, allow_outside=allow_outside, variants=variants)
-    from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
-
-    return MovingGltf(path, animation=animation, allow_outside=allow_outside, variants=variants)
+) -> MovingScene:
+    plugin = READERS.find(kind_of_file(path) or "")
+    assert plugin is not None
+    assert plugin.value.moving is not None
+    values = {"allow_outside": allow_outside, "variants": variants}
+    chosen = {name: value for name, value in values.items() if value and name in plugin.value.options}
+    with plugin.guarded(SceneError, path.name):
+        moving: MovingScene = function_of(plugin.value.moving)(path, animation=animation, **chosen)
+    return moving
 
 
 class Flight(Motion):
@@ -241,7 +232,8 @@ def open_motion(
         from lippmann.scene.readers.tachyon.reader import read_cam
 
         return Flight(read_scene(source, asked, light, allow_outside=allow_outside), read_cam(camera_path))
-    if kind_of_file(source) not in (".blend", ".glb", ".gltf", *STAGES):
+    plugin = READERS.find(kind_of_file(source) or "")
+    if plugin is None or plugin.value.moving is None:
         raise UsageError(
             f"nothing moves in '{source}'",
             parameter="frames",

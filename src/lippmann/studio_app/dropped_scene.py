@@ -7,9 +7,10 @@ from pathlib import Path
 from urllib.parse import quote
 
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.dicom_files import holds_dicom
 from lippmann.scene.readers.depth_photo import depth_beside
-from lippmann.scene.readers.load import PHOTOS, kind_of_name, known_suffixes
-from lippmann.scene.readers.volumes.dicom_files import holds_dicom
+from lippmann.scene.readers.load import kind_of_name
+from lippmann.scene.readers.registry import PHOTOS, READERS
 
 #: Endings of pictures of the surroundings.
 ENVIRONMENTS = (".hdr", ".exr")
@@ -34,7 +35,8 @@ def main_file(folder: Path, places: Sequence[Path]) -> Path:
     if len(places) == 1:
         return places[0]
     of_photos = {depth_beside(folder / place) for place in places if kind_of_name(place) in PHOTOS}
-    scenes = [place for place in places if kind_of_name(place) in known_suffixes() and folder / place not in of_photos]
+    known = [place for place in places if READERS.find(kind_of_name(place)) is not None]
+    scenes = [place for place in known if folder / place not in of_photos]
     found = [place for place in scenes if kind_of_name(place) not in PHOTOS]
     if all(kind_of_name(place) == _SLICE for place in found) and holds_dicom(folder):
         tops = {place.parts[0] for place in places}
@@ -47,7 +49,7 @@ def main_file(folder: Path, places: Sequence[Path]) -> Path:
     if len(found) == 1:
         return found[0]
     if not scenes:
-        raise SceneError("no scene is among these files", rule=f"known are {', '.join(known_suffixes())}")
+        raise SceneError("no scene is among these files", rule=f"known are {', '.join(READERS.claims())}")
     rule = "a scene is dropped with the files that it names"
     if all(kind_of_name(place) in PHOTOS for place in scenes):
         rule = "a photograph is dropped with its depth map, named like it: photo.jpg and photo_depth.png"

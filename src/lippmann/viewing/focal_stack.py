@@ -18,7 +18,7 @@ from lippmann.image.write import format_for, write_plain_picture
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.atomic_write import check_folder_writable, check_writable, replacing, replacing_folder
 from lippmann.viewing.refocus import focal_planes
-from lippmann.viewing.video_file import ANIMATIONS, check_animation_path, write_animation
+from lippmann.viewing.video_file import check_animation_path, film_suffixes, is_film, write_animation
 
 #: Frames per second of a stack as an animation: slow enough to see the focus move through a dozen planes.
 _FRAMES_PER_SECOND = 8.0
@@ -76,9 +76,9 @@ def check_stack_path(path: Path, bits: int | None = None) -> None:
     if path.suffix.lower() in (".tif", ".tiff"):
         format_for(path, bits)
     else:
-        if path.suffix.lower() not in ANIMATIONS:
-            rule = f"a focal stack is a folder, a .tif or an animation ({', '.join(ANIMATIONS)})"
-            raise OutputError.unknown("ending", path.suffix, (".tif", *ANIMATIONS), where=str(path), rule=rule)
+        if not is_film(path):
+            rule = f"a focal stack is a folder, a .tif or an animation ({', '.join(film_suffixes())})"
+            raise OutputError.unknown("ending", path.suffix, (".tif", *film_suffixes()), where=str(path), rule=rule)
         if bits not in (None, 8):
             raise OutputError(f"{bits} bits per channel are not possible", where=str(path), rule="animations have 8")
         check_animation_path(path)
@@ -112,7 +112,7 @@ def write_planes(
     checked = _reported(_finite(pictures, path), len(planes), progress)
     if not path.suffix:
         _write_folder(checked, planes, path, bits, transfer)
-    elif path.suffix.lower() in ANIMATIONS:
+    elif is_film(path):
         write_animation(checked, path, frames_per_second=_FRAMES_PER_SECOND, transfer=transfer)
     else:
         stored = format_for(path, bits)[1]

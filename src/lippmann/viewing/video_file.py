@@ -11,21 +11,20 @@ import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
 from lippmann.codecs.types import Pixels
 from lippmann.color.transfer import Transfer, quantize
 from lippmann.errors import OutputError, UsageError
+from lippmann.exchange.registry import EXPORTS, Film
 from lippmann.image.stored_values import FloatArray
 from lippmann.quilts.quilt import QuiltLayout
 from lippmann.quilts.quilt_metadata import layout_text
 from lippmann.runtime.atomic_write import replacing
+from lippmann.runtime.plugins import Plugin, function_of
 from lippmann.runtime.thread_policy import kept_policy
-
-#: Endings of the file names.
-ANIMATIONS = (".png", ".apng", ".mp4")
 
 #: How the frames of an MP4 file are coded. H.264 plays everywhere; HEVC and AV1 make smaller files.
 Codec = Literal["h264", "hevc", "av1"]
@@ -73,9 +72,7 @@ def check_animation_path(path: Path, codec: Codec | None = None) -> None:
     UsageError
         If a codec is asked for, and the file is no MP4.
     """
-    if path.suffix.lower() not in ANIMATIONS:
-        raise OutputError.unknown("ending of an animation", path.suffix, ANIMATIONS, where=str(path))
-    if codec is not None and path.suffix.lower() != ".mp4":
+    if "codec" not in _film_of(path).value.options and codec is not None:
         raise UsageError(
             "only MP4 has a choice of codecs", parameter="codec", fix="name the file .mp4, or leave it out"
         )
@@ -97,8 +94,9 @@ def write_animation(
     frames:
         At least one frame ``(H, W, 3)`` of linear RGB; all have one size.
     path:
-        The file: ``.png`` or ``.apng`` for APNG, which repeats forever, or ``.mp4``, which needs even sizes: an odd
-        last column or row is doubled; of quilts, each view loses one, so that views stay whole pixels.
+        The file: ``.png`` or ``.apng`` for APNG, which repeats forever, ``.mp4``, or an ending of a plugin's. MP4 needs
+        even sizes: an odd last column or row is doubled; of quilts, each view loses one, so that views stay whole
+        pixels.
     frames_per_second:
         Frame rate.
     transfer:
@@ -116,15 +114,34 @@ def write_animation(
         If a codec is given, and the file is no MP4.
     """
     check_animation_path(path, codec)
+    film = _film_of(path)
     codes = (quantize(frame, 8, transfer) for frame in frames)
-    with replacing(path) as temporary:
-        if path.suffix.lower() == ".mp4":
-            _write_mp4(codes, temporary, frames_per_second, path, _ENCODERS[codec or "h264"], quilt)
-        else:
-            _write_apng(codes, temporary, frames_per_second)
+    values = {"codec": codec, "quilt": quilt, "place": path}
+    chosen = {name: values[name] for name in film.value.options}
+    with replacing(path) as temporary, film.guarded(OutputError, str(path)):
+        function_of(film.value.write)(codes, temporary, frames_per_second, **chosen)
 
 
-def _write_apng(frames: Iterator[Pixels], path: Path, frames_per_second: float) -> None:
+def is_film(path: Path) -> bool:
+    """Whether a file's ending is that of films."""
+    return bool(path.suffix) and EXPORTS.find(path.suffix.lower()) is not None
+
+
+def film_suffixes() -> list[str]:
+    """Endings of the names of films, those of plugins too."""
+    return [each for each in EXPORTS.claims() if each.startswith(".")]
+
+
+def _film_of(path: Path) -> Plugin[Film]:
+    if not is_film(path):
+        raise OutputError.unknown(
+            "ending of an animation", path.suffix, film_suffixes(), where=str(path), fix=EXPORTS.problems
+        )
+    return cast("Plugin[Film]", EXPORTS.find(path.suffix.lower()))
+
+
+def write_apng(frames: Iterator[Pixels], path: Path, frames_per_second: float) -> None:
+    """Write 8-bit frames as a lossless animation that repeats forever."""
     from PIL import Image
 
     # A list of all frames: Pillow iterates twice, which exhausts a generator.
@@ -133,14 +150,16 @@ def _write_apng(frames: Iterator[Pixels], path: Path, frames_per_second: float) 
     first.save(path, format="PNG", save_all=True, append_images=others, duration=duration, loop=0)
 
 
-def _write_mp4(
+def write_mp4(
     frames: Iterator[Pixels],
     path: Path,
     frames_per_second: float,
+    *,
     place: Path,
-    encoder: _Encoder,
+    codec: Codec | None,
     quilt: QuiltLayout | None,
 ) -> None:
+    """Write 8-bit frames as MP4; the file will be called ``place``."""
     from fractions import Fraction
 
     import av
@@ -148,6 +167,7 @@ def _write_mp4(
     # SVT-AV1 prints its settings on standard error, unless told to print errors alone before it is first used.
     os.environ.setdefault("SVT_LOG", "1")
 
+    encoder = _ENCODERS[codec or "h264"]
     frames = (_even(codes, quilt) for codes in frames)
     head = list(itertools.islice(frames, _REORDERED))
     height, width = head[0].shape[:2]

@@ -9,7 +9,8 @@ import pytest
 from lippmann.errors import SceneError, UsageError
 from lippmann.scene import bundled
 from lippmann.scene.mitsuba_source import MitsubaSource
-from lippmann.scene.readers.load import known_suffixes, load_scene
+from lippmann.scene.readers.load import load_scene
+from lippmann.scene.readers.registry import READERS
 from lippmann.scene.scene import STUDIO_NOTE
 from lippmann.scene.studio_light import BACKDROP, studio
 from lippmann.scene.values.description import Environment, Instance, Material, Mesh, SceneDescription
@@ -139,7 +140,7 @@ def test_a_material_that_makes_its_mesh_vanish_is_named(save, mtl, seen):
     assert (expected in scene.notes) == (not seen)
 
 
-@pytest.mark.parametrize("suffix", known_suffixes())
+@pytest.mark.parametrize("suffix", READERS.own_claims)
 def test_files_that_are_missing_or_unreadable(tmp_path, suffix):
     with pytest.raises(SceneError, match="no such file"):
         load_scene(tmp_path / f"none{suffix}")

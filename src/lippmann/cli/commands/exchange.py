@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
 
-_Layout = Literal["hci", "lftoolbox", "eslf", "zarr", "views"]
-_LAYOUTS = "hci (4D Light Field Benchmark), lftoolbox (.mat), eslf (.png), zarr, or views"
+_LAYOUTS = "hci (4D Light Field Benchmark), lftoolbox (.mat), eslf (.png), zarr, views, or a plugin's"
 
 
 def export(
     picture: options.Picture,
     output: Annotated[Path, typer.Option("--output", "-o", help="File or folder to write.")],
-    layout: Annotated[_Layout, typer.Option("--as", help=f"Layout: {_LAYOUTS}.")],
+    layout: Annotated[str, typer.Option("--as", help=f"Layout: {_LAYOUTS}.")],
     distance: Annotated[
         float | None,
         typer.Option("--distance", help="Distance of the cameras in mm, for hci and displays of parallel views."),
@@ -38,7 +37,8 @@ def export(
 
     console = Console(quiet, as_json)
     output = with_ending(layout, output)
-    (check_folder_writable if is_folder(check_target(layout, output)) else check_writable)(output)
+    check_target(layout, output)
+    (check_folder_writable if is_folder(layout) else check_writable)(output)
     image = read_picture(picture, display=parse.display(display))
     with console.progress() as progress:
         done = export_image(image, output, layout, bits=bits, distance=distance, progress=progress)
@@ -59,7 +59,7 @@ def export(
 def import_(
     source: Annotated[Path, typer.Argument(help="File or folder of another light-field tool.")],
     output: options.Output,
-    layout: Annotated[_Layout | None, typer.Option("--as", help=f"Layout: {_LAYOUTS}. Default: recognized.")] = None,
+    layout: Annotated[str | None, typer.Option("--as", help=f"Layout: {_LAYOUTS}. Default: recognized.")] = None,
     display: Annotated[
         str | None,
         typer.Option(

@@ -25,7 +25,8 @@ def doctor(
     ] = False,
     as_json: options.Json = False,
 ) -> None:
-    """Check the rendering engine of this machine and say how to fix what is missing."""
+    """Check the rendering engine of this machine, say how to fix what is missing, and list plugins."""
+    from lippmann.plugins import installed
     from lippmann.runtime import engine
 
     diagnosis = engine.diagnose()
@@ -37,9 +38,23 @@ def doctor(
         lines.append(f"{_mark(check)} {check.name:<{width}}  {check.value}")
         if check.fix:
             lines.append(f"{'':<{width + 4}} -> {check.fix}")
+    plugins = [
+        {
+            "group": group,
+            "name": plugin.name,
+            "distribution": plugin.distribution,
+            "claims": list(plugin.claims),
+            "problem": plugin.problem,
+        }
+        for group, plugin in installed()
+    ]
+    for group, plugin in installed():
+        said = plugin.problem or ", ".join(plugin.claims)
+        lines.append(f"{'!! ' if plugin.problem else 'ok '} plugin {plugin} ({group}): {said}")
     verdict = "ready to render" if diagnosis.ok else "not ready to render"
     checks = [asdict(check) for check in diagnosis.checks]
-    Console(as_json=as_json).result({"ok": diagnosis.ok, "checks": checks}, "\n".join([*lines, verdict]))
+    result = {"ok": diagnosis.ok, "checks": checks, "plugins": plugins}
+    Console(as_json=as_json).result(result, "\n".join([*lines, verdict]))
     raise typer.Exit(0 if diagnosis.ok else 1)
 
 

@@ -92,13 +92,16 @@ def _parameter(each: Field[Any], its: Option) -> inspect.Parameter:
     default, kind = default_of(each), its.words or each.type
     if its.read is not None:
         kind, default = its.words or (str | None), default if isinstance(default, str) else its.default_text
+    metavar = its.metavar
+    if its.door:  # words of plugins are known later
+        kind, metavar = str, f"[{'|'.join(get_args(kind))}]"
     flag = its.flag_of(each.name)
     if bool in kinds_of(kind) and default is None:
         flag = f"{flag}/--no-{flag[2:]}"
     shown = typer.Option(
         flag,
         help=its.help_in_flags,
-        metavar=its.metavar,
+        metavar=metavar,
         rich_help_panel=its.group,
         show_default=default is not None and default is not False,
     )

@@ -34,10 +34,11 @@ import os
 import re
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 from lippmann.display import validation
 from lippmann.display.display import INFINITE, Display, check_tables
@@ -49,6 +50,7 @@ from lippmann.display.formats.print_sheet import print_of_texts
 from lippmann.display.formats.recorded_depth import default_aperture
 from lippmann.display.validation import MILLIMETRES, Arguments, length, positive, stripe
 from lippmann.errors import DisplayError
+from lippmann.runtime.plugins import Door, Extension, Target, function_of
 from lippmann.runtime.regular_file import check_kind
 
 #: Kinds of displays, before the colon.
@@ -144,6 +146,9 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+#: Name of Lippmann's own displays among all.
+_OWN = "lippmann"
+
 #: How the names of all Looking Glass devices begin.
 _FAMILY = "looking-glass-"
 
@@ -155,6 +160,49 @@ _LENGTHS: dict[str, dict[str, tuple[tuple[str, ...], bool]]] = {
     "panel": {"pixel_pitch": (("dpi", "ppi"), False)},
     "lens_array": {"pitch": (("lpi",), True), "row_pitch": (("lpi",), True), "offset": ((), True)},
 }
+
+
+@dataclass(frozen=True)
+class Displays(Extension):
+    """Displays of a maker, and a format of files that describe some.
+
+    Parameters
+    ----------
+    presets:
+        Texts by name: TOML, as :func:`lippmann.load_display` reads it from a file.
+    suffixes:
+        Endings of files, in lower case, with their dots, that ``read`` is for.
+    read:
+        ``read(path)``, or ``"module:function"``, returns a :class:`lippmann.Display`. It raises a
+        :class:`lippmann.LippmannError`, such as ``DisplayError``, for a file that it cannot read.
+
+    Examples
+    --------
+    >>> from lippmann.plugins import Displays
+    >>> Displays(suffixes=(".lens",), read="lens_maker:read").suffixes
+    ('.lens',)
+    """
+
+    presets: Mapping[str, str] = field(default_factory=dict)
+    suffixes: tuple[str, ...] = ()
+    read: Target | None = None
+
+    group: ClassVar[str] = "lippmann.displays"
+
+    def claims(self, name: str) -> tuple[str, ...]:
+        """Names of its presets, and its suffixes."""
+        return (*self.presets, *self.suffixes)
+
+    def fault(self) -> str:
+        """What is wrong with its fields."""
+        if self.suffixes and self.read is None:
+            return "it has suffixes, and no function reads such files"
+        try:
+            for name in self.presets:
+                _from_preset(name, self.presets)
+        except DisplayError as error:
+            return str(error)
+        return ""
 
 
 def load_display(name_or_path: str | os.PathLike[str]) -> Display:
@@ -174,26 +222,50 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
     >>> lippmann.load_display("Looking Glass Go").name
     'looking-glass-go'
     """
-    presets = _preset_texts()
+    own = displays().own[_OWN]
+    presets = own.presets
     name = os.fspath(name_or_path)
     # Owners of a Looking Glass know their device as "portrait".
     short = _FAMILY + name.removeprefix("lkg-")
     name = short if short in presets else name
     if name in presets:
-        return _from_toml(presets[name], where=f"{name}.toml", stem=name)
+        return _from_preset(name, presets)
     if is_short_form(name):
         return display_of_short_form(name)
     path = Path(name)
-    if path.suffix not in (".toml", ".json") and not path.exists():
-        if device := _device_called(name, presets):
-            return _from_toml(presets[device], where=f"{device}.toml", stem=device)
-        rule = f"known are {', '.join(presets)}, or a .toml file, or a Looking Glass's visual.json"
-        known = [*presets, *(preset.removeprefix(_FAMILY) for preset in presets)]
-        raise DisplayError.unknown("display", name, known, rule=rule)
-    text = _read(path)
-    if is_calibration(text):
-        return display_of_calibration(text, where=name)
-    return _from_toml(text, where=name, stem=path.stem)
+    if path.suffix in own.suffixes:
+        return _read_file(path)
+    if not path.exists() and (device := _device_called(name, presets)):
+        return _from_preset(device, presets)
+    return _of_plugin(name, path) or _read_file(path)
+
+
+def _of_plugin(name: str, path: Path) -> Display | None:
+    """The display that another package knows by name or reads from a file; None for a file that none reads.
+
+    Raises
+    ------
+    DisplayError
+        There is no such display and no such file, or it cannot be read.
+    """
+    door = displays()
+    plugin = door.find(name) or door.find(path.suffix.lower())
+    if plugin is None and not path.exists():
+        known = [each for each in door.claims() if not each.startswith(".")]
+        rule = f"known are {', '.join(known)}, or a .toml file, or a Looking Glass's visual.json"
+        names = [*known, *(preset.removeprefix(_FAMILY) for preset in door.own[_OWN].presets)]
+        raise DisplayError.unknown("display", name, names, rule=rule, fix=door.problems)
+    if plugin is None or not plugin.distribution:
+        return None
+    if name in plugin.value.presets:
+        return _from_preset(name, plugin.value.presets)
+    assert plugin.value.read is not None
+    with plugin.guarded(DisplayError, name):
+        display = function_of(plugin.value.read)(path)
+    if not isinstance(display, Display):
+        what = f"the plugin {plugin} made a {type(display).__name__} of it"
+        raise DisplayError(what, where=name, rule="a display is read as a Display")
+    return display
 
 
 def list_displays() -> list[Display]:
@@ -204,7 +276,27 @@ def list_displays() -> list[Display]:
     >>> [display.name for display in lippmann.list_displays()][-1]
     'seed-lenticular'
     """
-    return [_from_toml(text, where=f"{name}.toml", stem=name) for name, text in _preset_texts().items()]
+    door = displays()
+    plugins = [each.value for each in door.plugins if not each.problem]
+    return [_from_preset(name, each.presets) for each in (door.own[_OWN], *plugins) for name in each.presets]
+
+
+@cache
+def displays() -> Door[Displays]:
+    """All presets and formats."""
+    return Door(Displays, {_OWN: Displays(_preset_texts(), (".toml", ".json"), _read_file)})
+
+
+def _from_preset(name: str, presets: Mapping[str, str]) -> Display:
+    return _from_toml(presets[name], where=f"{name}.toml", stem=name)
+
+
+def _read_file(path: Path) -> Display:
+    """The display of a TOML file, or of a Looking Glass's calibration."""
+    text, where = _read(path), os.fspath(path)
+    if is_calibration(text):
+        return display_of_calibration(text, where=where)
+    return _from_toml(text, where=where, stem=path.stem)
 
 
 def _preset_texts() -> dict[str, str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from lippmann.display import Display
-from lippmann.options.choices import LIGHT, POOLED_LIGHT
+from lippmann.options.choices import POOLED_LIGHT, PROPERTIES
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import denoise, load_denoiser
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
@@ -77,7 +77,7 @@ def render_eye_preview(
     # Where lenses are larger than the picture's pixels, it is made of blocks, which the denoiser has never seen.
     is_fine = 2 * source.width > width * height * whole.channels
     # With 32 samples noise is not worth taking out.
-    denoises = samples < 32 and is_fine and request.denoise != "none" and resolved.integrator in LIGHT
+    denoises = samples < 32 and is_fine and request.denoise != "none" and resolved.integrator not in PROPERTIES
     denoises &= not (scene.lies_off_surfaces or scene.fills_panel)
     if denoises:
         load_denoiser()

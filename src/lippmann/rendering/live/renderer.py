@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.errors import SceneError, UsageError
+from lippmann.options.choices import POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.live.develop import develop
 from lippmann.rendering.live.live_view import LiveFrame, LiveView
@@ -32,9 +33,6 @@ if TYPE_CHECKING:
     from lippmann.rendering.live.scene_kernels import SceneKernels
 
 Floats = NDArray[np.float32]
-
-#: Integrators whose light live frames can show.
-_LIGHT = ("path", "direct")
 
 #: Lanes of a step of a frame: on two cores about as long as a whole frame of an eye, so that such frames come between.
 STEP_LANES = 1 << 18
@@ -307,8 +305,8 @@ def _resting(request: RenderRequest) -> RenderRequest:
 
 def _plain(request: RenderRequest, integrator: str, depth: int | None) -> RenderRequest:
     """The request of a picture of every pixel's own samples."""
-    if request.integrator not in ("auto", *_LIGHT):
-        rule = f"live pictures show the light of {' and '.join(_LIGHT)}"
+    if request.integrator not in ("auto", *POOLED_LIGHT):
+        rule = f"live pictures show the light of {' and '.join(POOLED_LIGHT)}"
         raise UsageError(f"'{request.integrator}' does not apply", parameter="integrator", rule=rule)
     return RenderRequest(
         method="full",

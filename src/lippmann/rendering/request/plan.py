@@ -16,8 +16,8 @@ from lippmann.display import Display
 from lippmann.errors import UsageError
 from lippmann.options.choices import (
     ASKED,
-    LIGHT,
     POOLED_LIGHT,
+    PROPERTIES,
     REUSING,
     Caustics,
     Denoiser,
@@ -25,11 +25,12 @@ from lippmann.options.choices import (
     Method,
     PixelFilter,
     ToneMap,
+    default_depth,
 )
 from lippmann.options.forms import Form
 from lippmann.options.light import LightOptions
 from lippmann.rendering.request.preconditions import check, check_off_surfaces
-from lippmann.rendering.request.render_request import DEFAULT_DEPTH, DEFAULT_SPP, Choice, RenderPlan, RenderRequest
+from lippmann.rendering.request.render_request import DEFAULT_SPP, Choice, RenderPlan, RenderRequest
 from lippmann.scene.scene import Scene
 
 T = TypeVar("T")
@@ -268,7 +269,7 @@ def _depth(request: RenderRequest, scene: Scene, integrator: Integrator) -> Choi
         return Choice(request.depth)
     if integrator == "classic" and scene.classic is not None:
         return Choice(scene.classic.camera.ray_depth, "as the scene's file says")
-    return Choice(DEFAULT_DEPTH.get(integrator, 1), f"that of {integrator}")
+    return Choice(default_depth(integrator), f"that of {integrator}")
 
 
 def _method(facts: _Facts) -> Choice[Method]:
@@ -282,7 +283,7 @@ def _method(facts: _Facts) -> Choice[Method]:
         (facts.is_photograph, "full", "a photograph has no noise"),
         (facts.is_denoised_draft, "full", "a draft, denoised"),  # sharing takes a while for 0.4 dB
         (request.denoise != "auto", "full", f"{denoising}, as asked for"),
-        (name not in LIGHT, "full", f"{name} has no noise"),
+        (name in PROPERTIES, "full", f"{name} has no noise"),
         (not facts.is_pooled_light, "full", f"the light of {name} is not pooled"),
         (facts.form == "preview", "full", "a plain picture has no micro-images to share light"),
         (True, "pooled", "light shared between micro-images"),
@@ -305,7 +306,7 @@ def _denoise(facts: _Facts, method: Choice[Method]) -> Choice[Denoiser]:
 def _subpixels(facts: _Facts, method: Method, display: Display | None) -> Choice[bool]:
     asked = facts.request.subpixels
     is_slanted = display is not None and display.has_slanted_stripes
-    is_whole = facts.integrator not in LIGHT or method in REUSING
+    is_whole = facts.integrator in PROPERTIES or method in REUSING
     return _first(
         (asked is not None, bool(asked), ASKED),
         (not is_slanted, False, "sub-pixels of a pixel see the same direction"),

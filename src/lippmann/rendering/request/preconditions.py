@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from lippmann.display import Display
 from lippmann.errors import PictureError, UsageError
-from lippmann.options.choices import LIGHT, POOLED_LIGHT, REUSING
+from lippmann.options.choices import LIGHT, POOLED_LIGHT, PROPERTIES, REUSING
 from lippmann.options.forms import LEFT_OUT, Form
 from lippmann.rendering.request.render_request import RenderRequest, shown_value
 from lippmann.scene.scene import Scene
@@ -103,7 +103,7 @@ def _of_denoiser(request: RenderRequest) -> list[_Refusal]:
     no_network = f"{_FULL}, or leave denoise out"
     return [
         (is_pooled and name not in POOLED_LIGHT, f"the light of {name} cannot be pooled", "integrator", pooled, _FULL),
-        (request.denoises and name not in LIGHT, f"{name} has no noise", "denoise", light, _LEAVE),
+        (request.denoises and name in PROPERTIES, f"{name} has no noise", "denoise", light, _LEAVE),
         (
             is_pooled and request.denoise == "none",
             "pooled needs the denoiser",

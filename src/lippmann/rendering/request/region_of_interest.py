@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.display.view_cone import cone_tangent
+from lippmann.options.choices import POOLED_LIGHT
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.values.description import Color
 
@@ -19,15 +20,13 @@ if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
     from lippmann.device.whitted.scene import BuiltClassic
 
-#: Integrators that show the background's very colour where a ray meets nothing.
-_SHOW_BACKGROUND = ("path", "direct")
 #: Pixels about the scene's outline, so that a denoiser sees what the scene stands before.
 _MARGIN = 8
 
 
 def even_background(built: BuiltScene | BuiltClassic, request: RenderRequest) -> Color | None:
     """The one colour that rays see which meet nothing; None if there is no such colour."""
-    if request.integrator not in _SHOW_BACKGROUND or getattr(built, "has_media", False):
+    if request.integrator not in POOLED_LIGHT or getattr(built, "has_media", False):
         return None  # a medium may surround the scene
     return getattr(built, "background", None)
 

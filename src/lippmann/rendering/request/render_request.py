@@ -10,15 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer, pbr_neutral
-from lippmann.options.choices import (
-    ASKED,
-    Caustics,
-    Denoiser,
-    Integrator,
-    Method,
-    PixelFilter,
-    ToneMap,
-)
+from lippmann.options.choices import ASKED, Caustics, Denoiser, Integrator, Method, PixelFilter, ToneMap, default_depth
 from lippmann.options.option import Options, options_of
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.quality import MachineOptions, QualityOptions
@@ -122,8 +114,6 @@ def shown_value(value: object) -> str:
 
 #: Samples per pixel where nothing is said and light is not pooled.
 DEFAULT_SPP = 16
-#: Surfaces per path where nothing is said.
-DEFAULT_DEPTH: dict[Integrator, int] = {"classic": 2, "path": 8, "direct": 1}
 
 
 @dataclass(frozen=True)
@@ -224,7 +214,7 @@ class RenderRequest(MachineOptions, QualityOptions):
     @property
     def surfaces(self) -> int:
         """The depth that will be used."""
-        return DEFAULT_DEPTH.get(self.integrator, 1) if self.depth is None else self.depth
+        return default_depth(self.integrator) if self.depth is None else self.depth
 
     @property
     def channels(self) -> int:

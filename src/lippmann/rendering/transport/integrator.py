@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from lippmann.device.sobol import SampleStream
-from lippmann.device.types import Bool, Float, Ray3f, Spectrum, UInt32
+if TYPE_CHECKING:  # plugins take their names from here before the engine starts
+    from lippmann.device.sobol import SampleStream
+    from lippmann.device.types import Bool, Float, Ray3f, Spectrum, UInt32
 
 
 @dataclass

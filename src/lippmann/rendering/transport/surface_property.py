@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -13,8 +11,6 @@ from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, Color3f, MitsubaScene, Ray3f, Vector3f
 from lippmann.rendering.transport.integrator import RayCounts
 from lippmann.scene.matrices import normal_matrix
-
-SurfaceProperty = Literal["normal", "depth", "position", "albedo"]
 
 
 class SurfaceIntegrator:
@@ -32,7 +28,7 @@ class SurfaceIntegrator:
         ``(4, 4)``, an affine map.
     """
 
-    def __init__(self, scene: MitsubaScene, prop: SurfaceProperty, display_from_world: NDArray[np.float64]) -> None:
+    def __init__(self, scene: MitsubaScene, prop: str, display_from_world: NDArray[np.float64]) -> None:
         self.scene = scene
         self.name = prop
         self.depth = 1

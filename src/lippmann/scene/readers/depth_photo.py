@@ -20,7 +20,6 @@ from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import decoding, read_bytes, texels_of_codes
 from lippmann.scene.readers.depth_layers import Layers, split_layers
 from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map
-from lippmann.scene.readers.heif_photo import read_heif_photo
 from lippmann.scene.values.description import Image, Instance, Material, Mesh, SceneDescription, Texture
 
 #: Endings of HEIF pictures.
@@ -39,7 +38,7 @@ _BYTES_PER_POINT = 400
 _ASPECT = 0.02
 
 
-def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path | None = None) -> SceneDescription:
+def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescription:
     """Read a photograph with its depth, both as their EXIF orientation turns them.
 
     The picture shows its own colours, unlit, and is 1 high or wide, whichever is less. What the camera saw as a pyramid
@@ -48,8 +47,6 @@ def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path
 
     Parameters
     ----------
-    allow_outside:
-        Without effect: the files are named by the caller.
     depth_map:
         A depth map; None for one within the picture (Dynamic Depth or XMP GDepth in JPEG files, an auxiliary picture in
         HEIF files), or one beside it (:func:`depth_beside`).
@@ -62,6 +59,8 @@ def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path
     data, turn = read_bytes(path), 1
     notes: tuple[str, ...] = ()
     if path.suffix.lower() in HEIF:
+        from lippmann.scene.readers.heif import read_heif_photo
+
         image, own = read_heif_photo(data, path.name)
     else:
         with decoding("the photograph", path.name), open_photograph(io.BytesIO(data), path) as photograph:

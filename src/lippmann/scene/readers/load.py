@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,12 +15,13 @@ from lippmann.options.option import takes
 from lippmann.options.outputs import AccessOptions
 from lippmann.options.scene import LoadKeywords, SceneOptions, Up
 from lippmann.options.texts import settings_of
+from lippmann.runtime.plugins import Plugin, function_of
 from lippmann.scene.cloud_selection import SplatSelection, VolumeSelection
 from lippmann.scene.mitsuba_source import MitsubaSource
+from lippmann.scene.parsing.dicom_files import DICOM, holds_dicom
 from lippmann.scene.parsing.files import read_bytes
-from lippmann.scene.readers.ply import UP_NOTE
+from lippmann.scene.readers.registry import READERS, VTK, Reader, ReaderOption, suffixes_with
 from lippmann.scene.readers.splats.sog_folder import holds_sog
-from lippmann.scene.readers.volumes.dicom_files import DICOM, holds_dicom
 from lippmann.scene.scene import Scene, check_description, override_light
 from lippmann.scene.splat_clouds import moved
 from lippmann.scene.values.description import (
@@ -44,62 +44,14 @@ if TYPE_CHECKING:
 #: Words in place of an environment file: the built-in studio, and no light but the scene's own.
 STUDIO, NO_ENVIRONMENT = "studio", "none"
 
-#: Pictures, which are scenes if they have depth.
-PHOTOS = (".jpg", ".jpeg", ".png", ".webp", ".heic", ".heif", ".hif")
-
-#: Data sets of VTK.
-VTK = (".vtp", ".vtu", ".vtk", ".vti", ".vtr", ".vts")
-
-# Suffix -> "module:function" of its reader: read(path, *, allow_outside) gives a SceneDescription, a MitsubaSource or a
-# ClassicScene.
-_READERS = {
-    ".blend": "lippmann.scene.readers.blend:read_blend",
-    ".dat": "lippmann.scene.readers.tachyon.reader:read_tachyon",
-    ".glb": "lippmann.scene.readers.gltf:read_gltf",
-    ".gltf": "lippmann.scene.readers.gltf:read_gltf",
-    ".nff": "lippmann.scene.readers.nff:read_nff",
-    ".obj": "lippmann.scene.readers.obj:read_obj",
-    ".ply": "lippmann.scene.readers.ply:read_ply",
-    ".sog": "lippmann.scene.readers.splats.sog:read_sog",
-    ".spz": "lippmann.scene.readers.splats.spz:read_spz",
-    ".stl": "lippmann.scene.readers.stl:read_stl",
-    ".usd": "lippmann.scene.readers.usd:read_usd",
-    ".usda": "lippmann.scene.readers.usd:read_usd",
-    ".usdc": "lippmann.scene.readers.usd:read_usd",
-    ".usdz": "lippmann.scene.readers.usd:read_usd",
-    ".xml": "lippmann.scene.mitsuba_source:read_mitsuba",
-    **dict.fromkeys((".nii", ".nii.gz"), "lippmann.scene.readers.volumes.nifti:read_nifti"),
-    **dict.fromkeys((".npy", ".npz"), "lippmann.scene.readers.volumes.numpy_arrays:read_array"),
-    **dict.fromkeys(VTK, "lippmann.scene.readers.vtk.files:read_vtk"),
-    ".dcm": "lippmann.scene.readers.volumes.dicom:read_dicom",
-    ".vdb": "lippmann.scene.readers.volumes.vdb:read_vdb",
-    ".vol": "lippmann.scene.readers.volumes.mitsuba_grid:read_mitsuba_grid",
-    **dict.fromkeys((".pdb", ".ent", ".cif", ".json"), "lippmann.scene.readers.molecule:read_molecule"),
-    **dict.fromkeys(PHOTOS, "lippmann.scene.readers.depth_photo:read_depth_photo"),
+#: Libraries whose objects are scenes -> "module:function" that finds the reader of an object.
+_LIBRARIES = {
+    "trimesh": "lippmann.scene.readers.trimesh_objects:adapter_for",
+    "pyvista": "lippmann.scene.readers.vtk.objects:adapter_for",
 }
 
 #: Radiance whose square single precision holds.
 _BRIGHTEST = 1e18
-
-# First bytes of a file -> its suffix, for unmistakable formats.
-_BEGINNINGS = {
-    b"BLENDER": ".blend",
-    b"glTF": ".glb",
-    b"ply\n": ".ply",
-    b"ply\r": ".ply",
-    b"#usda": ".usda",
-    b"PXR-USDC": ".usdc",
-    b"<": ".xml",
-    b'{"data_': ".json",
-    b"{": ".gltf",
-}
-
-#: Kinds of files that may hold several volumes, or arrays of which one is shown.
-SEVERAL_VOLUMES = (".nii", ".nii.gz", ".npz", ".dcm", ".vdb", *VTK)
-
-#: USD stages, and kinds of files whose variants can be chosen.
-STAGES = (".usd", ".usda", ".usdc", ".usdz")
-_WITH_VARIANTS = (*STAGES, ".gltf", ".glb")
 
 _PAPER_DEPTH = 2
 
@@ -135,18 +87,6 @@ _ELSEWHERE = {
     ".mol": "save it as .pdb or .cif, in Avogadro or by: obabel in.mol -O out.pdb",
 }
 
-#: Kinds of files that do not say which way is up, and which way it mostly is: for 3D printing, z.
-_USUAL_UP: dict[str, Up] = {
-    ".npy": "y",
-    ".npz": "y",
-    ".obj": "y",
-    ".ply": "y",
-    **dict.fromkeys(VTK, "y"),
-    ".sog": "-y",
-    ".spz": "y",
-    ".stl": "z",
-    ".vdb": "y",
-}
 _DIRECTIONS: dict[Up, Direction] = {"y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0), "-y": (0.0, -1.0, 0.0)}
 
 
@@ -242,11 +182,6 @@ def _single_scattering(description: SceneDescription | MitsubaSource) -> SceneDe
     return replace(description, multiple_scattering=False, notes=(*description.notes, remark))
 
 
-def known_suffixes() -> tuple[str, ...]:
-    """The endings of the scene files that can be read."""
-    return tuple(_READERS)
-
-
 def kind_of_file(source: str | Path) -> str | None:
     """The ending that goes with a scene file's content, or else its own; None for the name of a bundled scene.
 
@@ -261,38 +196,29 @@ def kind_of_file(source: str | Path) -> str | None:
     return _suffix_by_content(path) or kind_of_name(path)
 
 
+def kind_of_name(path: Path) -> str:
+    """The ending that names a file's kind, of two parts as that of packed volumes where such a kind is known."""
+    suffix, whole = path.suffix.lower(), "".join(path.suffixes[-2:]).lower()
+    is_plain = suffix == whole or suffix in READERS.own_claims or READERS.find(whole) is None
+    return suffix if is_plain else whole
+
+
 def unknown_kind(path: Path) -> SceneError | None:
     """The error of a file whose ending is that of no scene; None for a known ending or none."""
-    return None if kind_of_name(path) in ("", *_READERS) else _unknown_kind(path)
+    suffix = kind_of_name(path)
+    return None if not suffix or READERS.find(suffix) is not None else _unknown_kind(path)
 
 
 def _unknown_kind(path: Path) -> SceneError:
     suffix = kind_of_name(path)
-    return SceneError.unknown("kind of scene file", suffix, _READERS, where=path.name, rule=_ELSEWHERE.get(suffix, ""))
-
-
-def kind_of_name(path: Path) -> str:
-    """The ending that names a file's kind, that of packed volumes in whole."""
-    return ".nii.gz" if path.name.lower().endswith(".nii.gz") else path.suffix.lower()
+    rule, broken = _ELSEWHERE.get(suffix, ""), READERS.problems
+    return SceneError.unknown("kind of scene file", suffix, READERS.claims(), where=path.name, rule=rule, fix=broken)
 
 
 def _from_name(source: str | Path, allow_outside: bool, asked: SceneOptions) -> Scene:
-    up, variants, series = asked.up, asked.variants, asked.series
-    depth_map = None if asked.depth_map is None else Path(asked.depth_map)
     path = Path(source)
     suffix = ".sog" if holds_sog(path) else kind_of_name(path)
-    if up is not None and suffix not in _USUAL_UP:
-        what = f"{path.name} says itself which way is up"
-        raise UsageError(what, parameter="up", rule=f"y, z or -y, for {', '.join(_USUAL_UP)}", fix="leave it out")
-    if variants and kind_of_file(source) not in _WITH_VARIANTS:
-        rule = f"{', '.join(_WITH_VARIANTS)} files may have some"
-        raise UsageError(f"{path.name} has no variants", parameter="variants", rule=rule)
-    if depth_map is not None and suffix not in PHOTOS:
-        raise UsageError(f"{path.name} is no photograph", parameter="depth_map", rule=f"for {', '.join(PHOTOS)} files")
-    if series is not None and kind_of_file(source) not in SEVERAL_VOLUMES:
-        raise UsageError(
-            f"{path.name} holds no several volumes", parameter="series", rule=f"for {', '.join(SEVERAL_VOLUMES)} files"
-        )
+    _check_options(source, suffix, asked)
     if isinstance(source, str) and not suffix and path.name == source:
         from lippmann.scene import bundled
 
@@ -300,40 +226,76 @@ def _from_name(source: str | Path, allow_outside: bool, asked: SceneOptions) -> 
             return _from_library(source)
         if not path.exists():
             raise SceneError.unknown("bundled scene or file", source, bundled.names())
-    reader = _READERS.get(suffix)
-    by_content = _suffix_by_content(path)
-    if by_content is not None:
-        if reader not in (None, _READERS[by_content]):
-            raise SceneError(f"is no {suffix} file", where=path.name, rule=f"it begins like a {by_content} file")
-        reader = _READERS[by_content]
-    if reader is None:
-        raise _unknown_kind(path)
-    chosen = {
-        key: value for key, value in (("variants", variants), ("depth_map", depth_map), ("series", series)) if value
+    plugin = _reader_of(path, suffix)
+    reader = plugin.value
+    values = {
+        "allow_outside": allow_outside,
+        "variants": asked.variants,
+        "depth_map": None if asked.depth_map is None else Path(asked.depth_map),
+        "series": asked.series,
     }
-    module, function = reader.split(":")
-    description = getattr(import_module(module), function)(path, allow_outside=allow_outside, **chosen)
+    chosen = {name: values[name] for name in reader.options if values[name]}
+    with plugin.guarded(SceneError, path.name):
+        description = function_of(reader.read)(path, **chosen)
     if isinstance(description, ClassicScene):
         return _classic(description, world_camera(description))
     if isinstance(description, SceneDescription):
-        description = _upright(_with_remarks(check_description(description, path.name)), suffix, up)
+        description = _upright(_with_remarks(check_description(description, path.name)), suffix, reader, asked.up)
+    elif not isinstance(description, MitsubaSource):
+        what = f"the plugin {plugin} made a {type(description).__name__} of it"
+        raise SceneError(what, where=path.name, rule="a reader returns a SceneDescription")
     return Scene(description.name, description)
 
 
-def _upright(description: SceneDescription, suffix: str, up: Up | None) -> SceneDescription:
+def _check_options(source: str | Path, suffix: str, asked: SceneOptions) -> None:
+    """Refuse options that are not for files of this kind."""
+    name = Path(source).name
+    named = READERS.find(suffix) if asked.up is not None else None
+    if asked.up is not None and (named is None or named.value.up is None):
+        guessed = ", ".join(each for own in READERS.own.values() if own.up for each in own.suffixes)
+        what = f"{name} says itself which way is up"
+        raise UsageError(what, parameter="up", rule=f"y, z or -y, for {guessed}", fix="leave it out")
+    has_none: dict[ReaderOption, str] = {
+        "variants": f"{name} has no variants",
+        "depth_map": f"{name} is no photograph",
+        "series": f"{name} holds no several volumes",
+    }
+    for option, what in has_none.items():
+        if getattr(asked, option):
+            plugin = READERS.find(kind_of_file(source) or "")
+            if plugin is None or option not in plugin.value.options:
+                raise UsageError(what, parameter=option, rule=f"for {', '.join(suffixes_with(option))} files")
+
+
+def _reader_of(path: Path, suffix: str) -> Plugin[Reader]:
+    """The reader of a file by its ending; files of Lippmann's own kinds must also begin like one, if like any."""
+    named, beginning = READERS.find(suffix), _suffix_by_content(path)
+    if named is not None and named.distribution:
+        return named
+    found = named if beginning is None else READERS.find(beginning)
+    if found is None:
+        raise _unknown_kind(path)
+    if named not in (None, found):
+        raise SceneError(f"is no {suffix} file", where=path.name, rule=f"it begins like a {beginning} file")
+    return found
+
+
+def _upright(description: SceneDescription, suffix: str, reader: Reader, up: Up | None) -> SceneDescription:
     """A description of a file that does not say which way is up, with y up, and a note where that was guessed."""
-    if suffix not in _USUAL_UP:
+    if reader.up is None:
         return description
     splats = description.splats
-    usual: Up = "-y" if splats is not None and suffix == ".ply" else _USUAL_UP[suffix]
+    usual: Up = "-y" if splats is not None and suffix == ".ply" else reader.up
     is_guessed = up is None and description.up is None
-    notes = [note for note in description.notes if note != UP_NOTE or up is None]
+    notes = [*description.notes]
     if is_guessed and usual == "z":
         notes.append(f"up is taken as +z, as 3D printing has it, for nothing in {suffix} files says it (else up=y)")
     if is_guessed and usual == "-y":
         notes.append("up is taken as -y, as trainers of splats have it, for nothing in the file says it (else up=y)")
     if is_guessed and suffix == ".spz":
         notes.append("up is taken as +y, as SPZ has it, but some programs leave it at -y (then up=-y)")
+    if is_guessed and suffix == ".ply" and usual == "y":
+        notes.insert(0, "up is taken as +y, for nothing in the data says it (else up=z)")
     if is_guessed and suffix in VTK:
         notes.append(f"up is taken as +y, for nothing in {suffix} files says it (else up=z)")
     matrix = _turn_up(_DIRECTIONS[up or usual] if up is not None or description.up is None else description.up)
@@ -391,7 +353,12 @@ def _suffix_by_content(path: Path) -> str | None:
     head = head.removeprefix(b"\xef\xbb\xbf").lstrip()
     if b"<VTKFile" in head or (kind_of_name(path) in VTK and head.startswith(b"<")):  # they are XML, too
         return None
-    return next((suffix for beginning, suffix in _BEGINNINGS.items() if head.startswith(beginning)), None)
+    readers = [*READERS.own_claims.values()]
+    if kind_of_name(path) not in READERS.own_claims:
+        readers += [each for each in READERS.plugins if not each.problem]
+    fitting = [start for each in readers for start in each.value.beginnings if head.startswith(start)]
+    longest = max(fitting, key=len, default=b"")
+    return next((each.value.beginnings[longest] for each in readers if longest in each.value.beginnings), None)
 
 
 def _from_library(name: str) -> Scene:
@@ -427,9 +394,7 @@ def _from_object(source: object) -> Scene:
         return Scene("mitsuba", MitsubaSource("mitsuba", dict(source)))
     if type(source).__module__.partition(".")[0] == "mitsuba" and type(source).__name__ == "Scene":
         return Scene("mitsuba", MitsubaSource("mitsuba", source))
-    from lippmann.scene.readers.trimesh_pyvista import adapter_for
-
-    adapter = adapter_for(source)
+    adapter = _adapter_for(source)
     if adapter is None:
         raise UsageError(
             f"a {type(source).__module__}.{type(source).__qualname__} is no scene",
@@ -440,6 +405,14 @@ def _from_object(source: object) -> Scene:
     # A plotter shows its scene by its camera.
     home = description.cameras[0].name if hasattr(source, "renderers") else None
     return Scene(description.name, description, home_camera=home, home_may_move=True)
+
+
+def _adapter_for(source: object) -> Callable[[object], SceneDescription] | None:
+    """The function that reads an object of another library, by the library it or a base of its class comes from."""
+    libraries = {kind.__module__.partition(".")[0] for kind in type(source).__mro__}
+    home = next((each for library, each in _LIBRARIES.items() if library in libraries), None)
+    adapter: Callable[[object], SceneDescription] | None = None if home is None else function_of(home)(source)
+    return adapter
 
 
 def _environment(environment: str | Path | Environment | None) -> Environment | None:

@@ -29,8 +29,8 @@ _LARGEST_PICTURE = 65536
 _MOST_CORNERS = 16384  # concave polygons take time with the square of their corners
 
 
-def read_nff(path: str | Path, *, allow_outside: bool = False) -> ClassicScene:
-    """Read an NFF file. It refers to no other, so ``allow_outside`` has no effect.
+def read_nff(path: str | Path) -> ClassicScene:
+    """Read an NFF file. It refers to no other.
 
     Raises
     ------

@@ -24,8 +24,6 @@ from lippmann.scene.point_clouds import describe_cloud
 from lippmann.scene.readers.splats.ply import holds_splats, read_splat_ply
 from lippmann.scene.values.description import AlphaMode, Instance, Material, Mesh, SceneDescription, Texture
 
-UP_NOTE = "up is taken as +y, for nothing in the data says it (else up=z)"
-
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _COLOR_NAMES = (
     ("red", "green", "blue", "alpha"),
@@ -61,7 +59,7 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     columns = read_body(data, header, where)
     if not all(isinstance(columns.get("vertex", {}).get(axis), np.ndarray) for axis in "xyz"):
         raise SceneError("holds no vertices with x, y and z", where=where)
-    notes = [*header.notes] if header.up else [UP_NOTE, *header.notes]
+    notes = [*header.notes]
     elements = {element.name: element for element in header.elements}
     unread = sorted({each.name for each in elements["vertex"].properties} - _SHOWN)
     if unread:

@@ -32,7 +32,7 @@ _LONGEST_REMARKS = 4096
 _VERTEX = re.compile(r"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
 
 
-def read_stl(path: Path, *, allow_outside: bool = False) -> SceneDescription:
+def read_stl(path: Path) -> SceneDescription:
     """Read an STL file; its solids become one mesh of flat facets. It names no other file.
 
     Raises
@@ -40,7 +40,6 @@ def read_stl(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     SceneError
         The file is missing, foreign, cut short, or holds no facets.
     """
-    del allow_outside
     where = path.name
     data = read_bytes(path)
     notes: list[str] = []

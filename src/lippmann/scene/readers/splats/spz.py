@@ -65,7 +65,7 @@ class _Head:
         return [6 if self.version == 1 else 9, 1, 3, 3, turn, 3 * (COEFFICIENTS[self.degree] - 1)]
 
 
-def read_spz(path: Path, *, allow_outside: bool = False) -> SceneDescription:
+def read_spz(path: Path) -> SceneDescription:
     """Read an SPZ file. It names no other file.
 
     Raises
@@ -73,7 +73,6 @@ def read_spz(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     SceneError, MemoryLimitError
         The file is missing, foreign, damaged, of another version, or takes more memory than is left.
     """
-    del allow_outside
     splats, notes, says_axes = decode_spz(read_bytes(path), where=path.name)
     return SceneDescription(path.stem, splats=splats, notes=notes, up=(0.0, 1.0, 0.0) if says_axes else None)
 

@@ -15,8 +15,8 @@ from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
 from lippmann.runtime.machine import check_input, input_memory_left
 from lippmann.runtime.optional_import import check_installed
 from lippmann.scene.parsing.files import read_bytes
-from lippmann.scene.readers.volumes.description import WORLD_FROM_LPS, describe_volume
 from lippmann.scene.values.description import SceneDescription
+from lippmann.scene.volumes.description import WORLD_FROM_LPS, describe_volume
 from lippmann.scene.volumes.presets import Kind
 
 _MOST_SECONDS = 900.0
@@ -26,7 +26,7 @@ _KINDS: dict[str, Kind] = {"CT": "ct", "MR": "mr"}
 _process = HelperProcess("from lippmann.scene.readers.volumes.dicom_child import main; main()", _MOST_SECONDS)
 
 
-def read_dicom(path: Path, *, allow_outside: bool = False, series: str | None = None) -> SceneDescription:
+def read_dicom(path: Path, *, series: str | None = None) -> SceneDescription:
     """Read a series of a folder and those below it, or the series of one file with what lies beside it.
 
     World units are millimetres; the patient is seen from the front, head up. Slices are placed by their positions;
@@ -34,8 +34,6 @@ def read_dicom(path: Path, *, allow_outside: bool = False, series: str | None = 
 
     Parameters
     ----------
-    allow_outside:
-        Without effect: such files name no others, and links in a folder are left alone.
     series:
         Number (from 1), description or UID of a series; None for that with the most slices.
 

@@ -14,7 +14,7 @@ import numpy as np
 import pydicom
 
 from lippmann.runtime.helper_process import limit_memory, serve
-from lippmann.scene.readers.volumes.dicom_files import MOST_FILES, fault_of, files_in
+from lippmann.scene.parsing.dicom_files import MOST_FILES, fault_of, files_in
 from lippmann.scene.readers.volumes.dicom_slices import (
     Frame,
     SeriesError,

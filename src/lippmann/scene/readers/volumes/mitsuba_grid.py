@@ -10,21 +10,16 @@ import numpy as np
 from lippmann.errors import SceneError
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import read_bytes
-from lippmann.scene.readers.volumes.description import describe_volume
 from lippmann.scene.values.description import SceneDescription
+from lippmann.scene.volumes.description import describe_volume
 
 #: Magic, version, encoding, voxels along x, y and z, channels, and the box: lowest corner, then highest.
 _HEADER = struct.Struct("<3sB5i6f")
 _FLOAT = 1
 
 
-def read_mitsuba_grid(path: Path, *, allow_outside: bool = False) -> SceneDescription:
+def read_mitsuba_grid(path: Path) -> SceneDescription:
     """Read a grid of single-precision numbers, one a voxel, in the box that the file names.
-
-    Parameters
-    ----------
-    allow_outside:
-        Without effect: such files name no others.
 
     Raises
     ------

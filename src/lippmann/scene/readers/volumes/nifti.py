@@ -16,9 +16,9 @@ from lippmann.errors import SceneError, UsageError
 from lippmann.runtime.machine import check_input
 from lippmann.runtime.optional_import import optional
 from lippmann.scene.parsing.files import read_bytes
-from lippmann.scene.readers.volumes.description import WORLD_FROM_RAS, describe_volume
 from lippmann.scene.readers.volumes.parts import read_up_to
 from lippmann.scene.values.description import SceneDescription
+from lippmann.scene.volumes.description import WORLD_FROM_RAS, describe_volume
 
 #: First bytes of a file, and the length of its header.
 _LENGTHS = {348: 348, 540: 540}
@@ -29,13 +29,11 @@ _RULE = "NIfTI-1 or NIfTI-2 in one file"
 _MILLIMETRES = {0: 1.0, 1: 1000.0, 2: 1.0, 3: 1e-3}
 
 
-def read_nifti(path: Path, *, allow_outside: bool = False, series: str | None = None) -> SceneDescription:
+def read_nifti(path: Path, *, series: str | None = None) -> SceneDescription:
     """Read a volume of a NIfTI file. World units are millimetres; the patient is seen from the front, head up.
 
     Parameters
     ----------
-    allow_outside:
-        Without effect: such files name no others.
     series:
         Number of one of several volumes, from 1; None for the first.
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from lippmann.errors import LippmannError, SceneError, UsageError
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import read_bytes
-from lippmann.scene.readers.volumes.description import describe_volume
 from lippmann.scene.readers.volumes.parts import read_up_to
 from lippmann.scene.values.description import SceneDescription
+from lippmann.scene.volumes.description import describe_volume
 
 #: The array of an ``.npz`` file with the distances of voxels along its axes z, y and x.
 SPACING = "spacing"
@@ -26,13 +26,11 @@ _LONGEST_HEADER = 1 << 16
 _RULE = "an array (z, y, x) of real numbers"
 
 
-def read_array(path: Path, *, allow_outside: bool = False, series: str | None = None) -> SceneDescription:
+def read_array(path: Path, *, series: str | None = None) -> SceneDescription:
     """Read an array of three axes; voxels are 1 mm wide, or as ``spacing`` (z, y, x) of an ``.npz`` file says.
 
     Parameters
     ----------
-    allow_outside:
-        Without effect: such files name no others.
     series:
         Name of an array of an ``.npz`` file; None for the only one of three axes.
 

@@ -12,9 +12,9 @@ from lippmann.errors import SceneError, UsageError
 from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
 from lippmann.runtime.machine import check_input, input_memory_left
 from lippmann.scene.parsing.files import read_bytes
-from lippmann.scene.readers.volumes.description import describe_volume
 from lippmann.scene.readers.volumes.vdb_module import find_module
 from lippmann.scene.values.description import SceneDescription
+from lippmann.scene.volumes.description import describe_volume
 
 #: First bytes of such a file.
 _BEGINNING = b" BDV\0\0\0\0"
@@ -23,15 +23,13 @@ _MOST_SECONDS = 300.0
 _process = HelperProcess("from lippmann.scene.readers.volumes.vdb_child import main; main()", _MOST_SECONDS)
 
 
-def read_vdb(path: Path, *, allow_outside: bool = False, series: str | None = None) -> SceneDescription:
+def read_vdb(path: Path, *, series: str | None = None) -> SceneDescription:
     """Read a grid of one number a voxel; the box of its active voxels is shown.
 
     World units are the file's; +y is up.
 
     Parameters
     ----------
-    allow_outside:
-        Without effect: such files name no others.
     series:
         Name of a grid; None for ``density``, and where there is none for the first.
 

@@ -6,16 +6,16 @@ PyVista is not imported here: whoever has an object of it has loaded it.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.vertex_colors import linear_colors, material_of
 from lippmann.scene.point_clouds import describe_cloud
-from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
+from lippmann.scene.values.description import Instance, Mesh, SceneDescription
 
 if TYPE_CHECKING:
     import pyvista
@@ -26,17 +26,6 @@ COLOR_MAP = "viridis"
 _GHOSTS, _HIDDEN_POINT, _HIDDEN_CELL = "vtkGhostType", 2, 32
 #: Colour of what is no number, in sRGB codes.
 _NO_NUMBER = (160, 160, 160, 255)
-
-GREY = Material("grey", base_color=(0.7, 0.7, 0.7), roughness=0.6, double_sided=True)
-COLORED = Material("vertex colours", roughness=0.6, double_sided=True)
-_TRANSLUCENT = replace(COLORED, alpha_mode="blend")
-
-
-def material_of(colors: ArrayLike | None) -> Material:
-    """The material of a surface with colours ``(n, 3 or 4)`` of bytes, or without."""
-    if colors is None:
-        return GREY
-    return _TRANSLUCENT if (np.asarray(colors)[:, 3:] < 255).any() else COLORED
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,12 +177,6 @@ def describe_surface(surface: Surface, name: str, notes: list[str]) -> SceneDesc
     if surface.faces.shape[1] == 1:
         return describe_cloud(mesh, material, notes)
     return SceneDescription(name, [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
-
-
-def linear_colors(colors: ArrayLike) -> NDArray[np.float32]:
-    """Linear RGBA of sRGB-coded bytes ``(n, 3 or 4)``."""
-    fraction = np.asarray(colors, np.float64) / 255.0
-    return np.concatenate([decode_srgb(fraction[:, :3]), fraction[:, 3:]], axis=1).astype(np.float32)
 
 
 def _colors(

@@ -14,22 +14,20 @@ from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
 from lippmann.runtime.machine import check_input, input_memory_left
 from lippmann.runtime.optional_import import check_installed
 from lippmann.scene.parsing.files import read_bytes
-from lippmann.scene.readers.volumes.description import describe_volume
 from lippmann.scene.readers.vtk.data_set import Surface, describe_surface
 from lippmann.scene.values.description import SceneDescription
+from lippmann.scene.volumes.description import describe_volume
 
 _MOST_SECONDS = 300.0
 
 _process = HelperProcess("from lippmann.scene.readers.vtk.child import main; main()", _MOST_SECONDS)
 
 
-def read_vtk(path: Path, *, allow_outside: bool = False, series: str | None = None) -> SceneDescription:
+def read_vtk(path: Path, *, series: str | None = None) -> SceneDescription:
     """Read a data set of VTK's: its outer surface, or of an image with scalars the volume.
 
     Parameters
     ----------
-    allow_outside:
-        Without effect: such files name no others.
     series:
         Name of the array that is shown; None for the active one.
 

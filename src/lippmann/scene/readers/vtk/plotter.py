@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.vertex_colors import COLORED
 from lippmann.scene.point_clouds import draw_cloud
-from lippmann.scene.readers.vtk.data_set import COLORED, Surface, image_of, is_points, mesh_of, surface_of
+from lippmann.scene.readers.vtk.data_set import Surface, image_of, is_points, mesh_of, surface_of
 from lippmann.scene.values.description import (
     Camera,
     Color,

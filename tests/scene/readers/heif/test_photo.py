@@ -10,7 +10,7 @@ from PIL import Image as Pillow
 from lippmann.codecs.icc import rgb_profile
 from lippmann.errors import MemoryLimitError, SceneError
 from lippmann.runtime import machine
-from lippmann.scene.readers.heif_photo import read_heif_photo
+from lippmann.scene.readers.heif.photo import read_heif_photo
 from lippmann.scene.readers.load import load_scene
 
 pytest.importorskip("pillow_heif", reason="pillow-heif is not installed")

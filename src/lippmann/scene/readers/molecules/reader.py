@@ -57,20 +57,15 @@ _ELEMENTS: dict[int, tuple[tuple[int, int, int], float, float]] = {
 }
 _OTHER = ((255, 20, 147), 1.40, 2.00)
 
-_process = HelperProcess("from lippmann.scene.readers.molecule_child import main; main()", _MOST_SECONDS)
+_process = HelperProcess("from lippmann.scene.readers.molecules.child import main; main()", _MOST_SECONDS)
 
 
-def read_molecule(path: Path, *, allow_outside: bool = False) -> SceneDescription:
+def read_molecule(path: Path) -> SceneDescription:
     """Read a molecule: PDB, mmCIF, mmJSON, or the CIF of a small molecule. A unit is an angstrom.
 
     The first block with atoms and the first model are shown; of residues and atoms that share a place, the first.
     Balls have a quarter of van der Waals radii. Two atoms that lie within their covalent radii and 0.45 angstroms are
     joined by a stick, each half in its atom's colour.
-
-    Parameters
-    ----------
-    allow_outside:
-        Without effect: such files name no others.
 
     Raises
     ------

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lippmann.errors import LippmannError, SceneError
-from lippmann.scene.readers import molecule
 from lippmann.scene.readers.load import load_scene
+from lippmann.scene.readers.molecules import reader as molecule
 
 WATER = """\
 HETATM    1  O   HOH A   1       0.000   0.000   0.000  1.00  0.00           O

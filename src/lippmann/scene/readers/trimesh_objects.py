@@ -1,29 +1,19 @@
-"""Meshes and scenes of other Python libraries as plain values: trimesh and PyVista.
+"""Meshes and scenes of trimesh as plain values.
 
-Neither library is imported here: whoever has an object of one has loaded it.
+The library is not imported here: whoever has an object of it has loaded it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import texels_of
-from lippmann.scene.readers.volumes.description import describe_volume
-from lippmann.scene.readers.vtk.data_set import (
-    GREY,
-    describe_surface,
-    image_of,
-    linear_colors,
-    material_of,
-    surface_of,
-    unshown_arrays,
-)
-from lippmann.scene.readers.vtk.plotter import from_plotter
+from lippmann.scene.parsing.vertex_colors import GREY, linear_colors, material_of
 from lippmann.scene.values.description import (
     AlphaMode,
     Camera,
@@ -38,11 +28,8 @@ from lippmann.scene.values.description import (
 )
 
 if TYPE_CHECKING:
-    import pyvista
     import trimesh
     from PIL import Image as Pillow
-
-_UP_NOTE = "up is taken as +y, for nothing in the data says it (turn 0,-90 sets a model upright whose up is +z)"
 
 _LIGHT_KINDS: dict[str, Literal["point", "spot", "directional"]] = {
     "PointLight": "point",
@@ -201,34 +188,9 @@ def _from_trimesh_light(scene: trimesh.Scene, light: trimesh.scene.lighting.Ligh
     )
 
 
-def from_pyvista(source: pyvista.DataSet | pyvista.MultiBlock) -> SceneDescription:
-    """A PyVista data set: of an image with active scalars the volume, else its surface, cut into triangles.
-
-    See :mod:`lippmann.scene.readers.vtk.data_set`.
-
-    Raises
-    ------
-    SceneError
-        The data set has no surface.
-    """
-    image = image_of(source) if hasattr(source, "direction_matrix") else None
-    if image is not None:
-        return describe_volume("pyvista", *image, notes=[f"the scalars '{source.active_scalars_name}'"])
-    surface = surface_of(source)
-    notes = [_UP_NOTE, *surface.notes]
-    if surface.colors is None and (names := unshown_arrays(source)):
-        notes.append(f"none of its arrays is active in all of it, so that none is shown of {names}")
-    return describe_surface(surface, "pyvista", notes)
-
-
-def adapter_for(source: object) -> Callable[[object], SceneDescription] | None:
-    """The function that reads an object of another library, by the library it or a base of its class comes from."""
-    libraries = {kind.__module__.partition(".")[0] for kind in type(source).__mro__}
-    if "trimesh" in libraries and (hasattr(source, "graph") or hasattr(source, "faces")):
-        return from_trimesh
-    if "pyvista" in libraries and hasattr(source, "renderers"):
-        return from_plotter
-    return from_pyvista if "pyvista" in libraries else None
+def adapter_for(source: object) -> Callable[[Any], SceneDescription] | None:
+    """The function that reads an object of trimesh's; None for one that is no scene."""
+    return from_trimesh if hasattr(source, "graph") or hasattr(source, "faces") else None
 
 
 def _fraction(color: ArrayLike | None, default: tuple[int, ...]) -> NDArray[np.float64]:

@@ -1,0 +1,1 @@
+"""Molecules, read by the library ``gemmi`` in a process of its own."""

@@ -1,0 +1,153 @@
+"""Readers of scene files by what their files are called and begin with: Lippmann's own, and those of other packages.
+
+None is imported before a file of its kind is read.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal, Protocol
+
+from lippmann.options.scene import Up
+from lippmann.runtime.plugins import Door, Extension, Target
+from lippmann.scene.values.description import SceneDescription
+
+#: Options of a scene that are for some readers alone: ``allow_outside`` lets a file name files beside its own folder,
+#: ``variants`` chooses among those of a file, ``depth_map`` names a photograph's, ``series`` one of several volumes.
+ReaderOption = Literal["allow_outside", "variants", "depth_map", "series"]
+
+_SUFFIX = re.compile(r"(\.[a-z0-9_+-]+){1,2}")
+
+
+class MovingScene(Protocol):
+    """A scene file that moves."""
+
+    @property
+    def duration(self) -> float:
+        """Seconds to its last frame."""
+        ...
+
+    @property
+    def content(self) -> object:
+        """All values that its frames depend on, as plain values."""
+        ...
+
+    def at(self, seconds: float) -> SceneDescription:
+        """The scene at a time; after the last frame it stands still."""
+        ...
+
+
+@dataclass(frozen=True)
+class Reader(Extension):
+    """A format of scene files.
+
+    Functions may be given as texts, ``"module:function"``; their modules are then imported when a file is read.
+
+    Parameters
+    ----------
+    suffixes:
+        Endings of its files, in lower case, with their dots: ``(".tri",)``.
+    read:
+        ``read(path)`` returns a :class:`SceneDescription`, y up unless it says so. It raises a
+        :class:`lippmann.LippmannError`, such as ``SceneError``, for a file that it cannot read.
+    beginnings:
+        Suffixes by the first bytes of files of that kind; these tell files that are called otherwise.
+    options:
+        Which of ``allow_outside``, ``variants``, ``depth_map`` and ``series`` ``read`` takes as keywords.
+    up:
+        The way that mostly is up in files which do not say it: ``"y"``, ``"z"`` or ``"-y"``. Users may then ask for
+        another (``up``). None: files say it.
+    moving:
+        ``moving(path, animation=..., ...)`` returns an object with ``duration`` (seconds), ``at(seconds)``, a
+        :class:`SceneDescription`, and ``content``, the plain values that all depends on. It takes those of ``options``
+        that are ``allow_outside`` or ``variants``. None: nothing moves.
+
+    Examples
+    --------
+    >>> from lippmann.plugins import Reader
+    >>> Reader((".tri",), "tri_reader:read").suffixes
+    ('.tri',)
+    """
+
+    suffixes: tuple[str, ...]
+    read: Target
+    beginnings: Mapping[bytes, str] = field(default_factory=dict)
+    options: tuple[ReaderOption, ...] = ()
+    up: Up | None = None
+    moving: Target | None = None
+
+    group: ClassVar[str] = "lippmann.readers"
+
+    def claims(self, name: str) -> tuple[str, ...]:
+        """Its suffixes."""
+        return self.suffixes
+
+    def fault(self) -> str:
+        """What is wrong with its fields."""
+        wrong = next((each for each in self.suffixes if not _SUFFIX.fullmatch(each)), None)
+        return "" if wrong is None else f"its suffix '{wrong}' is no dot and letters in lower case"
+
+
+_HERE = "lippmann.scene.readers"
+
+#: Lippmann's own.
+_OWN = {
+    "blend": Reader(
+        (".blend",),
+        f"{_HERE}.blend:read_blend",
+        {b"BLENDER": ".blend"},
+        ("allow_outside",),
+        moving=f"{_HERE}.blend.moving:MovingBlend",
+    ),
+    "tachyon": Reader((".dat",), f"{_HERE}.tachyon.reader:read_tachyon", options=("allow_outside",)),
+    "gltf": Reader(
+        (".glb", ".gltf"),
+        f"{_HERE}.gltf:read_gltf",
+        {b"glTF": ".glb", b"{": ".gltf"},
+        ("allow_outside", "variants"),
+        moving=f"{_HERE}.gltf_animation.animated_file:MovingGltf",
+    ),
+    "nff": Reader((".nff",), f"{_HERE}.nff:read_nff"),
+    "obj": Reader((".obj",), f"{_HERE}.obj:read_obj", options=("allow_outside",), up="y"),
+    "ply": Reader((".ply",), f"{_HERE}.ply:read_ply", {b"ply\n": ".ply", b"ply\r": ".ply"}, ("allow_outside",), "y"),
+    "sog": Reader((".sog",), f"{_HERE}.splats.sog:read_sog", options=("allow_outside",), up="-y"),
+    "spz": Reader((".spz",), f"{_HERE}.splats.spz:read_spz", up="y"),
+    "stl": Reader((".stl",), f"{_HERE}.stl:read_stl", up="z"),
+    "usd": Reader(
+        (".usd", ".usda", ".usdc", ".usdz"),
+        f"{_HERE}.usd:read_usd",
+        {b"#usda": ".usda", b"PXR-USDC": ".usdc"},
+        ("allow_outside", "variants"),
+        moving=f"{_HERE}.usd.moving_stage:MovingStage",
+    ),
+    "mitsuba": Reader((".xml",), "lippmann.scene.mitsuba_source:read_mitsuba", {b"<": ".xml"}, ("allow_outside",)),
+    "nifti": Reader((".nii", ".nii.gz"), f"{_HERE}.volumes.nifti:read_nifti", options=("series",)),
+    "numpy": Reader((".npy",), f"{_HERE}.volumes.numpy_arrays:read_array", up="y"),
+    "numpy-archive": Reader((".npz",), f"{_HERE}.volumes.numpy_arrays:read_array", options=("series",), up="y"),
+    "vtk": Reader(
+        (".vtp", ".vtu", ".vtk", ".vti", ".vtr", ".vts"), f"{_HERE}.vtk.files:read_vtk", options=("series",), up="y"
+    ),
+    "dicom": Reader((".dcm",), f"{_HERE}.volumes.dicom:read_dicom", options=("series",)),
+    "vdb": Reader((".vdb",), f"{_HERE}.volumes.vdb:read_vdb", options=("series",), up="y"),
+    "mitsuba-volume": Reader((".vol",), f"{_HERE}.volumes.mitsuba_grid:read_mitsuba_grid"),
+    "molecules": Reader(
+        (".pdb", ".ent", ".cif", ".json"), f"{_HERE}.molecules.reader:read_molecule", {b'{"data_': ".json"}
+    ),
+    "photographs": Reader(
+        (".jpg", ".jpeg", ".png", ".webp", ".heic", ".heif", ".hif"),
+        f"{_HERE}.depth_photo:read_depth_photo",
+        options=("depth_map",),
+    ),
+}
+
+READERS = Door(Reader, _OWN)
+
+#: Endings of pictures, which are scenes if they have depth, and of VTK's data sets, whose newer kind is XML.
+PHOTOS, VTK = _OWN["photographs"].suffixes, _OWN["vtk"].suffixes
+
+
+def suffixes_with(option: ReaderOption) -> list[str]:
+    """Endings of Lippmann's own formats that have an option of a reader's."""
+    return [suffix for each in _OWN.values() if option in each.options for suffix in each.suffixes]

@@ -1,0 +1,63 @@
+"""The examples run as they are."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+ROOT = Path(__file__).resolve().parent.parent
+EXAMPLES = ROOT / "examples"
+PLUGINS = ("off_reader", "more_plugins")
+
+
+def test_the_guide_shows_the_plugins_as_they_are():
+    page = (ROOT / "docs" / "how-to" / "extend.md").read_text(encoding="utf-8")
+    for folder in PLUGINS:
+        for file in (EXAMPLES / folder).glob("*.[pt][yo]*"):
+            assert f'"\n{file.read_text(encoding="utf-8")}```' in page, file
+    assert len((EXAMPLES / "off_reader" / "lippmann_off.py").read_text(encoding="utf-8").splitlines()) <= 40
+
+
+@pytest.mark.slow
+def test_installed_plugins_render_their_own_files(engine, tmp_path):
+    target = tmp_path / "installed"
+    for folder in PLUGINS:
+        shutil.copytree(EXAMPLES / folder, tmp_path / folder)  # building leaves files beside the sources
+        words = ["install", "-q", "--no-deps", "--no-build-isolation", "--disable-pip-version-check", "--no-compile"]
+        words += ["--target", str(target), "--upgrade", str(tmp_path / folder)]
+        subprocess.run([sys.executable, "-m", "pip", *words], check=True)
+    gem = str(tmp_path / "off_reader" / "gem.off")
+    quick = ["--spp", "2", "--method", "full", "--threads", "2"]
+    commands = [
+        ["render", gem, "--display", "acme-9", *quick, "-o", "gem.png"],
+        ["render", "teapot", "--integrator", "sky-seen", *quick, "-o", "teapot.png"],
+        ["export", "gem.png", "--as", "strip", "-o", "strip"],
+        ["replay", "gem.png", "--sweep", "--frames", "3", "--size", "64x48", "-o", "gem.gif"],
+        ["doctor", "--json"],
+    ]
+    code = f"import sys; from lippmann.cli import run; sys.exit(max(run(words) for words in {commands!r}))"
+    path = os.pathsep.join([str(target), *os.environ.get("PYTHONPATH", "").split(os.pathsep)])
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    picture = Image.open(tmp_path / "gem.png").convert("RGB")
+    assert picture.size == (1024, 768)
+    red, _, blue = picture.getpixel((512, 600))
+    assert blue > 2 * red  # the dark sides of the gem
+    lightness = Image.open(tmp_path / "teapot.png").convert("L")
+    assert lightness.getextrema() == (0, 255)  # what sees nothing of the sky, and what sees all of it
+    with Image.open(tmp_path / "strip.png") as strip, Image.open(tmp_path / "gem.gif") as film:
+        assert (strip.size[1], film.n_frames) == (768, 3)
+    for name in ("off", "acme", "strip", "gif", "sky-seen"):
+        assert f'"name": "{name}"' in done.stdout
