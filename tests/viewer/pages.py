@@ -10,6 +10,7 @@ import numpy as np
 
 from lippmann.color.transfer import quantize
 from lippmann.display import Display, LensArray, Panel
+from lippmann.display.distortion import Distortion
 from lippmann.image import IntegralImage, Provenance
 from lippmann.viewer.export import export_page
 from lippmann.viewing.replay import replay
@@ -44,6 +45,10 @@ DISPLAYS = {
     "hexagonal": array("hexagonal"),
     "hexagonal converging": array("hexagonal", distance=250.0),
 }
+
+
+#: As of a real lens; stronger, so that it moves what is seen by pixels.
+BENT = Distortion(0.4, (0.9, 0.95, 1.05, 1.2, 1.3))
 
 
 def noise(display: Display, *, seed: int = 1, subpixels: bool = False, **parts: Any) -> IntegralImage:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from lens_samples import eye_of_view
 from pages import (
+    BENT,
     CELLS,
     DISPLAYS,
     VIEWER,
@@ -72,6 +75,19 @@ def test_page_shows_what_replay_shows(open_tab, tmp_path, name):
     image = noise(DISPLAYS[name])
     tab = opened(open_tab, page_of(tmp_path / "page.html", image))
     assert_shows_replay(tab, image)
+    tab.assert_clean()
+
+
+@pytest.mark.long_cases(but=["slanted", "hexagonal"])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["lenticular", "slanted", "square", "hexagonal"])
+def test_true_directions_are_seen_as_replay_shows_them(open_tab, tmp_path, name):
+    image = noise(replace(DISPLAYS[name], distortion=BENT))
+    tab = opened(open_tab, page_of(tmp_path / "page.html", image))
+    assert_shows_replay(tab, image)
+    eyes = [list(eye_of_view(image.display, 0, k)[:2]) for k in (0, 3)]
+    told = tab.evaluate(f'async () => (await import("lippmann/optics.js")).eyesOfViews({VIEWER}.optics)')
+    assert [[told[k]["x"], told[k]["y"]] for k in (0, 3)] == [pytest.approx(eye, rel=1e-9, abs=1e-6) for eye in eyes]
     tab.assert_clean()
 
 

@@ -124,6 +124,12 @@ class DeviceOps:
     def where(self, condition: Bool, a: Array, b: Array, /) -> Array:
         return dr.select(condition, a, b)
 
+    def interpolate(self, values: tuple[float, ...], at: Array, /) -> Array:
+        table = mi.Float64(values)
+        first = dr.minimum(mi.UInt32(at), len(values) - 2)
+        low, high = (dr.gather(mi.Float64, table, first + step) for step in (0, 1))
+        return low + (high - low) * (at - first)
+
 
 DEVICE = DeviceOps()
 

@@ -32,6 +32,10 @@ class ArrayOps(Protocol):
 
     def where(self, condition: Array, a: Array, b: Array, /) -> Array: ...
 
+    def interpolate(self, values: tuple[float, ...], at: Array, /) -> Array:
+        """``values`` between their indices, linearly; ``at`` lies from 0 to the last index."""
+        ...
+
 
 class _NumpyOps:
     """NumPy's own functions under the names of :class:`ArrayOps`."""
@@ -42,6 +46,10 @@ class _NumpyOps:
     minimum = staticmethod(np.minimum)
     maximum = staticmethod(np.maximum)
     where = staticmethod(np.where)
+
+    @staticmethod
+    def interpolate(values: tuple[float, ...], at: Array, /) -> Array:
+        return np.interp(at, np.arange(len(values)), values)
 
 
 NUMPY: ArrayOps = _NumpyOps()

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display.array_ops import NUMPY, Array, ArrayOps
+from lippmann.display.distortion import Distortion
 from lippmann.display.lattice import WHOLE_TOLERANCE, Lattice, LensGrid, lattice_in_front_of
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_profile import LensProfile
@@ -40,9 +41,10 @@ INFINITE = "infinite"
 Vector = tuple[Array, Array, Array]
 
 #: Tables of a display that may be left out.
-OPTIONAL_TABLES: dict[str, type[Sheet] | type[LensProfile] | type[PixelAperture]] = {
+OPTIONAL_TABLES: dict[str, type[Sheet] | type[LensProfile] | type[Distortion] | type[PixelAperture]] = {
     "sheet": Sheet,
     "lens": LensProfile,
+    "distortion": Distortion,
     "pixel": PixelAperture,
 }
 
@@ -78,6 +80,9 @@ class Display:
         :func:`lippmann.optics.fitting.gap_of`.
     pixel:
         The part of a sub-pixel that shines; None for the whole of it.
+    distortion:
+        How the true directions of the lenses differ from those of a pinhole at the gap, see
+        :func:`lippmann.optics.directions.distortion_of`; None for the pinhole's.
 
     Notes
     -----
@@ -113,6 +118,7 @@ class Display:
     sheet: Sheet | None = None
     lens: LensProfile | None = None
     pixel: PixelAperture | None = None
+    distortion: Distortion | None = None
 
     def __post_init__(self) -> None:
         check_text(self.name, "name", empty=False)
@@ -200,9 +206,15 @@ class Display:
     # ---- What the display can show ---------------------------------------------------------------------------------
 
     @property
+    def edge_factor(self) -> float:
+        """Slope of the outermost views over that behind a pinhole at the gap; 1 for the pinhole."""
+        half = 0.5 * self.micro_image_pitch
+        return float(self.pinhole_place(half)) / half
+
+    @property
     def field_of_view(self) -> float:
         """Angle in degrees, across the lenses, over which the central lens shows its own micro-image."""
-        return math.degrees(2 * math.atan(0.5 * self.micro_image_pitch / self.gap))
+        return math.degrees(2 * math.atan(0.5 * self.micro_image_pitch * self.edge_factor / self.gap))
 
     def reach_of_views(self, z: float) -> tuple[float, float]:
         """Farthest distance from the middle, in mm along x and y, of the panel's light lines at height ``z``."""
@@ -211,7 +223,7 @@ class Display:
         nearness = (1.0 - z * self._convergence) / self.magnification
         across, along = (
             max(
-                abs((0.5 * side - d) * nearness - z * d / self.gap)
+                abs((0.5 * side - d) * nearness - z * d * self.edge_factor / self.gap)
                 for d in (self.magnification * edge, -self.magnification * edge)
             )
             for side, edge in zip(self.size_mm, self.lens_array.half_cell, strict=True)
@@ -294,11 +306,38 @@ class Display:
         """
         i, j = self.lens_of(x, y, ops)
         cx, cy = self.lens_center(i, j, x, y, ops)
-        slope_x, slope_y = (x - cx) / self.gap, (y - cy) / self.gap
+        dx, dy = self.pinhole_offset(x - cx, y - cy, ops)
+        slope_x, slope_y = dx / self.gap, dy / self.gap
         length = ops.sqrt(slope_x * slope_x + slope_y * slope_y + 1.0)
         origin = (cx - slope_x * self.aperture_distance, cy - slope_y * self.aperture_distance)
         aperture = length * 0.0 + self.aperture_distance
         return (*origin, aperture), (slope_x / length, slope_y / length, -1.0 / length)
+
+    def pinhole_place(self, place: Array, ops: ArrayOps = NUMPY) -> Array:
+        """Place across a lens, in mm from its axis, at which a pinhole at the gap has the direction of ``place``."""
+        return place if self.distortion is None else self.distortion.pinhole_place(place, 0.0 * place, ops)[0]
+
+    def place(self, pinhole: Array, ops: ArrayOps = NUMPY) -> Array:
+        """Place of the direction that a pinhole at the gap has at ``pinhole``: the inverse of :meth:`pinhole_place`."""
+        return pinhole if self.distortion is None else self.distortion.place(pinhole, 0.0 * pinhole, ops)[0]
+
+    def pinhole_offset(self, dx: Array, dy: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
+        """:meth:`pinhole_place` of a panel point: its offset from the lens's centre, or the level point of its axis."""
+        if self.distortion is None:
+            return dx, dy
+        if self.lens_array.layout != "lenticular":
+            return self.distortion.pinhole_place(dx, dy, ops)
+        across, along = self.lattice.across(dx, dy), self.lattice.along(dx, dy)
+        return self.lattice.from_axes(self.pinhole_place(across, ops), along)
+
+    def panel_offset(self, dx: Array, dy: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
+        """The inverse of :meth:`pinhole_offset`: what lies along a cylinder stays."""
+        if self.distortion is None:
+            return dx, dy
+        if self.lens_array.layout != "lenticular":
+            return self.distortion.place(dx, dy, ops)
+        across, along = self.lattice.across(dx, dy), self.lattice.along(dx, dy)
+        return self.lattice.from_axes(self.place(across, ops), along)
 
     def project(
         self, px: Array, py: Array, pz: Array, i: Array, j: Array, ops: ArrayOps = NUMPY
@@ -313,9 +352,10 @@ class Display:
         scale = self.gap / _nonzero(pz, ops)
         if lattice.layout != "lenticular":
             cx, cy = lattice.center(i, j, px, py, ops)
-            return cx + (cx - px) * scale, cy + (cy - py) * scale
+            dx, dy = self.panel_offset((cx - px) * scale, (cy - py) * scale, ops)
+            return cx + dx, cy + dy
         center = lattice.origin_x + i * lattice.pitch
-        across = center + (center - lattice.across(px, py)) * scale
+        across = center + self.place((center - lattice.across(px, py)) * scale, ops)
         along = lattice.along(px, py) * self.magnification / _nonzero(1.0 - pz * self._convergence, ops)
         return lattice.from_axes(across, along)
 
@@ -331,7 +371,8 @@ class Display:
         i, j = self.lattice.lens_at(lx, ly, ops)
         cx, cy = self.lattice.center(i, j, lx, ly, ops)
         scale = self.gap / ez
-        return cx + (cx - ex) * scale, cy + (cy - ey) * scale
+        dx, dy = self.panel_offset((cx - ex) * scale, (cy - ey) * scale, ops)
+        return cx + dx, cy + dy
 
     def lenses_seeing(self, point: tuple[float, float, float]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """All lenses that show a 3D point, and where.

@@ -31,7 +31,12 @@ def cone_tangent(display: Display) -> float:
     slant across the lenses. A calibration's ``viewCone`` is twice the angle. At ``x = (2 f - 1) D`` times this tangent
     the eye sees, through every lens, the fraction f of its micro-image, counted from the right edge.
     """
-    return 0.5 * display.micro_image_pitch / (display.gap * math.cos(math.radians(display.lens_array.slant)))
+    return (
+        0.5
+        * display.micro_image_pitch
+        * display.edge_factor
+        / (display.gap * math.cos(math.radians(display.lens_array.slant)))
+    )
 
 
 def zone_slopes(display: Display) -> tuple[float, float]:
@@ -41,7 +46,9 @@ def zone_slopes(display: Display) -> tuple[float, float]:
     shows it. Micro-lenses: half a micro-image over the gap. Lenticular sheets: what their light lines reach across the
     slanted axis, and eyes that move level over the whole of :func:`cone_tangent`.
     """
-    across, along = (edge * display.magnification / display.gap for edge in display.lens_array.half_cell)
+    across, along = (
+        edge * display.magnification * display.edge_factor / display.gap for edge in display.lens_array.half_cell
+    )
     return (cone_tangent(display) if display.lens_array.layout == "lenticular" else across), along
 
 

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
+from lippmann.display.distortion import Distortion
+from lippmann.display.lens_array import LensArray
+from lippmann.display.lens_profile import LensProfile
 from lippmann.optics.lens import Lens, Real
-from lippmann.optics.light_table import light_table
+from lippmann.optics.trace import Vectors, crest, trace, trace_back
 
-#: Directions to both sides whose light is averaged, evenly spaced in angle, and their largest angle in degrees.
-_DIRECTIONS, _LARGEST_ANGLE = 320, 80.0
+#: Places of half a lens at which directions are known; between them they are interpolated.
+_PLACES = 49
 
-#: Places across one lens at which directions are known; between them they are interpolated.
-_PLACES = 48
+#: Points of the crest through which the light of a place is followed, across the lens and, if it is round, along it.
+_POINTS, _ROUND_POINTS = 512, 48
+
+#: Largest angle in degrees of light that counts.
+_LARGEST_ANGLE = 80.0
+
+#: Distance in pitches of the two places by which it is known how much light a place sends through a point.
+_APART = 1e-5
 
 #: Slope by which the directions of a lens fall off where its light would have them stand still.
 _TINY = 1e-9
@@ -46,17 +56,47 @@ class TrueDirections:
 
 @lru_cache(maxsize=16)
 def true_directions(lens: Lens) -> TrueDirections:
-    """The true directions of a lens: light of all angles that leaves a place through it, weighted by its share."""
-    angles = np.radians(np.linspace(-_LARGEST_ANGLE, _LARGEST_ANGLE, 2 * _DIRECTIONS + 1))
-    slopes = np.tan(angles)
-    table = light_table(lens, slopes, places_per_lens=_PLACES, neighbours=0)
-    light = table.shares.sum(axis=0)
-    places, shares, light = table.places[light > 0.0], table.shares[:, light > 0.0], light[light > 0.0]
-    mean = slopes @ shares / light
-    spread = np.sqrt(np.maximum(slopes**2 @ shares / light - mean**2, 0.0))
+    """The true directions of a lens: light of all angles that leaves a place through it, weighted by its share.
+
+    Of a micro-lens, those of places level with its centre.
+    """
+    half = np.linspace(0.0, 0.5, _PLACES) * lens.pitch
+    x, y = lens.samples(_POINTS if lens.is_cylinder else _ROUND_POINTS)
+    apart = _APART * lens.pitch
+    before, after = (_leaving(lens, half[:, None] + step, x, y) for step in (-apart, apart))
+    slope_x, slope_y = (0.5 * (a + b) for a, b in zip(before, after, strict=True))
+    # Light that a point of the crest sends evenly into all angles, by the place of the panel that it comes from.
+    angles = np.abs(np.arctan(after[0]) - np.arctan(before[0])) / (2.0 * apart)
+    is_passing = np.isfinite(slope_x) & (np.abs(slope_x) < math.tan(math.radians(_LARGEST_ANGLE)))
+    slope_x, slope_y = (np.where(is_passing, slope, 0.0) for slope in (slope_x, slope_y))
+    weights = np.where(is_passing, trace(lens, x, y, slope_x, slope_y).light * angles, 0.0)
+    light = weights.sum(axis=1)
+    mean = (weights * slope_x).sum(axis=1) / light
+    spread = np.sqrt(np.maximum((weights * slope_x**2).sum(axis=1) / light - mean**2, 0.0))
     # A lens has two like sides; and directions have one place each.
-    mean, spread = 0.5 * (mean - mean[::-1]), 0.5 * (spread + spread[::-1])
-    return TrueDirections(places, np.minimum.accumulate(mean) - _TINY * places / lens.pitch, spread)
+    mean[0] = 0.0
+    mean = np.minimum.accumulate(mean) - _TINY * half / lens.pitch
+    sides = np.concatenate([-half[:0:-1], half]), np.concatenate([-mean[:0:-1], mean])
+    return TrueDirections(*sides, np.concatenate([spread[:0:-1], spread]))
+
+
+@lru_cache(maxsize=64)
+def distortion_of(profile: LensProfile, lenses: LensArray, gap: float) -> Distortion:
+    """What such lenses do to the directions of a pinhole at the gap."""
+    directions = true_directions(Lens(profile, lenses))
+    places = directions.places[_PLACES:]
+    factors = -gap * directions.slopes[_PLACES:] / places
+    return Distortion(float(places[-1]), (float(factors[0]), *(float(factor) for factor in factors)))
+
+
+def _leaving(lens: Lens, place: Real, x: Real, y: Real) -> tuple[Real, Real]:
+    """Slopes of the light that leaves places ``(places, 1)`` through points ``(n,)`` of the crest; NaN if none does."""
+    depth, _ = crest(lens, x, y)
+    height = lens.profile.thickness - depth
+    length = np.sqrt((x - place) ** 2 + y**2 + height**2)
+    inside = Vectors((x - place) / length, y / length + 0.0 * place, height / length)
+    slope_x, slope_y, _ = trace_back(lens, np.broadcast_to(place, length.shape), np.zeros(length.shape), inside)
+    return slope_x, slope_y
 
 
 def _interpolate(at: Real, x: Real, y: Real) -> Real:

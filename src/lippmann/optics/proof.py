@@ -11,7 +11,7 @@ import numpy as np
 from lippmann.display.display import INFINITE, Display
 from lippmann.display.pixel_aperture import PixelAperture
 from lippmann.display.validation import INCH
-from lippmann.display.view_cone import cone_tangent, size_seen
+from lippmann.display.view_cone import size_seen
 from lippmann.json_values import JsonObject, JsonValue
 from lippmann.optics.crosstalk import ANNOYING, VISIBLE, crosstalk, independent_directions, most_strips
 from lippmann.optics.directions import true_directions
@@ -205,8 +205,8 @@ def edge_slope(display: Display) -> float:
 
 def zone_of(display: Display) -> ViewingZone:
     """The viewing zone of an eye that moves level, by the true directions of the lens."""
-    # The cone of slanted lenses is wider by 1 / cos slant.
-    level = edge_slope(display) * cone_tangent(display) * display.gap / (0.5 * display.micro_image_pitch)
+    # The cone of slanted lenses is wider.
+    level = edge_slope(display) / math.cos(math.radians(display.lens_array.slant))
     return ViewingZone(size_seen(display)[0], display.viewing_distance, level)
 
 

@@ -233,7 +233,7 @@ def view_fraction(display: Display, x: Real, y: Real) -> Real:
     lattice, scale = display.lattice, display.magnification
     i, _ = display.lens_of(x, y, NUMPY)
     axis = (lattice.origin_x + i * lattice.pitch) * scale
-    place = (lattice.across(x, y) - axis) / (lattice.pitch * scale)
+    place = display.pinhole_place(lattice.across(x, y) - axis) / (lattice.pitch * scale * display.edge_factor)
     fraction: Real = np.clip(0.5 - place, 0.0, 1.0)
     return fraction
 

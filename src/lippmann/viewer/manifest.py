@@ -81,6 +81,8 @@ def optics(display: Display, *, subpixels: bool) -> dict[str, object]:
             "tolerance": lattice.tolerance,
         },
         "gap": display.gap,
+        "edge_factor": display.edge_factor,
+        "distortion": _distortion(display),
         "viewing_distance": _finite(display.viewing_distance),
         "magnification": display.magnification,
         "micro_image_pitch": display.micro_image_pitch,
@@ -88,6 +90,17 @@ def optics(display: Display, *, subpixels: bool) -> dict[str, object]:
         "resolvable_depth": list(display.resolvable_depth),
         "eye": list(default_eye(display)),
         "views": {"right": list(places.right), "down": list(places.down)},
+    }
+
+
+def _distortion(display: Display) -> dict[str, object] | None:
+    """Factors at equal steps up to ``reach`` (mm from a lens's axis), of both maps; None of a pinhole."""
+    bent = display.distortion
+    if bent is None:
+        return None
+    return {
+        "pinhole": {"reach": bent.reach, "factors": list(bent.factors)},
+        "place": {"reach": bent.reach * bent.factors[-1], "factors": list(bent.inverse_factors)},
     }
 
 

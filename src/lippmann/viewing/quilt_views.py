@@ -77,7 +77,7 @@ def replay_quilt(
         across = lattice.across(x, y)
         # Where under its lens the eye sees the panel, in micro-images from the middle: right of it from the left.
         place = (across - lattice.across(eye[0], eye[1])) / eye[2] - across * convergence
-        place *= display.gap / display.micro_image_pitch
+        place *= display.gap / (display.micro_image_pitch * display.edge_factor)
         position = np.clip((0.5 - place) * count - 0.5, 0.0, count - 1.0)
         first = np.floor(position if linear else position + 0.5).astype(np.intp)
         share = (position - first if linear else np.zeros_like(position))[..., None]
@@ -119,11 +119,15 @@ def refocus_quilt(
 def _refocused(quilt: Quilt, display: Display, plane: float, width: int, height: int) -> FloatArray:
     picture = np.zeros((height, width, 3), dtype=np.float32)
     count = np.zeros((height, width), dtype=np.float32)
-    across, _ = display.pixels_per_lens
+    pixel, (across, _) = display.panel.pixel_pitch, display.pixels_per_lens
     half = display.size_mm[0] / 2, display.size_mm[1] / 2
     for number in range(quilt.layout.views):
         fraction = (number + 0.5) / quilt.layout.views
-        eye = eye_of_offset(display, (0.5 - fraction) * across, 0.0)
+        # Views are even in the tangent.
+        place = (0.5 - fraction) * across
+        if display.distortion is not None:
+            place = float(display.place(place * pixel * display.edge_factor)) / pixel
+        eye = eye_of_offset(display, place, 0.0)
         view = quilt.view(number)[None]
         stretch = plane / (eye[2] - plane)
         for rows, x, y in lens_plane_points(display, width, height):

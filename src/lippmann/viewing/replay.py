@@ -157,10 +157,14 @@ def eye_of_offset(display: Display, right: float, down: float) -> Eye:
     distance = display.viewing_distance if math.isfinite(display.viewing_distance) else FAR
     # From the panel through the lens's centre: a point right of the centre is seen from the left.
     scale = -display.panel.pixel_pitch * distance / display.gap
+    if display.distortion is not None:
+        pixel = display.panel.pixel_pitch
+        x, y = display.pinhole_offset(right * pixel, -down * pixel)
+        right, down = float(x) / pixel, -float(y) / pixel
     if display.lens_array.layout != "lenticular":
         return right * scale, -down * scale, distance
     lattice = display.lattice
-    across = lattice.across(right * scale, 0.0)
+    across = lattice.across(right * scale, -down * scale)
     x, y = lattice.from_axes(across, 0.0)
     return float(x), float(y), distance
 

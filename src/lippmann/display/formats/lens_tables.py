@@ -41,6 +41,7 @@ _PIXEL_LENGTHS = ("width", "height", "black_matrix", "blur")
 
 def monitor_display(values: Arguments) -> Display:
     """The display of a file with the table ``[monitor]``; ``[lens]`` takes the place of its view cone."""
+    from lippmann.optics.directions import distortion_of
     from lippmann.optics.fitting import profile_behind
 
     values = dict(values)
@@ -58,12 +59,14 @@ def monitor_display(values: Arguments) -> Display:
         monitor = replace(monitor, view_cone=cone)
     display = monitor.display()
     if lens is not None:
-        display = replace(display, lens=profile)
+        distortion = distortion_of(profile, display.lens_array, display.gap)
+        display = replace(display, lens=profile, distortion=distortion)
     return display if pixel is None else replace(display, pixel=aperture_of_table(pixel, display.panel.pixel_pitch))
 
 
 def with_profile(values: Arguments) -> Arguments:
     """The values of a display in millimetres, with the profile and the gap of its table ``[lens]``."""
+    from lippmann.optics.directions import distortion_of
     from lippmann.optics.fitting import gap_of
 
     if "gap" in values:
@@ -71,7 +74,8 @@ def with_profile(values: Arguments) -> Arguments:
         raise DisplayError("gap and lens are both given", where="gap", rule=rule, fix="leave one out")
     lenses = LensArray(**values["lens_array"])
     profile = profile_of_table(values["lens"], lenses)
-    return {**values, "gap": gap_of(profile, lenses), "lens": vars(profile)}
+    gap = gap_of(profile, lenses)
+    return {**values, "gap": gap, "lens": vars(profile), "distortion": vars(distortion_of(profile, lenses, gap))}
 
 
 def profile_of_table(table: object, lenses: LensArray) -> LensProfile:

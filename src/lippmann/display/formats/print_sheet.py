@@ -289,23 +289,27 @@ class Print:
 
     def display(self) -> Display:
         """The print and its sheet as a display, aligned as :class:`Display` aligns lenses."""
+        from lippmann.optics.directions import distortion_of
+
         lpi, gap, pixel = self.pitch_of_sheet, self.gap, validation.INCH / self.ppi
         width, height = self.pixels
         distance = self.viewing_distance
         lens_pitch = validation.INCH / lpi
+        lenses = LensArray("lenticular", lens_pitch)
         place = "afar" if math.isinf(distance) else f"{distance:g} mm"
         size = f"{self.size[0]:g}x{self.size[1]:g} mm"
         return Display(
             name=f"print-{lpi:g}lpi",
             title=f"{lpi:g}-lpi lenticular print, {size} at {self.ppi:g} ppi, seen from {place}",
             panel=Panel(width, height, pixel, validation.stripe("none", "subpixels")),
-            lens_array=LensArray("lenticular", lens_pitch),
+            lens_array=lenses,
             gap=gap,
             viewing_distance=distance,
             aperture_distance=default_aperture(distance, lens_pitch=lens_pitch, gap=gap, pixel_pitch=pixel),
             sheet=Sheet(),
             lens=self.lens,
             pixel=self.pixel,
+            distortion=None if self.lens is None else distortion_of(self.lens, lenses, gap),
         )
 
 

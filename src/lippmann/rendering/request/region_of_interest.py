@@ -79,7 +79,7 @@ def panel_window(corners: NDArray[np.float64], display: Display) -> PixelWindow 
     slant = math.radians(lenses.slant)
     # Cylinders bend across their axis only.
     shares = (math.cos(slant), math.sin(slant)) if lenses.layout == "lenticular" else (1.0, 1.0)
-    either = reach / display.gap * np.array([[-1.0], [1.0]])
+    either = float(display.pinhole_place(reach)) / display.gap * np.array([[-1.0], [1.0]])
     nearness = (1 - z / display.viewing_distance) / display.magnification
     x, y = ((corners[:, axis] + share * either * z) / nearness for axis, share in enumerate(shares))
     columns = x / panel.pixel_pitch + panel.width / 2

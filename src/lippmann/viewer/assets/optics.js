@@ -132,16 +132,55 @@ export function microImages(optics, eye) {
   };
 }
 
+/**
+ * What a real lens does to the visible point: its offset from the lens's centre, per lens and at 0, across and down in
+ * mm behind a pinhole; pixels by which a millimetre across moves the point to the right and down. Null of a pinhole.
+ */
+export function bending(optics, eye) {
+  const { panel, lenses, gap, distortion } = optics;
+  if (distortion === null) return null;
+  const share = gap / eye.z;
+  const { reach, factors } = distortion.place;
+  const table = { factors, perReach: (factors.length - 1) / reach };
+  const [originX, originY] = lenses.origin;
+  if (lenses.layout !== "lenticular") {
+    const across = [lenses.pitch * share, (originX - eye.x) * share];
+    const perMillimetre = 1 / panel.pixel_pitch;
+    const beside = [...across, lenses.row_pitch * share, (eye.y - originY) * share];
+    return { ...table, beside, moves: [perMillimetre, perMillimetre] };
+  }
+  const [sin, cos] = axis(lenses);
+  const across = [lenses.pitch * share, (originX - eye.x * cos + eye.y * sin) * share];
+  return { ...table, beside: [...across, 0, 0], moves: [cos / panel.pixel_pitch, sin / panel.pixel_pitch] };
+}
+
+/** Display.pinhole_offset: pixels right and down of a lens's centre at which a pinhole has the same direction. */
+function pinholeOffset(optics, right, below) {
+  const { panel, lenses, distortion } = optics;
+  if (distortion === null) return [right, below];
+  const { reach, factors } = distortion.pinhole;
+  const [sin, cos] = lenses.layout === "lenticular" ? axis(lenses) : [0, 1];
+  const isRound = lenses.layout !== "lenticular";
+  const across = right * cos + below * sin;
+  const distance = isRound ? Math.hypot(right, below) : Math.abs(across);
+  const at = Math.min((distance * panel.pixel_pitch) / reach, 1) * (factors.length - 1);
+  const first = Math.min(Math.floor(at), factors.length - 2);
+  const factor = factors[first] + (factors[first + 1] - factors[first]) * (at - first);
+  if (isRound) return [right * factor, below * factor];
+  return [right + across * (factor - 1) * cos, below + across * (factor - 1) * sin];
+}
+
 /** Eye positions of the views: each sees one view through all lenses; eye_of_offset of replay.py. */
 export function eyesOfViews(optics) {
   const { panel, lenses, gap, viewing_distance: distance, views } = optics;
   const z = distance ?? FAR;
   const scale = (-panel.pixel_pitch * z) / gap;
   return views.down.flatMap((below) =>
-    views.right.map((right) => {
-      if (lenses.layout !== "lenticular") return { x: right * scale, y: -below * scale, z };
+    views.right.map((column) => {
+      const [right, down] = pinholeOffset(optics, column, below);
+      if (lenses.layout !== "lenticular") return { x: right * scale, y: -down * scale, z };
       const [sin, cos] = axis(lenses);
-      const across = right * scale * cos;
+      const across = right * scale * cos + down * scale * sin;
       return { x: across * cos, y: -across * sin, z };
     }),
   );
@@ -149,7 +188,7 @@ export function eyesOfViews(optics) {
 
 /** Half width in mm, at a distance, of the view zone in which the central lens shows its own micro-image. */
 export function halfField(optics, distance) {
-  return (0.5 * distance * optics.micro_image_pitch) / optics.gap;
+  return (0.5 * distance * optics.micro_image_pitch * optics.edge_factor) / optics.gap;
 }
 
 /**
@@ -157,7 +196,8 @@ export function halfField(optics, distance) {
  * that it shows, at the panel's edges. [0, 0]: the central zone. [k, k]: the k-th neighbour. Otherwise between zones.
  */
 export function flips(optics, eye) {
-  const { panel, lenses, gap, micro_image_pitch: pitch, viewing_distance: distance } = optics;
+  const { panel, lenses, gap, viewing_distance: distance } = optics;
+  const pitch = optics.micro_image_pitch * optics.edge_factor;
   const [sin, cos] = lenses.layout === "lenticular" ? axis(lenses) : [0, 1];
   const convergence = distance === null ? 0 : 1 / distance;
   const beside = (place, from) => Math.round((gap * (place * (1 / eye.z - convergence) - from / eye.z)) / pitch);

@@ -1,7 +1,7 @@
 /** A picture in graphics memory: its tiles, its layers, and the shader programs that draw it. */
 
 import { setFixedPoint } from "lippmann/fixed.js";
-import { LAYOUTS, channelPlaces, microImages, sightline } from "lippmann/optics.js";
+import { LAYOUTS, bending, channelPlaces, microImages, sightline } from "lippmann/optics.js";
 import { SIGHT_VERTEX, fragmentSource } from "lippmann/shaders.js";
 import { TileTexture, capacityOf, tilesOf } from "lippmann/tiles.js";
 
@@ -19,7 +19,7 @@ export class Picture {
     this.capacity = capacityOf(gl, manifest.tiles, memory);
     this.tiles = new TileTexture(gl, manifest.tiles, this.capacity);
     this.overlays = new Map();
-    this.variant = { ...variantOf(manifest.panel), ...lensesOf(manifest.lenses), tiled: this.tiles.isTiled };
+    this.variant = { ...variantOf(manifest.panel), ...lensesOf(manifest), tiled: this.tiles.isTiled };
     this.isReady = false;
   }
 
@@ -87,6 +87,7 @@ export class Picture {
     const layer = overlay && this.overlays.get(overlay.name);
     const program = this.#use(layer ? "overlaid" : "eye");
     this.#setSightline(program, sightline(this.manifest, eye, 0, frame, pane.width, pane.height), pane);
+    this.#setBending(program, bending(this.manifest, eye));
     if (layer) {
       gl.uniform1f(program.at("overlayShare"), overlay.share);
       layer.bind(program, 2, "overlay");
@@ -100,6 +101,7 @@ export class Picture {
     const program = this.#use("summand");
     this.#setSightline(program, sightline(this.manifest, eye, plane, frame, pane.width, pane.height), pane);
     this.#setLensOfPoint(program, microImages(this.manifest, eye));
+    this.#setBending(program, bending(this.manifest, eye));
     gl.uniform1i(program.at("isCoded"), this.isCoded);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
@@ -110,6 +112,7 @@ export class Picture {
     const program = this.#use("magnifier");
     const parts = microImages(this.manifest, eye);
     this.#setLensOfPoint(program, parts);
+    this.#setBending(program, bending(this.manifest, eye));
     for (const name of ["visibleU", "visibleV"]) setFixedPoint(gl, program, name, parts[name]);
     gl.uniform2f(program.at("middle"), glass.x, glass.y);
     gl.uniform1f(program.at("radius"), glass.radius);
@@ -152,6 +155,15 @@ export class Picture {
   #setLensOfPoint(program, parts) {
     for (const name of ["acrossOf", "downOf"]) setFixedPoint(this.gl, program, name, parts[name]);
     this.gl.uniform4fv(program.at("gradients"), parts.gradients);
+  }
+
+  #setBending(program, parts) {
+    if (parts === null) return;
+    const { gl } = this;
+    gl.uniform1fv(program.at("factors"), parts.factors);
+    gl.uniform1f(program.at("perReach"), parts.perReach);
+    gl.uniform4fv(program.at("beside"), parts.beside);
+    gl.uniform2fv(program.at("moves"), parts.moves);
   }
 
   #setSightline(program, coefficients, pane) {
@@ -205,8 +217,9 @@ export function checkManifest(manifest) {
   return manifest;
 }
 
-function lensesOf(lenses) {
-  return { layout: LAYOUTS[lenses.layout], slanted: lenses.slant !== 0 };
+function lensesOf({ lenses, distortion }) {
+  const bent = distortion === null ? 0 : distortion.place.factors.length;
+  return { layout: LAYOUTS[lenses.layout], slanted: lenses.slant !== 0, bent };
 }
 
 /** Arrangement of the panel's sub-pixels: parameters of `fragmentSource`. */

@@ -177,6 +177,30 @@ vec3 fetchOverlay(vec2 pixel) {
 #endif
 `;
 
+// Distortion of a real lens: Display.panel_offset. `beside` is the offset of a pinhole's point from the lens's centre, see
+// bending in optics.js.
+const BENDING = `
+#if BENT
+uniform float factors[BENT];
+uniform float perReach;
+uniform vec4 beside;
+uniform vec2 moves;  // of arrays in pixels per mm
+
+vec2 bent(vec2 lens, float shift) {
+  vec2 from = vec2(beside.x * (lens.x + 0.5 * shift) + beside.y, beside.z * lens.y + beside.w);
+#if LAYOUT == LENTICULAR
+  from = vec2(from.x);
+  float at = abs(from.x) * perReach;
+#else
+  float at = length(from) * perReach;
+#endif
+  at = min(at, float(BENT - 1));
+  int first = min(int(at), BENT - 2);
+  return from * (mix(factors[first], factors[first + 1], at - float(first)) - 1.0) * moves;
+}
+#endif
+`;
+
 // The panel point that the eye sees: Display.panel_point_seen_by and replay.py. Coordinates (u, v) are pixels of the
 // panel from its upper left corner.
 const SIGHTLINE = `
@@ -224,6 +248,15 @@ void visiblePoint(out Fixed u, out Fixed v) {
   float roughU = flatPanelU[0] * lens.x + flatPanelU[1] * shift + flatPanelU[3];
   u = fixedPoint(roughU, flatPanelUParts[0] * whole.x + flatPanelUParts[1] * whole.z + flatPanelUParts[3]);
   v = fixedPoint(flatPanelV[0] * lens.y + flatPanelV[1], flatPanelVParts[0] * whole.y + flatPanelVParts[1]);
+#endif
+#if BENT
+#if LAYOUT == LENTICULAR
+  vec2 shifted = bent(vec2(lens.whole, 0.0), 0.0);
+#else
+  vec2 shifted = bent(lens, shift);
+#endif
+  u.part += shifted.x;
+  v.part += shifted.y;
 #endif
 }
 
@@ -376,12 +409,25 @@ bool isVisible(vec2 pixel) {
   float second = pixel.y;
 #else
   float second = shiftOf(lens.y);
+#endif
+#if BENT
+  vec2 shifted = bent(lens, second * float(LAYOUT != LENTICULAR));
+#if LAYOUT == LENTICULAR
+  // Along the slanted axis, back to the middle of the row.
+  shifted.x += shifted.y * moves.y / moves.x;
+#endif
+#else
+  vec2 shifted = vec2(0.0);
+#endif
+#if LAYOUT != LENTICULAR
   float v = visibleV[0] * lens.y + visibleV[1];
-  if (fixedPoint(v, visibleVParts[0] * uint(int(lens.y)) + visibleVParts[1]).whole != pixel.y) return false;
+  Fixed row = fixedPoint(v, visibleVParts[0] * uint(int(lens.y)) + visibleVParts[1]);
+  if (row.whole + floor(row.part + shifted.y) != pixel.y) return false;
 #endif
   float u = visibleU[0] * lens.x + visibleU[1] * second + visibleU[2];
   uint uParts = visibleUParts[0] * uint(int(lens.x)) + visibleUParts[1] * uint(int(second)) + visibleUParts[2];
-  return fixedPoint(u, uParts).whole == pixel.x;
+  Fixed column = fixedPoint(u, uParts);
+  return column.whole + floor(column.part + shifted.x) == pixel.x;
 }
 
 void main() {
@@ -410,18 +456,19 @@ void main() {
 }`;
 
 /**
- * Source of a fragment shader. Properties of the picture are compiled in: layout and slant of the lenses; arrangement
+ * Source of a fragment shader. Properties of the picture are compiled in: layout and slant of the lenses; the number of
+ * factors of their distortion (`bent`: 0 of a pinhole); arrangement
  * of sub-pixels (`cells`: 0 all in the pixel's centre, 1 in a row, 2 any, 3 in cells of several kinds, the nearest
  * within `reach` pixels); whether the picture is one texture or an array of tiles (`tiled`).
  */
-export function fragmentSource(kind, { layout, slanted, cells, reach, tiled }) {
-  const values = { LAYOUT: layout, SLANTED: slanted, CELLS: cells, REACH: reach, TILED: tiled };
+export function fragmentSource(kind, { layout, slanted, bent, cells, reach, tiled }) {
+  const values = { LAYOUT: layout, SLANTED: slanted, BENT: bent, CELLS: cells, REACH: reach, TILED: tiled };
   const defines = Object.entries(values).map(([name, value]) => `#define ${name} ${Number(value)}\n`);
   const bodies = {
-    eye: SIGHTLINE + EYE,
-    overlaid: SIGHTLINE + OVERLAY,
-    summand: SRGB + LENS_OF_POINT + SIGHTLINE + SUMMAND,
-    magnifier: LENS_OF_POINT + MAGNIFIER,
+    eye: BENDING + SIGHTLINE + EYE,
+    overlaid: BENDING + SIGHTLINE + OVERLAY,
+    summand: SRGB + LENS_OF_POINT + BENDING + SIGHTLINE + SUMMAND,
+    magnifier: LENS_OF_POINT + BENDING + MAGNIFIER,
   };
   return HEAD + defines.join("") + FIXED_POINT + LENSES + TILES + bodies[kind];
 }
