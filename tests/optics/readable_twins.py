@@ -1,11 +1,11 @@
-"""Twins of the light table in NumPy, and of its rays the other way: slower, and easier to read."""
+"""Twins of the light table in NumPy: slower, and easier to read."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from lippmann.optics.light_table import _NEIGHBOURS, _SQUARE_RAYS, PLACES_PER_LENS, LightTable, _frame, _nodes
-from lippmann.optics.trace import Vectors, _conic_along, _dot, crest, refract, trace
+from lippmann.optics.trace import trace
 
 
 def readable_light_table(lens, slopes, along=0.0, *, places_per_lens=PLACES_PER_LENS, neighbours=_NEIGHBOURS):
@@ -35,27 +35,3 @@ def _lines(rays, edges):
         left = np.clip((edges - low[:, None]) / (high - low)[:, None], 0.0, 1.0)
     left = np.where((high > low)[:, None], left, edges > low[:, None])
     return light @ np.diff(left, axis=1)
-
-
-def trace_back(lens, x, y, inside):
-    """Trace light from points of the panel, in directions ``inside`` the lens away from it, out of the crest.
-
-    Returns
-    -------
-    Slopes x and y of the light outside, and the share of it that passes; NaN and 0 where it is totally reflected.
-    """
-    h = _hit(lens, x, y, inside)
-    way = (lens.profile.thickness - h) / inside.z
-    _, normal = crest(lens, x + way * inside.x, y + way * inside.y)
-    outward = Vectors(-normal.x, -normal.y, -normal.z)
-    transmission, ray = refract(inside, outward, -_dot(inside, outward), lens.profile.index)
-    return ray.x / ray.z, ray.y / ray.z, transmission
-
-
-def _hit(lens, x, y, inside):
-    """Depth at which light from points of the panel meets the crest of the lens."""
-    a, b, c = _conic_along(lens, x, y, np.full(np.shape(x), lens.profile.thickness), inside)
-    root = np.sqrt(np.maximum(b * b - a * c, 0.0))
-    # The upper sheet of the conic is met where the line leaves it; the form without cancellation.
-    way = np.where(b <= 0.0, (-b + root) / np.where(a == 0.0, 1e-300, a), -c / (b + root))
-    return lens.profile.thickness - way * inside.z

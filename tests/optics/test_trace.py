@@ -6,12 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from readable_twins import trace_back
 
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_profile import LensProfile
 from lippmann.optics.lens import Lens
-from lippmann.optics.trace import Vectors, trace
+from lippmann.optics.trace import Vectors, trace, trace_back
 
 PITCH = 0.5
 LENSES = {

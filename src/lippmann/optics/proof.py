@@ -84,7 +84,7 @@ class Proof:
         Usable depth before and behind the lenses, together: by the light of one direction, which spreads over one lens
         there; and 2 N t / n by the rule of the trade, None without a lens.
     field, field_of_extreme_ray:
-        Between the outermost mean directions of a lens, and by the formula; None without a lens.
+        Between the outermost true directions of a lens, and by the formula; None without a lens.
     zone:
         Where the whole display shows one set of views.
     viewing_distance:
@@ -196,7 +196,7 @@ def is_print(display: Display) -> bool:
 
 
 def edge_slope(display: Display) -> float:
-    """Slope across the lenses of the outermost mean direction that a lens shows of its own micro-image."""
+    """Slope across the lenses of the outermost true direction that a lens shows of its own micro-image."""
     half = 0.5 * display.micro_image_pitch
     if display.lens is None:
         return half / display.gap

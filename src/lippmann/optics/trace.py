@@ -76,6 +76,21 @@ def trace(lens: Lens, x: Real, y: Real, slope_x: float | Real, slope_y: float | 
     )
 
 
+def trace_back(lens: Lens, x: Real, y: Real, inside: Vectors) -> tuple[Real, Real, Real]:
+    """Trace light from points of the panel, in directions ``inside`` the lens away from it, out of the crest.
+
+    Returns
+    -------
+    Slopes x and y of the light outside, and the share of it that passes; NaN and 0 where it is totally reflected.
+    """
+    h = _hit(lens, x, y, inside)
+    way = (lens.profile.thickness - h) / inside.z
+    _, normal = crest(lens, x + way * inside.x, y + way * inside.y)
+    outward = Vectors(-normal.x, -normal.y, -normal.z)
+    transmission, ray = refract(inside, outward, -_dot(inside, outward), lens.profile.index)
+    return ray.x / ray.z, ray.y / ray.z, transmission
+
+
 def crest(lens: Lens, x: Real, y: Real) -> tuple[Real, Vectors]:
     """Depth below the top of the crest, and the unit normal out of the lens, over points relative to its axis."""
     profile, tangential = lens.profile, 0.0 if lens.is_cylinder else 1.0
@@ -153,3 +168,12 @@ def _is_own(lens: Lens, x: Real, y: Real) -> Mask:
     own_x, own_y = lens.from_center(x, y)
     nearest: Mask = (np.abs(own_x - x) + np.abs(own_y - y)) < 1e-9 * lens.pitch
     return nearest & (x**2 + y**2 <= lens.reach**2)
+
+
+def _hit(lens: Lens, x: Real, y: Real, inside: Vectors) -> Real:
+    """Depth at which light from points of the panel meets the crest of the lens."""
+    a, b, c = _conic_along(lens, x, y, np.full(np.shape(x), lens.profile.thickness), inside)
+    root = np.sqrt(np.maximum(b * b - a * c, 0.0))
+    # The upper sheet of the conic is met where the line leaves it; the form without cancellation.
+    way = np.where(b <= 0.0, (-b + root) / np.where(a == 0.0, 1e-300, a), -c / (b + root))
+    return lens.profile.thickness - way * inside.z
