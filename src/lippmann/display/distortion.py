@@ -14,7 +14,7 @@ import numpy as np
 from lippmann.display.array_ops import Array, ArrayOps
 from lippmann.display.validation import finite, positive
 from lippmann.errors import DisplayError
-from lippmann.runtime.cached_property import cached_property
+from lippmann.runtime.engine_lock import cached_property
 
 
 @dataclass(frozen=True)
