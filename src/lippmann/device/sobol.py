@@ -9,6 +9,7 @@ every elementary interval, and each single point is uniform in [0, 1)^2.
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import dataclass
 
 import drjit as dr
@@ -29,6 +30,11 @@ def hash32(x: UInt32) -> UInt32:
     x = x ^ (x >> 15)
     x = x * 0x735A2D97
     return x ^ (x >> 15)
+
+
+def named_seed(*names: str | int) -> int:
+    """A seed for what has these names, such as a purpose, the picture's seed and a number."""
+    return zlib.crc32(repr(names).encode())
 
 
 def _permute_low_to_high(x: UInt32, seed: UInt32) -> UInt32:

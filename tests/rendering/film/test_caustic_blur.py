@@ -19,15 +19,11 @@ class PlaneOfPhotons:
     """Stands in for photons of passes: spread over a plane, as dense as ``light`` says at their places."""
 
     def __init__(self, light, radius, count=400_000):
-        from lippmann.rendering.transport.pass_schedule import PassSchedule
-
         self._light, self._radius, self._count = light, radius, count
-        self.schedule = PassSchedule(8, 8)
-
-    def relative_radius(self, number):
-        return (5 / 6) ** (number / 2)
+        self.pass_samples = 8
 
     def of_pass(self, number):
+        from lippmann.rendering.transport.caustic_photons import radius_of_pass
         from lippmann.rendering.transport.photon_map import PhotonMap, Photons
 
         halves = []
@@ -37,7 +33,7 @@ class PlaneOfPhotons:
             up = np.tile(np.float32([0, 0, 1]), (self._count, 1))
             power = np.repeat(self._light(position[:, :1]) * 16 / self._count, 3, axis=1).astype(np.float32)
             halves.append(Photons(position, up, up, power, np.ones(self._count, np.uint32)))
-        return PhotonMap((halves[0], halves[1]), self._radius * self.relative_radius(number))
+        return PhotonMap((halves[0], halves[1]), self._radius * radius_of_pass(number))
 
 
 def matt_plane(passes):

@@ -191,12 +191,11 @@ def test_samples_of_one_pass_are_taken_together():
     import mitsuba as mi
 
     from lippmann.rendering.film.sample_batches import _stretches
-    from lippmann.rendering.transport.pass_schedule import PassSchedule
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.scene_features import make_scene_features
 
     class Passes:
-        schedule = PassSchedule(32, 32)
+        pass_samples = 32
 
         def of_pass(self, number):
             return f"photons {number}"

@@ -113,9 +113,8 @@ def prepared(scene, *, has_null=False, depth=4):
 
 def passes(integrator, seed):
     from lippmann.rendering.transport.light_vertices import LightVertexPasses
-    from lippmann.rendering.transport.pass_schedule import PassSchedule
 
-    return LightVertexPasses(integrator.scene, integrator.light_sampler, PassSchedule(8, 8), seed, None)
+    return LightVertexPasses(integrator.scene, integrator.light_sampler, 8, seed, None)
 
 
 def pictures(integrator, source, joined, *, seeds, spp=8):

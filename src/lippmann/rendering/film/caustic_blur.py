@@ -21,7 +21,7 @@ from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.rendering.film.memory_model import PREFERRED_LANES
 from lippmann.rendering.film.wavefront import select_colors
-from lippmann.rendering.transport.caustic_photons import CausticPhotons
+from lippmann.rendering.transport.caustic_photons import CausticPhotons, radius_of_pass
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
@@ -32,7 +32,7 @@ Floats = NDArray[np.float32]
 
 #: Of a picture of fewer samples only some pixels are looked at, one for each in this many samples; and so many of the
 #: whole picture, at least.
-SAMPLES_OF_LOOK, FEWEST_LOOKED_AT = 64, 1 << 14
+SAMPLES_OF_LOOK, FEWEST_LOOKED_AT = 256, 1 << 12
 
 
 class SquaredBlur:
@@ -67,9 +67,9 @@ class SquaredBlur:
         # A look is worth its time again at twice the share.
         if share >= 2 * self._share or share == 1.0 > self._share:
             # The photons that the last sample met are at hand.
-            self._share, (self._pass, _) = share, passes.schedule.at(samples - 1)
+            self._share, self._pass = share, (samples - 1) // passes.pass_samples
             self._of_pass = self._measure(passes.of_pass(self._pass), share)
-        scaled = _mean_area(passes, samples) / passes.relative_radius(self._pass) ** 2
+        scaled = _mean_area(passes, samples) / radius_of_pass(self._pass) ** 2
         return (self._of_pass * np.float32(scaled**2)).reshape(*self._window.shape, 3)
 
     def _measure(self, photons: PhotonMap, share: float) -> Floats:
@@ -87,12 +87,9 @@ class SquaredBlur:
 
 def _mean_area(passes: CausticPhotons, samples: int) -> float:
     """Mean squared radius of the passes that serve so many samples, over that of the first: blur is as that."""
-    total, sample = 0.0, 0
-    while sample < samples:
-        number, left = passes.schedule.at(sample)
-        total += min(left, samples - sample) * passes.relative_radius(number) ** 2
-        sample += left
-    return total / samples
+    size = passes.pass_samples
+    served = (min(size, samples - first) for first in range(0, samples, size))
+    return sum(each * radius_of_pass(number) ** 2 for number, each in enumerate(served)) / samples
 
 
 def _choose_pixels(source: RaySource, window: PixelWindow, seed: int, share: float) -> NDArray[np.intp]:

@@ -7,7 +7,6 @@ from lippmann.rendering.preparation.pilot import Pilot
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.light_vertices import LightVertexPasses
-from lippmann.rendering.transport.pass_schedule import PassSchedule
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.tuning import TUNING as TRANSPORT
 
@@ -36,7 +35,7 @@ def trace_light_vertices(
     passes = LightVertexPasses(
         integrator.scene,
         integrator.light_sampler,
-        PassSchedule(TUNING.vertex_pass_samples, TUNING.vertex_pass_samples),
+        TUNING.vertex_pass_samples,
         request.seed,
         pilot.region,
     )

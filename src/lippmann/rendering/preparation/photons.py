@@ -9,21 +9,13 @@ from lippmann.rendering.film import memory_model
 from lippmann.rendering.preparation.pilot import Pilot
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import find_casters, hides_caustics
-from lippmann.rendering.transport.caustic_photons import (
-    FEWEST,
-    MOST,
-    SAMPLES_OF_EMISSION,
-    CausticPhotons,
-    emissions,
-    no_photons,
-)
-from lippmann.rendering.transport.pass_schedule import PassSchedule
+from lippmann.rendering.transport.caustic_photons import CausticPhotons, emissions, no_photons
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.ray_source import RaySource
 
-#: Samples of a pixel that one pass of photons serves, at least; and the first one of a picture that may need no more.
-PASS_SAMPLES, FIRST_PASS_SAMPLES = 32, 4
+#: Samples of a pixel that one pass of photons serves.
+PASS_SAMPLES = 16
 #: Share of the memory for photons of passes that tiles and bands ask for in turn.
 KEPT_SHARE = 0.25
 
@@ -67,13 +59,11 @@ def shoot_photons(
     if casters.pairs == 0:
         return Caustics(None)
     pixels = source.width * source.height * source.channels
-    schedule = _schedule(pixels, request.is_open_ended)
     # A single pass is for no more samples than there are.
-    most = schedule.most if request.is_open_ended else min(schedule.most, request.samples)
-    passes = 1 if request.is_open_ended else -(-request.samples // schedule.most)
+    samples = pixels * (PASS_SAMPLES if request.is_open_ended else min(PASS_SAMPLES, request.samples))
+    passes = 2 if request.is_open_ended else -(-request.samples // PASS_SAMPLES)
     # No fewer where memory is short: it does not change a picture.
-    of_pass = emissions(pixels * most)
-    required = memory_model.photons(of_pass, 2 if request.is_open_ended else passes)
+    required = memory_model.photons(emissions(samples), passes)
     if required > memory:
         if request.caustics == "auto":
             return _left_to_paths(integrator)
@@ -82,20 +72,13 @@ def shoot_photons(
         integrator.scene,
         integrator.features,
         casters,
-        samples=pixels * min(schedule.first, most),
-        schedule=schedule,
+        samples=samples,
+        pass_samples=PASS_SAMPLES,
         seed=request.seed,
         region=pilot.region,
-        kept=max(1, min(passes, int(KEPT_SHARE * memory) // memory_model.photons(of_pass, 1))),
+        kept=max(1, min(passes, int(KEPT_SHARE * memory) // memory_model.photons(emissions(samples), 1))),
     )
     return Caustics(None) if photons.are_none else Caustics("photons", photons.of_pass(0), photons)
-
-
-def _schedule(pixels: int, is_open_ended: bool) -> PassSchedule:
-    """Passes of photons for a picture of so many pixels, channels apart."""
-    fewest = (FEWEST if is_open_ended else MOST) * SAMPLES_OF_EMISSION // pixels
-    most = max(PASS_SAMPLES, fewest)
-    return PassSchedule(max(FIRST_PASS_SAMPLES, fewest) if is_open_ended else most, most)
 
 
 def _left_to_paths(integrator: PathIntegrator) -> Caustics:

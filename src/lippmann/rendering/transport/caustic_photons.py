@@ -17,29 +17,24 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.sobol import named_seed
 from lippmann.device.types import MitsubaScene
 from lippmann.rendering.transport.casters import Casters
-from lippmann.rendering.transport.pass_schedule import PassSchedule
 from lippmann.rendering.transport.photon_map import PhotonMap, Photons
 from lippmann.rendering.transport.photon_shooter import PhotonShooter
 from lippmann.rendering.transport.scene_features import SceneFeatures
 
-#: Emissions of the pilot for each emitter and caster; and in all, one for so many samples of the picture at least.
-PILOT_OF_PAIR, SAMPLES_OF_PILOT = 4096, 8
-_FEWEST_OF_PAIR = 64
+#: Emissions of the pilot for each emitter and caster, at most and at least.
+MOST_OF_PAIR, FEWEST_OF_PAIR = 4096, 64
 #: Share of the emissions that goes to all pairs alike, whatever the pilot met.
 _UNIFORM_SHARE = 0.1
-#: Emissions of each half: one for so many samples of the picture, within limits. An emission may take as long as two
-#: paths (`benchmarks/photon_share.py`): with three halves as many, caustics have 1 dB less noise.
-SAMPLES_OF_EMISSION, FEWEST, MOST = 12, 1 << 16, 1 << 21
-#: Samples of the picture to an emission of each half at least: photons are to take no more time than its paths.
-FEWEST_SAMPLES_OF_EMISSION = 6
-#: Photons within the radius of a look-up, as a rule, where there are so many emissions.
-NEIGHBOURS, EMISSIONS_OF_NEIGHBOURS = 50, 1 << 18
+#: Samples of a picture to an emission of each half at least, emissions over the two-thirds power of the samples at
+#: most, and emissions at most. An emission may take as long as two paths (``benchmarks/photon_share.py``).
+SAMPLES_OF_EMISSION, OF_POWER, MOST = 8, 6, 1 << 21
+#: Photons within the radius of a look-up, as a rule, over the root of the emissions.
+NEIGHBOURS_OF_ROOT = 0.12
 #: Photons by which the radius is found.
 _PROBED = 2000
-_SEED_STEPS = (0xB5297A4D, 0x68E31DA4)
-_PILOT_STEP, _PASS_STEP = 0x1B56C4E9, 0x632BE5AB
 _NONE = Photons.dark(0)
 
 
@@ -49,25 +44,24 @@ def no_photons() -> PhotonMap:
 
 
 def emissions(samples: int) -> int:
-    """Emissions of each half for a picture of so many samples in all."""
-    fewest = max(1, min(FEWEST, samples // FEWEST_SAMPLES_OF_EMISSION))
-    return int(np.clip(samples // SAMPLES_OF_EMISSION, fewest, MOST))
+    """Emissions of each half for so many samples in all: noise and blur of caustics fall with the cost of paths."""
+    return max(1, min(samples // SAMPLES_OF_EMISSION, round(OF_POWER * math.pow(samples, 2 / 3)), MOST))
 
 
 class CausticPhotons:
     """Photons of a picture's caustics in passes, each for the next samples of every pixel.
 
     Passes know nothing of each other, and their radii shrink (Knaus and Zwicker 2011, with alpha = 2/3), so that the
-    mean over them comes to have neither noise nor blur. Passes of more photons have smaller radii, too.
+    mean over them comes to have neither noise nor blur.
 
     Parameters
     ----------
     scene, features, casters:
         What they are shot in.
     samples:
-        Of all pixels together for which the photons of the first pass are.
-    schedule:
-        Samples of one pixel that each pass serves; None where one pass is for all.
+        Of all pixels together for which the photons of a pass are.
+    pass_samples:
+        Samples of one pixel that each pass serves.
     seed:
         0 to 2**32 - 1: the same gives the same photons.
     region:
@@ -84,13 +78,13 @@ class CausticPhotons:
         *,
         samples: int,
         seed: int,
-        schedule: PassSchedule | None = None,
+        pass_samples: int = 1 << 32,
         region: NDArray[np.float64] | None = None,
         kept: int = 1,
     ) -> None:
         self._shooter = PhotonShooter(scene, features, casters)
-        self.schedule = schedule or PassSchedule(1 << 32, 1 << 32)
-        self._samples = samples
+        self.pass_samples = pass_samples
+        self._emissions = emissions(samples)
         self._seed = seed
         self._region = region
         self._kept = kept
@@ -103,15 +97,6 @@ class CausticPhotons:
         """Whether a few emissions of each emitter and caster brought nothing that is seen, or missed."""
         return self._chances is None
 
-    def relative_radius(self, number: int) -> float:
-        """Radius of a look-up in pass ``number`` over that in the first."""
-        # The area of a look-up is as the number of photons in it, the root of all, over their density.
-        return radius_of_pass(number) * math.sqrt(math.sqrt(self._emissions(0) / self._emissions(number)))
-
-    def _emissions(self, number: int) -> int:
-        """Of each half in a pass."""
-        return emissions(self._samples * self.schedule.samples(number) // self.schedule.first)
-
     def of_pass(self, number: int) -> PhotonMap:
         """The photons of pass ``number``, from 0 on; a map without any where there are none."""
         if self._chances is None:
@@ -121,23 +106,23 @@ class CausticPhotons:
         if number not in self._maps:
             while len(self._maps) >= self._kept:
                 del self._maps[next(iter(self._maps))]
-            seeds = [(self._seed + step + number * _PASS_STEP) % 2**32 for step in _SEED_STEPS]
-            count = self._emissions(number)
-            first, second = (self._shooter.shoot(count, self._chances, seed)[0] for seed in seeds)
-            if number == 0 and not self._radius:
-                neighbours = NEIGHBOURS * math.sqrt(count / EMISSIONS_OF_NEIGHBOURS)
+            first, second = (
+                self._shooter.shoot(self._emissions, self._chances, named_seed("photons", self._seed, number, half))[0]
+                for half in range(2)
+            )
+            if not self._radius:
+                neighbours = NEIGHBOURS_OF_ROOT * math.sqrt(self._emissions)
                 self._radius = _radius(first.inside(self._region), neighbours)
-            self._maps[number] = PhotonMap((first, second), self._radius * self.relative_radius(number))
+            self._maps[number] = PhotonMap((first, second), self._radius * radius_of_pass(number))
         return self._maps[number]
 
     def _pilot(self, casters: Casters) -> NDArray[np.float64] | None:
         """Shares of the emissions of each emitter and caster: as the roots of the second moments of what they bring."""
         if casters.pairs == 0:
             return None
-        affordable = self._samples // SAMPLES_OF_PILOT // casters.pairs
-        count = int(np.clip(affordable, _FEWEST_OF_PAIR, PILOT_OF_PAIR)) * casters.pairs
+        count = min(max(self._emissions // casters.pairs, FEWEST_OF_PAIR), MOST_OF_PAIR) * casters.pairs
         even = np.full(casters.pairs, 1 / casters.pairs)
-        photons, pair = self._shooter.shoot(count, even, (self._seed + _PILOT_STEP) % 2**32)
+        photons, pair = self._shooter.shoot(count, even, named_seed("pilot of photons", self._seed))
         seen = photons.are_inside(self._region)
         if not seen.any():
             return None

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import upload
+from lippmann.device.sobol import named_seed
 from lippmann.device.types import (
     Bool,
     BSDFPtr,
@@ -36,16 +37,12 @@ from lippmann.device.types import (
 )
 from lippmann.rendering.transport.emitter_rays import EmitterRays, LitPoints
 from lippmann.rendering.transport.light_sampling import LightSampler
-from lippmann.rendering.transport.pass_schedule import PassSchedule
 from lippmann.rendering.transport.path_weights import mis_weight
 from lippmann.rendering.transport.photon_map import are_inside
 from lippmann.rendering.transport.sharp_events import lambertian_share
 from lippmann.rendering.transport.tuning import TUNING
 
 Floats = NDArray[np.float32]
-
-_SEED_STEPS = (0x2C1B3C6D, 0x297A2D39)
-_PILOT_STEP, _PASS_STEP = 0x846CA68B, 0x7FEB352D
 
 
 class JointLight:
@@ -238,7 +235,7 @@ class LightVertexPasses:
     ----------
     scene, sampler:
         As of :class:`~lippmann.rendering.transport.emitter_rays.EmitterRays`.
-    schedule:
+    pass_samples:
         Samples of one pixel that each pass serves.
     seed:
         0 to 2**32 - 1: the same gives the same light vertices.
@@ -250,13 +247,13 @@ class LightVertexPasses:
         self,
         scene: MitsubaScene,
         sampler: LightSampler,
-        schedule: PassSchedule,
+        pass_samples: int,
         seed: int,
         region: NDArray[np.float64] | None,
     ) -> None:
         self._scene = scene
         self._rays = EmitterRays(scene, sampler)
-        self.schedule = schedule
+        self.pass_samples = pass_samples
         self._seed = seed
         self._current: tuple[int, LightVertices] | None = None
         self._chances = self._pilot(region)
@@ -271,7 +268,7 @@ class LightVertexPasses:
         assert self._chances is not None
         if self._current is None or self._current[0] != number:
             chosen, chances = _dealt(self._chances, TUNING.light_vertices)
-            seeds = [(self._seed + step + number * _PASS_STEP) % 2**32 for step in _SEED_STEPS]
+            seeds = (named_seed("light vertices", self._seed, number, half) for half in range(2))
             first, second = (self._rays.meet(chosen, chances, seed)[0] for seed in seeds)
             densities = self._rays.densities(chances)
             self._current = number, LightVertices(self._scene, (first, second), TUNING.light_vertices, densities)
@@ -284,7 +281,7 @@ class LightVertexPasses:
             return None
         even = np.full(senders, 1 / senders)
         chosen, chances = _dealt(even, min(TUNING.vertex_pilot_of_emitter * senders, TUNING.vertex_pilot))
-        points, met = self._rays.meet(chosen, chances, (self._seed + _PILOT_STEP) % 2**32)
+        points, met = self._rays.meet(chosen, chances, named_seed("pilot of light vertices", self._seed))
         seen = are_inside(points.position, region)
         if not seen.any():
             return None

@@ -54,13 +54,13 @@ class PreparedLight:
 
         None for all.
         """
-        light, served = self, []
+        light, served = self, list[int]()
         if self.photon_passes is not None:
-            number, left = self.photon_passes.schedule.at(sample)
+            number, before = divmod(sample, self.photon_passes.pass_samples)
             light = replace(light, photons=self.photon_passes.of_pass(number))
-            served.append(left)
+            served.append(self.photon_passes.pass_samples - before)
         if self.vertex_passes is not None:
-            number, left = self.vertex_passes.schedule.at(sample)
+            number, before = divmod(sample, self.vertex_passes.pass_samples)
             light = replace(light, light_vertices=self.vertex_passes.of_pass(number))
-            served.append(left)
+            served.append(self.vertex_passes.pass_samples - before)
         return light, min(served, default=None)
