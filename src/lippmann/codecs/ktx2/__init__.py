@@ -3,6 +3,8 @@
 - ``container``: headers, and which of the two kinds of texels the file holds.
 - ``etc1s``: texels in ETC1S with BasisLZ, and ``huffman``, the codes that these are written in.
 - ``uastc``: texels in UASTC.
+
+Khronos' own package ``pyktx`` has no wheels: it needs its C library built and installed first.
 """
 
 from lippmann.codecs.ktx2.container import IDENTIFIER, Ktx2Error, decode_ktx2

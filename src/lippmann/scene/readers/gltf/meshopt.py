@@ -1,5 +1,9 @@
 """Buffer views compressed by meshoptimizer, as EXT_meshopt_compression and KHR_meshopt_compression describe them
-(appendices A and B of both): attributes of version 0, and of version 1, which the latter adds."""
+(appendices A and B of both): attributes of version 0, and of version 1, which the latter adds.
+
+Libraries do less: imagecodecs decodes attributes alone, and not in its releases for Python 3.10; the package
+``meshoptimizer`` is in alpha.
+"""
 
 from __future__ import annotations
 
