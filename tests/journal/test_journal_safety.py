@@ -56,6 +56,66 @@ def precious(tmp_path):
 
 
 @pytest.mark.parametrize("resume", [False, True])
+@pytest.mark.parametrize("target", ["empty", "journal", "nowhere"])
+def test_a_folder_that_is_a_link_is_refused(output, tmp_path, resume, target):
+    elsewhere = tmp_path / "elsewhere"
+    if target == "journal":
+        elsewhere.mkdir()
+        with opened(elsewhere / "poster.tif") as store:
+            store.put(tile(0))
+        elsewhere = journal_of(elsewhere / "poster.tif")
+    elif target == "empty":
+        elsewhere.mkdir()
+    journal_of(output).symlink_to(elsewhere)
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(PictureError, match=r"poster\.tif\.parts: .*it is a symbolic link; .*choose another name"):
+        opened(output, resume=resume)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_link_in_the_place_of_a_tile_is_replaced_and_its_target_stays(output, folder, precious):
+    (folder / "r0000_c0001.tile").symlink_to(precious)
+    with opened(output) as store:
+        assert store.missing() == [1]
+        store.put(tile(1))
+        assert store.missing() == []
+        assert np.array_equal(store.get(1).pixels, tile(1).pixels)
+    assert not (folder / "r0000_c0001.tile").is_symlink()
+
+
+def test_a_tile_is_not_read_through_a_link(output, folder, tmp_path):
+    other = tmp_path / "other.tile"
+    other.write_bytes(encode(tile(1)))
+    (folder / "r0000_c0001.tile").symlink_to(other)
+    with opened(output) as store:
+        assert store.resumed == 1
+        with pytest.raises(DamagedTile, match="not found"):
+            store.get(1)
+        assert other.read_bytes() == encode(tile(1))
+        store.put(tile(1))
+        assert np.array_equal(store.get(1).pixels, tile(1).pixels)
+
+
+def test_a_frame_journal_is_not_made_through_a_link(tmp_path):
+    (tmp_path / "out.journal").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(PictureError, match="it is a symbolic link"):
+        FrameJournal.open(tmp_path / "out.journal", JOB, resume=False)
+    assert not (tmp_path / "nowhere").exists()
+
+
+def test_a_job_and_a_lock_are_not_written_through_links(output, tmp_path):
+    journal_of(output).mkdir()
+    (journal_of(output) / "job.json").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(PictureError, match=r"holds 'job\.json' and no"):
+        opened(output)
+    (journal_of(output) / "job.json").unlink()
+    (journal_of(output) / "lock").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(PictureError, match="its lock is a symbolic link"):
+        opened(output)
+    assert not (tmp_path / "nowhere").exists()
+
+
+@pytest.mark.parametrize("resume", [False, True])
 def test_a_file_in_the_place_of_the_folder_is_refused_and_stays(output, resume):
     journal_of(output).write_text("mine")
     with pytest.raises(PictureError, match=r"it is no folder; .*choose another name") as raised:

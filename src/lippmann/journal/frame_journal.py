@@ -64,6 +64,8 @@ class FrameJournal:
         PictureError
             If the journal is of another sequence (names the differences), or the file is no journal.
         """
+        if path.is_symlink():
+            raise _no_journal(path, "it is a symbolic link")
         try:
             file = locked(path, path)
         except OSError as error:

@@ -5,7 +5,8 @@ tile, and an empty lock file. A tile's file appears whole or not at all and neve
 at any moment is a journal too. Sizes are checked when the folder is opened, check sums when a tile is read; a damaged
 tile is removed and rendered again.
 
-A folder of that name that is no journal is refused. Files that are no part of a journal stay.
+A folder of that name that is no journal, or a link, is refused; links in the places of its files are not followed.
+Files that are no part of a journal stay.
 """
 
 from __future__ import annotations
@@ -98,6 +99,8 @@ class TileStore:
         _is_begun(output, folder, job, resume)  # refuses before anything is created
         with _reported(folder):
             folder.mkdir(exist_ok=True)
+        if (folder / LOCK).is_symlink():
+            raise _no_journal(folder, "its lock is a symbolic link")
         with _reported(folder):
             lock = locked(folder / LOCK, folder)
         try:
@@ -105,8 +108,7 @@ class TileStore:
                 sweep(folder)
             if not _is_begun(output, folder, job, resume):  # again: another process may have begun and ended meanwhile
                 text = json.dumps({_KEY: _VERSION, **job._asdict()}, indent=1, sort_keys=True) + "\n"
-                with replacing(folder / JOB) as temporary:
-                    temporary.write_text(text, encoding="utf-8")
+                _write(folder / JOB, text.encode())
             return cls(folder, grid, lock)
         except BaseException:
             lock.close()
@@ -133,8 +135,7 @@ class TileStore:
 
     def put_bytes(self, index: int, data: bytes) -> None:
         """Write tile ``index`` as encoded by :func:`lippmann.journal.tile_file.encode`; errors as for :meth:`put`."""
-        with replacing(self._path(index)) as temporary:
-            temporary.write_bytes(data)
+        _write(self._path(index), data)
 
     def get(self, index: int) -> TileResult:
         """Read and check a tile.
@@ -146,7 +147,7 @@ class TileStore:
         """
         path, most = self._path(index), self._most_bytes(index)
         try:
-            if not path.is_file():
+            if path.is_symlink() or not path.is_file():
                 raise DamagedTile("not found")
             if path.stat().st_size > most:
                 raise DamagedTile("it is larger than its pixels need")
@@ -237,8 +238,8 @@ def read_job(output: Path) -> Job | None:
         with _reported(folder, read=True):
             if not os.path.lexists(folder):
                 return None
-            if not folder.is_dir():
-                raise _no_journal(folder, "it is no folder")
+            if folder.is_symlink() or not folder.is_dir():
+                raise _no_journal(folder, "it is a symbolic link" if folder.is_symlink() else "it is no folder")
             if not (folder / JOB).exists():
                 if foreign := foreign_names(folder, no_tile):
                     raise _no_journal(folder, f"it holds {foreign[0]!r} and no {JOB}")
@@ -324,14 +325,22 @@ def _no_journal(folder: Path, why: str) -> PictureError:
     )
 
 
+def _write(path: Path, data: bytes) -> None:
+    """Write a file of the journal; a link in its place goes, and what it leads to stays."""
+    if path.is_symlink():
+        path.unlink()
+    with replacing(path) as temporary:
+        temporary.write_bytes(data)
+
+
 def _is_whole(path: Path, most: int) -> bool:
     """Whether a tile's file has the length that its head states, at most ``most`` bytes.
 
     Interrupted copies and crashed disks cut files off.
     """
     try:
-        size = path.stat().st_size if path.is_file() else most + 1
-        if size > most:
+        size = path.stat().st_size
+        if path.is_symlink() or not path.is_file() or size > most:
             return False
         with path.open("rb") as file:
             return whole_length(file.read(len(MARK) + 12)) == size
