@@ -52,6 +52,16 @@ def test_enlarging_the_scene_leaves_less_room_before_the_lens_plane():
     assert 2 * (placed @ (0, 0, -12.0, 1))[2] < 10.0
 
 
+def test_without_an_aspect_the_camera_takes_the_display_s():
+    """The angle spans the height of a display twice as wide as high, as it would that of such a picture."""
+    square = load_display("seed-lenticular")
+    wide = dataclasses.replace(square, panel=dataclasses.replace(square.panel, width=2 * square.panel.width))
+    camera = dataclasses.replace(EYE, aspect=None)
+    placed = place_by_camera(camera, BOUNDS, wide, probe=seeing(20.0, 20.0), warnings=[])
+    height = 2 * 20 * np.tan(0.25)
+    assert np.linalg.norm(placed[:3, 1]) == pytest.approx(wide.size_mm[1] / height)
+
+
 @pytest.mark.parametrize("display", [DISPLAY, load_display("seed-lenticular")])
 def test_a_shifted_lens_shows_what_lies_beside_the_axis_in_the_middle(display):
     turned = np.array([[0, 0, 1, 3], [0, 1, 0, -2], [-1, 0, 0, 5], [0, 0, 0, 1.0]])

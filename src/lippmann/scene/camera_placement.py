@@ -177,9 +177,13 @@ def _units_per_mm(camera: Camera, focus: float, display: Display) -> float:
         height = camera.height
     else:
         raise SceneError(f"camera '{camera.name}' has neither an angle nor a height", parameter="camera")
-    if not (np.isfinite(height) and height > 0.0 and camera.aspect > 0.0):
+    if not (np.isfinite(height) and height > 0.0 and _aspect(camera, display) > 0.0):
         raise SceneError(f"camera '{camera.name}' has a field {height:g} high", parameter="camera", rule="above 0")
-    return min(height * camera.aspect / display.size_mm[0], height / display.size_mm[1])
+    return min(height * _aspect(camera, display) / display.size_mm[0], height / display.size_mm[1])
+
+
+def _aspect(camera: Camera, display: Display) -> float:
+    return display.size_mm[0] / display.size_mm[1] if camera.aspect is None else camera.aspect
 
 
 def frame_whole(camera: Camera, points: Bounds, display: Display) -> Matrix:
@@ -223,8 +227,8 @@ def _share_contained(camera: Camera, display: Display) -> float:
     width, height = display.size_mm
     if np.isfinite(display.viewing_distance):
         reach = 2.0 * display.viewing_distance * slope
-        return min(1.0, width / (reach * camera.aspect), height / reach)
-    shares = width / camera.aspect, height
+        return min(1.0, width / (reach * _aspect(camera, display)), height / reach)
+    shares = width / _aspect(camera, display), height
     return min(shares) / max(shares)
 
 

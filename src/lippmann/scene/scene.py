@@ -439,6 +439,7 @@ def _no_matrix(number: int, where: str) -> SceneError:
 def _check_mesh(mesh: Mesh, materials: int, where: str) -> None:
     count = len(mesh.positions)
     tables = {"vertices": mesh.positions, "normals": mesh.normals, "vertex colours": mesh.colors}
+    tables |= {"tangents": mesh.tangents}
     tables |= {f"uv set {number}": uvs for number, uvs in enumerate(mesh.uvs)}
     for what, table in tables.items():
         if table is None:

@@ -11,10 +11,14 @@ from lippmann.device.types import Color3f, Float, Frame3f, MitsubaTexture, Point
 
 @dataclass(eq=False)
 class NormalMap:
-    """A tangent-space normal map: ``lookup`` of its texels, ``scale`` of its normals' x and y."""
+    """A tangent-space normal map: ``lookup`` of its texels, ``scale`` of its normals' x and y.
+
+    ``tangents`` says that meshes bring tangents of their own.
+    """
 
     lookup: Lookup
     scale: Signal
+    tangents: bool = False
 
 
 @dataclass(eq=False)
@@ -22,12 +26,14 @@ class Anisotropy:
     """KHR_materials_anisotropy: ``strength`` in [0, 1], and the cosine and sine of its ``rotation``.
 
     ``lookup`` of texels whose red and green are a direction in the tangent plane and whose blue scales the strength.
+    ``tangents`` says that meshes bring tangents of their own.
     """
 
     strength: Signal
     cosine: Signal
     sine: Signal
     lookup: Lookup | None = None
+    tangents: bool = False
 
 
 @dataclass(eq=False)

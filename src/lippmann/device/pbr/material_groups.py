@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -46,13 +46,14 @@ class Variant:
     """A material as one mesh wears it.
 
     ``tinted`` and ``faded`` say that the mesh's vertex colours and their alpha count, ``alone`` that its shape cannot
-    tell several materials apart.
+    tell several materials apart, ``tangents`` that the mesh's own tangents count.
     """
 
     material: int
     tinted: bool = False
     faded: bool = False
     alone: bool = False
+    tangents: bool = False
 
 
 @dataclass(frozen=True)
@@ -132,6 +133,11 @@ def structure_of(m: Material, faded: bool, store: TextureStore) -> Structure:
     )
 
 
+def follows_tangents(m: Material) -> bool:
+    """Whether a mesh's tangents change the looks of a material."""
+    return m.anisotropy > 0 or not (m.normal_texture is None and m.clearcoat_normal_texture is None)
+
+
 def glows(m: Material, store: TextureStore) -> bool:
     """Whether the surface gives off light."""
     texels = store.constant(m.emission_texture, (0, 1, 2))
@@ -166,4 +172,4 @@ def _key(m: Material, variant: Variant, store: TextureStore) -> tuple[object, ..
         varying = [store.constant(texture, channels) is None for channels in _USES.get(name, ())]
         unpoolable = None if texture.image.pixels.dtype == np.uint8 else id(texture.image)
         looks.append((name, sampler_key(texture), tuple(varying), unpoolable))
-    return (variant.material if alone else None, structure, tuple(looks), variant.tinted, variant.faded, variant.alone)
+    return (variant.material if alone else None, structure, tuple(looks), replace(variant, material=0))

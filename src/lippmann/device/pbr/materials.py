@@ -47,6 +47,7 @@ class Finish:
     uv_sets: tuple[int, ...]
     tinted: bool
     faded: bool
+    tangents: bool
     emission: Emission | None
     absorption: Color | None
 
@@ -97,6 +98,7 @@ class _Maker:
             uv_sets=self._uv_sets,
             tinted=variant.tinted,
             faded=variant.faded,
+            tangents=variant.tangents,
             emission=self._emission(model) if material_groups.glows(first, self._store) else None,
             absorption=material_groups.absorption(first),
         )
@@ -152,6 +154,7 @@ class _Maker:
             cosine=Signal(numbers(np.cos(rotation))),
             sine=Signal(numbers(np.sin(rotation))),
             lookup=None if textures[0] is None else self._store.normals(textures, self._uv),
+            tangents=self._variants[0].tangents,
         )
 
     def _film(self) -> ThinFilm:
@@ -190,7 +193,8 @@ class _Maker:
         textures = self._textures(f"{name}_texture")
         if textures[0] is None:
             return None
-        return NormalMap(self._store.normals(textures, self._uv), Signal(numbers(self._numbers(f"{name}_scale"))))
+        scale = Signal(numbers(self._numbers(f"{name}_scale")))
+        return NormalMap(self._store.normals(textures, self._uv), scale, self._variants[0].tangents)
 
 
 def _uv_sets(m: Material) -> tuple[int, ...]:

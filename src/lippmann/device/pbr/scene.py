@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lippmann.device.pbr.emitters import environment_object, light_object
-from lippmann.device.pbr.material_groups import Variant
+from lippmann.device.pbr.material_groups import Variant, follows_tangents
 from lippmann.device.pbr.materials import Finish, make_finishes
 from lippmann.device.pbr.media import MEDIA_NOTE, has_media
 from lippmann.device.pbr.shapes import Dress, has_volume, make_shapes
@@ -201,12 +201,15 @@ def _placements(description: SceneDescription, notes: list[str]) -> dict[int, Ma
 
 def _variant(description: SceneDescription, mesh: int) -> Variant:
     colors = description.meshes[mesh].colors
-    material = description.meshes[mesh].material
-    alone = description.meshes[mesh].stands_for == "rod"
-    if colors is None:
-        return Variant(material, alone=alone)
-    fades = colors.shape[1] == 4 and description.materials[material].alpha_mode != "opaque"
-    return Variant(material, tinted=True, faded=fades, alone=alone)
+    number = description.meshes[mesh].material
+    material = description.materials[number]
+    return Variant(
+        number,
+        tinted=colors is not None,
+        faded=colors is not None and colors.shape[1] == 4 and material.alpha_mode != "opaque",
+        alone=description.meshes[mesh].stands_for == "rod",
+        tangents=description.meshes[mesh].tangents is not None and follows_tangents(material),
+    )
 
 
 def _finishes(description: SceneDescription, meshes: Sequence[int]) -> dict[Variant, Finish]:

@@ -19,7 +19,14 @@ from lippmann.device.pbr.instancing import CopiedMesh, choose_instances, too_man
 from lippmann.device.pbr.material_groups import Variant
 from lippmann.device.pbr.materials import Finish
 from lippmann.device.pbr.round_shapes import BYTES, can_wear, curves, ellipsoids, keeps_round
-from lippmann.device.pbr.texture_lookup import ALPHA_ATTRIBUTE, COLOR_ATTRIBUTE, MEMBER_ATTRIBUTE, uv_attribute
+from lippmann.device.pbr.tangents import tangents_in_uv, with_own_corners
+from lippmann.device.pbr.texture_lookup import (
+    ALPHA_ATTRIBUTE,
+    COLOR_ATTRIBUTE,
+    MEMBER_ATTRIBUTE,
+    TANGENT_ATTRIBUTE,
+    uv_attribute,
+)
 from lippmann.device.types import Float, Shape
 from lippmann.scene.values.description import FloatArray, IndexArray, Matrix, Mesh, Round
 
@@ -91,6 +98,8 @@ def make_shapes(
     # Meshes that are always placed together, as the primitives of one glTF mesh are, share their instances.
     together: dict[tuple[bool, bytes], list[Piece]] = {}
     for dress, matrices in placements:
+        if dress.finish.tangents:
+            dress = replace(dress, mesh=with_own_corners(dress.mesh))
         key = _is_instantiable(dress), hashlib.sha256(np.ascontiguousarray(matrices).data).digest()
         together.setdefault(key, []).append(Piece(dress, matrices))
     groups = {number: _count_copies(pieces) for number, pieces in enumerate(together.values())}
@@ -238,6 +247,9 @@ def _attributes(pieces: Sequence[Piece], finish: Finish) -> Mapping[str, FloatAr
         attributes[COLOR_ATTRIBUTE] = np.concatenate([_colors(piece)[:, :3] for piece in pieces])
     if finish.faded:
         attributes[ALPHA_ATTRIBUTE] = np.concatenate([_colors(piece)[:, 3:] for piece in pieces])
+    if finish.tangents:
+        own = [piece.per_copy(tangents_in_uv(piece.dress.mesh, finish.uv_sets[0])) for piece in pieces]
+        attributes[TANGENT_ATTRIBUTE] = np.concatenate(own)
     for number in finish.uv_sets[1:]:
         uv = np.concatenate([_uv(piece, number) for piece in pieces])
         attributes[uv_attribute(number)] = np.column_stack([uv, np.zeros(len(uv), np.float32)])

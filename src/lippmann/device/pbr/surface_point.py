@@ -85,19 +85,26 @@ def _direction(anisotropy: Anisotropy, place: Place) -> tuple[Vector3f, Float]:
         u, v = texel.x * 2 - 1, texel.y * 2 - 1
         x, y = x * u - y * v, y * u + x * v
         strength = strength * texel.z
-    tx, ty, up = _tangent(place)
+    tx, ty, up = _tangent(place, anisotropy.tangents)
     y = y * up
     along = mi.Vector3f(x * tx - y * ty, x * ty + y * tx, 0)
     return dr.select(dr.squared_norm(along) > 0, along, mi.Vector3f(1, 0, 0)), dr.clip(strength, 0, 1)
 
 
-def _tangent(place: Place) -> tuple[Float, Float, Float]:
-    """Unit tangent along +u in the surface's plane, x and y, and the sign of the way up the picture, against v."""
+def _tangent(place: Place, own: bool) -> tuple[Float, Float, Float]:
+    """Unit tangent in the surface's plane, x and y, and the sign of the bitangent on its left.
+
+    The tangent runs along +u and the bitangent up the picture, against v, unless the mesh has its ``own``.
+    """
     along_u, along_v = place.si.to_local(place.si.dp_du), place.si.to_local(place.si.dp_dv)
-    length = dr.sqrt(dr.square(along_u.x) + dr.square(along_u.y))
-    tx = dr.select(length > 0, along_u.x / length, 1)
-    ty = dr.select(length > 0, along_u.y / length, 0)
-    return tx, ty, dr.select(tx * along_v.y - ty * along_v.x > 0, mi.Float(-1), 1)
+    up = dr.select(along_u.x * along_v.y - along_u.y * along_v.x > 0, mi.Float(-1), 1)
+    along = along_u
+    if own:
+        carried = place.tangent
+        along = along_u * carried.x + along_v * carried.y
+        up = dr.select(carried.z < 0, -up, up)
+    length = dr.sqrt(dr.square(along.x) + dr.square(along.y))
+    return dr.select(length > 0, along.x / length, 1), dr.select(length > 0, along.y / length, 0), up
 
 
 def mapped_normal(normal_map: NormalMap | None, place: Place, flip: Float) -> Vector3f:
@@ -106,9 +113,9 @@ def mapped_normal(normal_map: NormalMap | None, place: Place, flip: Float) -> Ve
         return mi.Vector3f(0, 0, 1)
     si = place.si
     texel = normal_map.lookup.eval(place) * 2 - 1
-    # The map's x runs along +u and its y up the picture. Seen from behind, a bump is a dent: the normal turns
-    # around as a whole.
-    tx, ty, up = _tangent(place)
+    # The map's x runs along the tangent, its y along the bitangent. Seen from behind, a bump is a dent: the normal
+    # turns around as a whole.
+    tx, ty, up = _tangent(place, normal_map.tangents)
     scale = normal_map.scale.eval(place)
     x, y = texel.x * scale * flip, texel.y * scale * up * flip
     n = dr.normalize(mi.Vector3f(x * tx - y * ty, x * ty + y * tx, texel.z))

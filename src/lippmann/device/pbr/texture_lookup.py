@@ -22,11 +22,14 @@ from lippmann.device.types import (
     Point2f,
     SurfaceInteraction3f,
     UInt32,
+    Vector3f,
 )
 from lippmann.scene.values.description import Filter, Wrap
 
 #: Mesh attributes that carry a triangle's member number, and vertex colours with their alpha.
 MEMBER_ATTRIBUTE, COLOR_ATTRIBUTE, ALPHA_ATTRIBUTE = "face_member", "vertex_color", "vertex_alpha"
+#: Mesh attribute that carries tangents: see :mod:`lippmann.device.pbr.tangents`.
+TANGENT_ATTRIBUTE = "vertex_tangent"
 
 
 def uv_attribute(uv_set: int) -> str:
@@ -61,6 +64,11 @@ class Place:
     def alpha(self) -> Float:
         """Vertex alpha."""
         return self.si.shape.eval_attribute_1(ALPHA_ATTRIBUTE, self.si, self.active)
+
+    @property
+    def tangent(self) -> Vector3f:
+        """The mesh's own tangent, as its attribute has it."""
+        return self.si.shape.eval_attribute_3(TANGENT_ATTRIBUTE, self.si, self.active)
 
     def uv(self, attribute: str | None) -> Point2f:
         """Texture coordinates: the mesh's own, or those in an attribute."""

@@ -121,7 +121,8 @@ class Mesh:
 
     ``positions`` ``(n, 3)``, ``faces`` ``(m, 3)`` counter-clockwise seen from the front, ``normals`` ``(n, 3)`` unit or
     None (flat), ``uvs`` a tuple of ``(n, 2)`` (v down from the image's top row, as in glTF), ``colors`` ``(n, 3 or 4)``
-    linear or None. Normal maps take the tangent frame of the uv parametrisation. ``fitted``: whether displays are
+    linear or None. ``tangents`` ``(n, 4)``: unit vectors along the x of normal maps, and 1 or -1 by which ``normal x
+    tangent`` is their y; zeros or None for those of the uv parametrisation. ``fitted``: whether displays are
     fitted to it; not so a light source around the scene. ``stands_for``: the round body that the triangles stand for, a
     ball of radius 1 about the origin, or a rod of radius 1 from there to (0, 0, 1), open at its ends; what can trace
     such bodies does so instead. ``points``: vertices of each of the balls that stand for points of a cloud, one ball
@@ -138,6 +139,7 @@ class Mesh:
     fitted: bool = True
     stands_for: Round | None = None
     points: int = 0
+    tangents: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +176,8 @@ class Camera:
     """A camera looking along its own -z with +y up.
 
     ``fov_y`` is the full vertical angle in radians (perspective), ``height`` the full vertical extent in world units
-    (orthographic). ``focus_distance`` (world units) becomes the lens plane when the camera places a display; None means
+    (orthographic), ``aspect`` width over height of its picture; None for that of the display it places.
+    ``focus_distance`` (world units) becomes the lens plane when the camera places a display; None means
     the distance of the scene's centre. ``shift`` is where the middle of the picture lies beside the axis, to the right
     and up: a slope (perspective), or world units (orthographic). ``exposure`` is the camera's own, in stops.
     """
@@ -183,7 +186,7 @@ class Camera:
     world_from_camera: Matrix
     fov_y: float | None = None
     height: float | None = None
-    aspect: float = 1.0
+    aspect: float | None = 1.0
     focus_distance: float | None = None
     shift: tuple[float, float] = (0.0, 0.0)
     exposure: float = 0.0

@@ -75,6 +75,12 @@ def test_alpha_modes(material, mode, expected):
     assert material(alphaMode=mode).alpha_mode == expected
 
 
+def test_occlusion_textures_are_noted(writer, read):
+    writer.add("materials", occlusionTexture={"index": 0})
+    (note,) = read(writer.triangle(material=0)).notes
+    assert note == "occlusion textures are left out: light is traced into corners (materials[0])"
+
+
 def test_unlit_and_emissive_strength(material):
     found = material(
         emissiveFactor=[1, 0.5, 0],

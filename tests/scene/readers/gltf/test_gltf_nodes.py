@@ -214,6 +214,12 @@ def test_gpu_instances(writer, read, world_points):
     np.testing.assert_allclose(world_points(scene, 1), [[10, 0, 2], [10, 2, 2], [8, 0, 2]], atol=1e-6)
 
 
+def test_colours_of_copies_are_noted(writer, read):
+    attributes = {"TRANSLATION": writer.accessor([[0, 0, 1]]), "_COLOR_0": 99}
+    writer.node(mesh=writer.mesh(), extensions={"EXT_mesh_gpu_instancing": {"attributes": attributes}})
+    assert read(writer).notes[0].startswith("colours of copies are left out")
+
+
 @pytest.mark.parametrize(
     ("key", "values", "words"),
     [
@@ -285,7 +291,12 @@ def test_a_skin_without_inverse_bind_matrices(writer, read, world_points):
 
 def test_joints_that_mirror_turn_the_triangles_round(writer, read):
     _skinned(writer).json["nodes"][0]["scale"] = [-1, 1, 1]
-    np.testing.assert_array_equal(read(writer).meshes[0].faces, [[2, 1, 0]])
+    tangents = writer.accessor(np.float32([[1, 0, 0, 1]] * 3))
+    writer.json["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = tangents
+    mesh = read(writer).meshes[0]
+    np.testing.assert_array_equal(mesh.faces, [[2, 1, 0]])
+    # joint 1 takes (1, 0, 0) to (-1, 0, 0), joint 3 to (0, 1, 0); they hold a quarter and three.
+    np.testing.assert_allclose(mesh.tangents, [[-(0.1**0.5), 0.9**0.5, 0, -1]] * 3, atol=1e-6)
 
 
 def test_unused_joints_may_be_out_of_range(writer, read):

@@ -260,6 +260,32 @@ def test_morph_targets_at_their_default_weights(writer, read):
     np.testing.assert_allclose(mesh.colors, [[0.25, 0.125, 0]] * 3)
 
 
+TANGENTS = [[2, 0, 0, 1], [0, 3, 0, -1], [0, 0, 0, 1]]
+
+
+def _with_tangents(writer, tangents=TANGENTS, normals=((0, 0, 1),) * 3, **primitive):
+    attributes = {"TANGENT": writer.accessor(np.float32(tangents))}
+    if normals is not None:
+        attributes["NORMAL"] = writer.accessor(np.float32(normals))
+    return writer.triangle(attributes=attributes, **primitive)
+
+
+def test_tangents_have_unit_length_or_none(writer, read):
+    mesh = read(_with_tangents(writer)).meshes[0]
+    np.testing.assert_array_equal(mesh.tangents, [[1, 0, 0, 1], [0, 1, 0, -1], [0, 0, 0, 0]])
+
+
+def test_without_normals_tangents_do_not_count(writer, read):
+    assert read(_with_tangents(writer, normals=None)).meshes[0].tangents is None
+
+
+def test_morph_targets_move_tangents_and_leave_their_side(writer, read):
+    changes = writer.accessor(np.float32([[-2, 1, 0]] * 3))
+    _with_tangents(writer, targets=[{"TANGENT": changes}]).json["meshes"][0]["weights"] = [1.0]
+    expected = [[0, 1, 0, 1], [-(0.2**0.5), 0.8**0.5, 0, -1], [-(0.8**0.5), 0.2**0.5, 0, 1]]
+    np.testing.assert_allclose(read(writer).meshes[0].tangents, expected, rtol=1e-6)
+
+
 def test_weights_of_a_node_go_before_those_of_its_mesh(writer, read, world_points):
     _morphing(writer, [1.0, 0.25]).node(mesh=0, weights=[0.0, 1.0])
     scene = read(writer)

@@ -20,7 +20,7 @@ def _camera(writer, read, node=None, **camera):
 def test_perspective_without_end(writer, read):
     camera = _camera(writer, read, name="eye", type="perspective", perspective=PERSPECTIVE)
     assert (camera.name, camera.fov_y, camera.height) == ("eye", 0.8, None)
-    assert (camera.aspect, camera.focus_distance) == (1.0, None)
+    assert (camera.aspect, camera.focus_distance) == (None, None)
 
 
 def test_perspective_with_aspect_and_far_plane(writer, read):
@@ -108,6 +108,11 @@ def test_point_light(writer, read):
 def test_light_defaults(writer, read):
     light = _light(writer, read, type="spot")
     assert (light.color, light.inner_angle, light.outer_angle) == ((1, 1, 1), 0.0, math.pi / 4)
+
+
+def test_a_range_is_noted(writer, read):
+    _light(writer, read, type="point", range=5.0)
+    assert "light falls with the square of the distance, beyond its range, too (extensions" in read(writer).notes[0]
 
 
 def test_spot_of_a_right_angle_in_single_precision(writer, read):

@@ -55,6 +55,7 @@ _SIGNED = frozenset({_BYTE, _SHORT})
 
 POSITION = Storage(("VEC3",), quantized_plain=_UNSIGNED | _SIGNED, quantized_normalized=_UNSIGNED | _SIGNED)
 NORMAL = Storage(("VEC3",), quantized_normalized=_SIGNED)
+TANGENT = Storage(("VEC4",), quantized_normalized=_SIGNED)
 TEXCOORD = Storage(
     ("VEC2",), normalized=_UNSIGNED, quantized_plain=_UNSIGNED | _SIGNED, quantized_normalized=_UNSIGNED | _SIGNED
 )

@@ -35,8 +35,8 @@ def read_camera(fields: Fields, node: Fields, world: Matrix) -> Camera:
         angle = lens.optional_number("yfov")
         if angle is None or not 0.0 < angle < math.pi:
             raise lens.error("yfov", "it must lie between 0 and pi")
-        aspect = lens.number("aspectRatio", 1.0, minimum=0.0)
-        if aspect == 0.0:
+        aspect = lens.optional_number("aspectRatio")
+        if aspect is not None and aspect <= 0.0:
             raise lens.error("aspectRatio", "it must be above 0")
         return Camera(name, rigid(world), fov_y=angle, aspect=aspect, focus_distance=focus, shift=shift)
     width, height = (abs(lens.optional_number(key) or 0.0) for key in ("xmag", "ymag"))
@@ -90,6 +90,8 @@ def read_light(node: Fields, world: Matrix, document: Document) -> Light | None:
     if min(red, green, blue) < 0.0:
         raise fields.error("color", "it must not be negative")
     intensity = fields.number("intensity", 1.0, minimum=0.0)
+    if fields.has("range"):
+        document.notes.add("light falls with the square of the distance, beyond its range, too", fields.place)
     color = (red * intensity, green * intensity, blue * intensity)
     name = node.text("name") or fields.text("name") or fields.place
     kind = fields.text("type")

@@ -150,6 +150,8 @@ class Materials:
         if extension is not None:
             strength = extension.number("emissiveStrength", 1.0, minimum=0.0)
         emission = self._fractions(fields, "emissiveFactor", _BLACK)
+        if fields.has("occlusionTexture"):
+            self.document.notes.add("occlusion textures are left out: light is traced into corners", fields.place)
         return {
             "normal_texture": self.textures.read(fields, "normalTexture"),
             "normal_scale": 1.0 if normal is None else normal.number("scale", 1.0),

@@ -105,7 +105,16 @@ class Meshes:
             )
             missing: FloatArray = np.zeros((len(geometry.positions), 2), np.float32)
             uvs += (missing,) * (uv_sets - len(uvs))
-        return Mesh(name, geometry.positions, geometry.faces, material, geometry.normals, uvs, geometry.colors)
+        return Mesh(
+            name,
+            geometry.positions,
+            geometry.faces,
+            material,
+            geometry.normals,
+            uvs,
+            geometry.colors,
+            tangents=geometry.tangents,
+        )
 
 
 def _is_fitted(mesh: Fields) -> bool:

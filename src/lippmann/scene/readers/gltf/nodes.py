@@ -154,6 +154,8 @@ def instance_matrices(node: Fields, document: Document, accessors: Accessors) ->
     if attributes is None:
         return _ONE
     values_of: dict[str, Matrix] = {}
+    if any(name.lstrip("_").startswith("COLOR") for name in attributes.names()):
+        document.notes.add("colours of copies are left out", attributes.place)
     for key, kind in (
         ("TRANSLATION", storage.TRANSLATION),
         ("ROTATION", storage.ROTATION),

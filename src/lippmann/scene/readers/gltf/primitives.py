@@ -28,6 +28,7 @@ class Geometry:
     normals: FloatArray | None
     uvs: tuple[FloatArray, ...]
     colors: FloatArray | None
+    tangents: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,12 +76,14 @@ class Primitives:
         faces = self._faces(primitive, mode, len(positions))
         if not len(faces):
             return None
-        normals = None
+        normals = tangents = None
         if mode >= _TRIANGLES:
             normals = self._vertex_data(attributes, "NORMAL", storage.NORMAL, len(positions))
+        if normals is not None:  # without them tangents do not count (section 3.7.2.1)
+            tangents = self._vertex_data(attributes, "TANGENT", storage.TANGENT, len(positions))
         uvs = self._uvs(attributes, len(positions))
         colors = self._vertex_data(attributes, "COLOR_0", storage.COLOR, len(positions))
-        vertices = Geometry(positions, faces, normals, uvs, colors)
+        vertices = Geometry(positions, faces, normals, uvs, colors, tangents)
         if any(weights):
             vertices = self._morph(vertices, primitive, weights)
         if skin is not None:
@@ -154,13 +157,14 @@ class Primitives:
         count = len(vertices.positions)
 
         def apply_targets(values: FloatArray, key: str, kind: Storage) -> FloatArray:
-            total = values
+            total = values.copy()
+            width = 3 if key == "TANGENT" else values.shape[1]  # of tangents, the side of the bitangent stays
             for target, weight in zip(targets, weights, strict=True):
                 change = self._vertex_data(target, key, kind, count) if weight else None
                 if change is not None:
-                    if change.shape[1] != values.shape[1]:
-                        raise target.error(key, f"it must have {values.shape[1]} components, as what it changes")
-                    total = total + np.float32(weight) * change
+                    if change.shape[1] != width:
+                        raise target.error(key, f"it must have {width} components, as what it changes")
+                    total[:, :width] += np.float32(weight) * change
             return total
 
         with np.errstate(over="ignore", invalid="ignore"):  # positions are checked to be finite in the end
@@ -172,6 +176,9 @@ class Primitives:
                     apply_targets(uvs, f"TEXCOORD_{i}", storage.TEXCOORD_CHANGE) for i, uvs in enumerate(vertices.uvs)
                 ),
                 None if vertices.colors is None else apply_targets(vertices.colors, "COLOR_0", storage.COLOR_CHANGE),
+                None
+                if vertices.tangents is None
+                else apply_targets(vertices.tangents, "TANGENT", storage.NORMAL_CHANGE),
             )
 
     def _skin(self, vertices: Geometry, attributes: Fields, skin: Skin) -> Geometry:
@@ -193,9 +200,11 @@ class Primitives:
         if (all_weights[beyond] != 0.0).any():
             raise attributes.error("JOINTS_0", f"it names joint {joints[beyond].max()} of {len(skin.matrices)}")
         joints[beyond] = 0
-        positions, normals, mirrored = deform(vertices.positions, vertices.normals, joints, all_weights, skin.matrices)
-        faces = vertices.faces[:, ::-1] if mirrored else vertices.faces
-        return Geometry(positions, np.ascontiguousarray(faces), normals, vertices.uvs, vertices.colors)
+        positions, normals, tangents, mirrored = deform(
+            vertices.positions, vertices.normals, vertices.tangents, joints, all_weights, skin.matrices
+        )
+        faces = np.ascontiguousarray(vertices.faces[:, ::-1] if mirrored else vertices.faces)
+        return replace(vertices, positions=positions, faces=faces, normals=normals, tangents=tangents)
 
     def _clean(self, vertices: Geometry, primitive: Fields) -> Geometry:
         """Only vertices that a triangle uses, all of them finite, with normals of unit length."""
@@ -209,6 +218,7 @@ class Primitives:
                 None if vertices.normals is None else vertices.normals[used],
                 tuple(uvs[used] for uvs in vertices.uvs),
                 None if vertices.colors is None else vertices.colors[used],
+                None if vertices.tangents is None else vertices.tangents[used],
             )
         finite = np.isfinite(vertices.positions).all(axis=1)
         if not finite.all():
@@ -219,11 +229,12 @@ class Primitives:
             normals, repaired = unit_normals(normals, vertices.positions, vertices.faces)
             if repaired:
                 self.document.notes.add("normals without a direction were taken from the triangles", primitive.place)
+        tangents = None if vertices.tangents is None else _unit_tangents(vertices.tangents)
         uvs = tuple(self._zero_nonfinite(values, "texture coordinates", primitive) for values in vertices.uvs)
         colors = vertices.colors
         if colors is not None:
             colors = np.clip(self._zero_nonfinite(colors, "colours", primitive), 0.0, 1.0)
-        return Geometry(vertices.positions, vertices.faces, normals, uvs, colors)
+        return Geometry(vertices.positions, vertices.faces, normals, uvs, colors, tangents)
 
     def _zero_nonfinite(self, values: FloatArray, what: str, primitive: Fields) -> FloatArray:
         finite = np.isfinite(values)
@@ -231,3 +242,12 @@ class Primitives:
             return values
         self.document.notes.add(f"{what} that are not finite were set to 0", primitive.place)
         return np.where(finite, values, np.float32(0.0))
+
+
+def _unit_tangents(tangents: FloatArray) -> FloatArray:
+    """Tangents ``(n, 4)`` brought to unit length; zeros for those without a direction."""
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        along = tangents[:, :3] / np.linalg.norm(tangents[:, :3], axis=1, keepdims=True)
+    good = np.isfinite(along).all(axis=1, keepdims=True)
+    side = np.where(tangents[:, 3:] < 0.0, np.float32(-1.0), np.float32(1.0))
+    return np.where(good, np.hstack([along, side]), np.float32(0.0))

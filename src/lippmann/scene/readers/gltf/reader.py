@@ -225,4 +225,4 @@ def _ranks(placements: list[_Placements]) -> list[NDArray[np.int64]]:
 def _flatten(mesh: Mesh, world: Matrix) -> Mesh:
     """The mesh in world coordinates."""
     positions = (mesh.positions @ world[:3, :3].T + world[:3, 3]).astype(np.float32)
-    return replace(mesh, positions=positions, normals=None)
+    return replace(mesh, positions=positions, normals=None, tangents=None)

@@ -54,16 +54,19 @@ def read_skin(index: int, document: Document, accessors: Accessors, nodes: Nodes
 def deform(
     positions: FloatArray,
     normals: FloatArray | None,
+    tangents: FloatArray | None,
     joints: IndexArray,
     weights: FloatArray,
     matrices: NDArray[np.float64],
-) -> tuple[FloatArray, FloatArray | None, bool]:
+) -> tuple[FloatArray, FloatArray | None, FloatArray | None, bool]:
     """Linear blend skinning (glTF 2.0, section 3.7.3.3).
 
     Parameters
     ----------
     positions, normals:
         ``(n, 3)``.
+    tangents:
+        ``(n, 4)``.
     joints, weights:
         ``(n, k)``: which matrices hold a vertex, and how much; weights are brought to a sum of 1, and a vertex
         without any follows its first joint.
@@ -72,8 +75,8 @@ def deform(
 
     Returns
     -------
-    positions, normals:
-        ``(n, 3)``; normals are not of unit length.
+    positions, normals, tangents:
+        As given; normals and tangents are not of unit length.
     mirrored:
         Whether most vertices were mirrored, which turns triangles round.
     """
@@ -85,11 +88,14 @@ def deform(
             blended += shares[:, k, None, None] * matrices[joints[:, k], :3]
         linear = blended[:, :, :3]
         skinned = np.einsum("nij,nj->ni", linear, positions) + blended[:, :, 3]
-        mirrored = bool((np.linalg.det(linear) < 0.0).mean() > 0.5)
-        skinned_normals = None
+        turned = np.linalg.det(linear) < 0.0
+        skinned_normals = skinned_tangents = None
         if normals is not None:
             skinned_normals = np.einsum("nij,nj->ni", normal_matrices(linear), normals).astype(np.float32)
-        return skinned.astype(np.float32), skinned_normals, mirrored
+        if tangents is not None:
+            along, side = np.einsum("nij,nj->ni", linear, tangents[:, :3]), tangents[:, 3]
+            skinned_tangents = np.column_stack([along, np.where(turned, -side, side)]).astype(np.float32)
+        return skinned.astype(np.float32), skinned_normals, skinned_tangents, bool(turned.mean() > 0.5)
 
 
 def unit_normals(normals: FloatArray, positions: FloatArray, faces: IndexArray) -> tuple[FloatArray, bool]:
