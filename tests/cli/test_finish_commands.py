@@ -74,3 +74,14 @@ def test_a_missing_denoiser_is_said_before_anything_is_rendered(lippmann, engine
     assert done.code == 2
     assert 'pip install "pyoidn>=2.5"' in done.err
     assert "trace" not in done.err
+
+
+def test_without_a_denoiser_the_default_says_what_is_rendered_instead(lippmann, engine, tmp_path, monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "pyoidn", None)
+    small = ["--display", "monitor:size=64x48,dpi=100,pitch=8,slope=5,center=0", "--threads", "1"]
+    for more in ([], ["--effort", "draft"]):
+        done = lippmann("render", "teapot", *small, *more, "-o", tmp_path / "a.png")
+        assert (done.code, done.err.count("no denoiser")) == (0, 1), done.err
+        assert "auto: full: no denoiser is installed (Linux on ARM has no package of it), so noise stays" in done.err

@@ -9,6 +9,9 @@ Form = Literal["picture", "tiles", "quilt", "forecast", "preview"]
 _GOALS = ("quality", "quality_worst", "max_time")
 _REUSE = ("order", "respect_gloss")
 
+#: Forms that reuse no points of one micro-image in others.
+REUSES_NOTHING: tuple[Form, ...] = ("tiles", "quilt", "forecast")
+
 #: The options of a render that a form does not have.
 LEFT_OUT: Mapping[Form, tuple[str, ...]] = {
     "picture": (),

@@ -51,7 +51,6 @@ if TYPE_CHECKING:
 #: Share of the free memory that is used where no limit is given.
 DEFAULT_MEMORY_SHARE = 0.6
 
-
 T = TypeVar("T")
 
 
@@ -402,10 +401,7 @@ def _build(scene: Scene, request: RenderRequest, engine: engines.Engine, memory:
 
 
 def make_integrator(built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix) -> Integrator:
-    """The integrator that a resolved request names, with no light prepared.
-
-    ``frame_from_world`` is that of :meth:`Session.integrator`.
-    """
+    """The integrator that a resolved request names, with no light prepared; see :meth:`Session.integrator`."""
     plugin = INTEGRATORS.find(request.integrator)
     assert plugin is not None  # options know no others
     with plugin.guarded(EngineError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import importlib.util
 import os
 import sys
 from collections.abc import Iterator
@@ -73,6 +74,15 @@ def _used() -> int:
 
 _WINDOWS = sys.platform == "win32"
 _DRIVER, _OPTIX = ("nvcuda.dll", "nvoptix.dll") if _WINDOWS else ("libcuda.so.1", "libnvoptix.so.1")
+
+
+#: Why nothing is denoised.
+NO_DENOISER = "no denoiser is installed (Linux on ARM has no package of it), so noise stays: more samples lower it"
+
+
+def has_denoiser() -> bool:
+    """Whether Open Image Denoise is installed, which has no package for Linux on ARM; it is not loaded."""
+    return importlib.util.find_spec("pyoidn") is not None
 
 
 def find_gpu() -> str | None:

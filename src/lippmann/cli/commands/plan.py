@@ -8,10 +8,9 @@ from typing import Annotated
 from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence
 from lippmann.cli.shared import options
-from lippmann.cli.shared.command_options import only, with_options, without
+from lippmann.cli.shared.command_options import for_form, only, with_options
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.scene_source import SceneSource
-from lippmann.options.forms import LEFT_OUT
 from lippmann.options.light import LightOptions
 from lippmann.options.outputs import AccessOptions, SequenceOptions
 from lippmann.options.placement import PlacementOptions
@@ -32,7 +31,7 @@ def plan(
     access: AccessOptions,
     placement: PlacementOptions,
     light: LightOptions,
-    how: Annotated[QualityOptions, without(*LEFT_OUT["forecast"])],
+    how: Annotated[QualityOptions, for_form("forecast")],
     printed: PrintOptions,
     turning: Annotated[SequenceOptions, only("turntable", "swing")],
     machine: MachineOptions,

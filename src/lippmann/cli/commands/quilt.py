@@ -13,14 +13,13 @@ from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence
 from lippmann.cli.commands.interlace import FitOption, fit_note
 from lippmann.cli.shared import options, parse
-from lippmann.cli.shared.command_options import with_options, without
+from lippmann.cli.shared.command_options import for_form, with_options
 from lippmann.cli.shared.console import Console, estimate_in_words
 from lippmann.cli.shared.grouped_help import HelpfulCommand
 from lippmann.cli.shared.picture_report import add_seconds, depth_line, report
 from lippmann.cli.shared.scene_source import SceneSource
 from lippmann.errors import UsageError
 from lippmann.options.choices import tone_map_of
-from lippmann.options.forms import LEFT_OUT
 from lippmann.options.light import LightOptions
 from lippmann.options.outputs import AccessOptions, SequenceOptions
 from lippmann.options.placement import PlacementOptions
@@ -102,7 +101,7 @@ def render(
     access: AccessOptions,
     placement: PlacementOptions,
     light: LightOptions,
-    how: Annotated[QualityOptions, without(*LEFT_OUT["quilt"])],
+    how: Annotated[QualityOptions, for_form("quilt")],
     in_frames: SequenceOptions,
     machine: MachineOptions,
 ) -> None:

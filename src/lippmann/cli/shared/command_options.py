@@ -12,12 +12,14 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import Field, dataclass
-from typing import Annotated, Any, TypeVar, get_args, get_origin
+from dataclasses import Field, dataclass, field
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 import typer
 
 from lippmann.cli.shared.grouped_help import ALL, MANY
+from lippmann.options.choices import REUSING
+from lippmann.options.forms import LEFT_OUT, REUSES_NOTHING, Form
 from lippmann.options.option import Option, Options, default_of, kinds_of, options_of
 from lippmann.options.quality import MachineOptions
 
@@ -26,10 +28,14 @@ T = TypeVar("T", bound=Options)
 
 @dataclass(frozen=True)
 class Subset:
-    """Which options of a dataclass a command has; the others stay at their defaults."""
+    """Which options of a dataclass a command has; the others stay at their defaults.
+
+    ``refused`` are words that it does not take, by their options.
+    """
 
     names: tuple[str, ...]
     are_left_out: bool
+    refused: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def has(self, name: str) -> bool:
         """Whether the command has this option."""
@@ -46,6 +52,11 @@ def without(*names: str) -> Subset:
     return Subset(names, are_left_out=True)
 
 
+def for_form(form: Form) -> Subset:
+    """The options, and of them the words, that a form of picture has."""
+    return Subset(LEFT_OUT[form], are_left_out=True, refused={"method": REUSING} if form in REUSES_NOTHING else {})
+
+
 def with_options(command: Callable[..., None]) -> Callable[..., None]:
     """A command whose parameters that are option dataclasses have become options."""
     signature = inspect.signature(command, eval_str=True)
@@ -58,7 +69,7 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
             continue
         chosen = [(each, its) for each, its in options_of(kind) if subset.has(each.name)]
         groups[parameter.name] = kind, chosen
-        parameters += [_parameter(each, its) for each, its in chosen]
+        parameters += [_parameter(each, its, subset.refused.get(each.name, ())) for each, its in chosen]
     options = {each.name: its for _, chosen in groups.values() for each, its in chosen}
     if len(parameters) > MANY:
         parameters.append(_HELP_ALL)
@@ -87,9 +98,12 @@ def _dataclass_of(annotation: Any) -> tuple[type[Options] | None, Subset]:
     return (kind, subset) if isinstance(kind, type) and issubclass(kind, Options) else (None, subset)
 
 
-def _parameter(each: Field[Any], its: Option) -> inspect.Parameter:
+def _parameter(each: Field[Any], its: Option, refused: tuple[str, ...]) -> inspect.Parameter:
     """A field as typer's parameter; where its words are read here, None stands for its default."""
-    default, kind = default_of(each), its.words or each.type
+    default, kind, help_text = default_of(each), its.words or each.type, its.help_in_flags
+    if refused:
+        kind = Literal[tuple(word for word in get_args(kind) if word not in refused)]
+        help_text = "; ".join(part for part in help_text.split("; ") if not part.startswith(refused))
     if its.read is not None:
         kind, default = its.words or (str | None), default if isinstance(default, str) else its.default_text
     metavar = its.metavar
@@ -100,7 +114,7 @@ def _parameter(each: Field[Any], its: Option) -> inspect.Parameter:
         flag = f"{flag}/--no-{flag[2:]}"
     shown = typer.Option(
         flag,
-        help=its.help_in_flags,
+        help=help_text,
         metavar=metavar,
         rich_help_panel=its.group,
         show_default=default is not None and default is not False,

@@ -11,7 +11,7 @@ from dataclasses import replace
 from lippmann.display import Display
 from lippmann.options.choices import POOLED_LIGHT, PROPERTIES
 from lippmann.progress import ProgressCallback, silent
-from lippmann.rendering.denoise.oidn import denoise, load_denoiser
+from lippmann.rendering.denoise.oidn import denoise
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.live.develop import arrange
 from lippmann.rendering.live.seen_pixels import EyeMap, Vector
@@ -20,6 +20,7 @@ from lippmann.rendering.preview import Preview
 from lippmann.rendering.request.plan import BUDGET, resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session
+from lippmann.runtime import machine
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.scene import Scene
 
@@ -78,9 +79,8 @@ def render_eye_preview(
     is_fine = 2 * source.width > width * height * whole.channels
     # With 32 samples noise is not worth taking out.
     denoises = samples < 32 and is_fine and request.denoise != "none" and resolved.integrator not in PROPERTIES
-    denoises &= not (scene.lies_off_surfaces or scene.fills_panel)
+    denoises &= machine.has_denoiser() and not (scene.lies_off_surfaces or scene.fills_panel)
     if denoises:
-        load_denoiser()
         guides = trace_guides(
             session.built,
             source,

@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.rendering.denoise.noisy_blend import weigh_samples
-from lippmann.rendering.denoise.oidn import denoise, load_denoiser
+from lippmann.rendering.denoise.oidn import denoise
 from lippmann.rendering.film.batched_picture import STREAMS
 from lippmann.rendering.live.develop import arrange, develop, develop_picture
 from lippmann.rendering.live.live_tracer import Lanes, PlacedDisplay
 from lippmann.rendering.live.live_view import LiveFrame, LiveView
 from lippmann.rendering.live.seen_pixels import PixelSet
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.runtime import machine
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.placement import Placement
 
@@ -68,7 +69,7 @@ class Progressive:
         self._task: Iterator[Floats | None] | None = None
         #: Lanes of the next step in each stream.
         self._next = min(self._count, self._most)
-        self._denoises = view.eye is not None and request.box_filter
+        self._denoises = view.eye is not None and request.box_filter and machine.has_denoiser()
 
     @property
     def samples(self) -> int:
@@ -130,7 +131,6 @@ class Progressive:
         """One of the steps that take the noise out; the picture after the last."""
         started = time.perf_counter()
         if self._task is None:
-            load_denoiser()
             if self._features is None:
                 self._trace_features(seconds)
             assert self._features is not None

@@ -31,6 +31,7 @@ from lippmann.options.forms import Form
 from lippmann.options.light import LightOptions
 from lippmann.rendering.request.preconditions import check, check_off_surfaces
 from lippmann.rendering.request.render_request import DEFAULT_SPP, Choice, RenderPlan, RenderRequest
+from lippmann.runtime import machine
 from lippmann.scene.scene import Scene
 
 T = TypeVar("T")
@@ -214,7 +215,7 @@ class _Facts:
     @property
     def is_denoised_draft(self) -> bool:
         """Whether the fast network takes the noise out of a single sample."""
-        is_open = self.form != "preview" and self.request.denoise == "auto"
+        is_open = self.form != "preview" and self.request.denoise == "auto" and machine.has_denoiser()
         return self.is_draft and is_open and self.is_pooled_light and not self.is_photograph
 
     @property
@@ -286,6 +287,7 @@ def _method(facts: _Facts) -> Choice[Method]:
         (name in PROPERTIES, "full", f"{name} has no noise"),
         (not facts.is_pooled_light, "full", f"the light of {name} is not pooled"),
         (facts.form == "preview", "full", "a plain picture has no micro-images to share light"),
+        (not machine.has_denoiser(), "full", machine.NO_DENOISER),
         (True, "pooled", "light shared between micro-images"),
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from lippmann.display import Display
 from lippmann.errors import PictureError, UsageError
 from lippmann.options.choices import LIGHT, POOLED_LIGHT, PROPERTIES, REUSING
-from lippmann.options.forms import LEFT_OUT, Form
+from lippmann.options.forms import LEFT_OUT, REUSES_NOTHING, Form
 from lippmann.rendering.request.render_request import RenderRequest, shown_value
 from lippmann.scene.scene import Scene
 
@@ -159,7 +159,7 @@ def _of_form(request: RenderRequest, form: Form) -> list[_Refusal]:
     needs = "needs the whole picture" if form == "tiles" else f"is not possible in a {form}"
     given = [name for name in LEFT_OUT[form] if getattr(request, name) not in (getattr(plain, name), False, "full")]
     values = {name: "it" if getattr(request, name) is True else getattr(request, name) for name in given}
-    reuses = request.method in REUSING and form in ("tiles", "quilt", "forecast")
+    reuses = request.method in REUSING and form in REUSES_NOTHING
     instead = 'use method="full" or method="pooled"' if form == "tiles" else _LEAVE
     return [
         *((True, f"{value} {needs}", name, _WHY[form], _LEAVE) for name, value in values.items()),
