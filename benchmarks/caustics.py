@@ -77,8 +77,7 @@ def _by_paths(stage: Stage) -> None:
 
 
 def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:
-    """As the program makes it: halves with photons of their own; pooled by the effort that the rays deserve."""
-    from lippmann.rendering.denoise.cost_model import effort_of, traced_work
+    """As the program makes it: halves with photons of their own; pooled by the effort that the samples deserve."""
     from lippmann.rendering.denoise.dual_buffer import Denoised
     from lippmann.rendering.film.sample_batches import FullInBatches
 
@@ -89,10 +88,8 @@ def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:
     batches.add(samples)
     if method == "full":
         return batches.picture()
-    rays = batches.rays
-    work = traced_work(rays.primary, rays.shadow, rays.secondary) / (stage.source.width * stage.source.height)
-    denoiser = guided_denoiser(stage, effort_of("oidn", work))
-    return Denoised(batches, denoiser.denoise, "srgb", CORES, denoiser.share, denoiser.coverage).picture()
+    denoiser = guided_denoiser(stage, "oidn")
+    return Denoised(batches, denoiser, "srgb", CORES, denoiser.coverage).picture()
 
 
 if __name__ == "__main__":

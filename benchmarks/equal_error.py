@@ -166,19 +166,20 @@ def _denoised(
 
     samples, effort = how
 
-    def guided() -> Any:
+    def guided(shares: bool) -> Any:
         # Anew each time: a denoiser traces its guides once.
-        denoiser = guided_denoiser(stage, effort)
+        denoiser = guided_denoiser(stage, f"oidn-{effort}", shares)
         denoiser.coverage()
         return denoiser
 
-    looked, denoiser = timed(guided)
+    looked, plain = timed(lambda: guided(False))
+    sharing = guided(True)
 
     def pooled() -> Picture:
-        return Denoised(batches, denoiser.denoise, "srgb", CORES, denoiser.share, denoiser.coverage).picture()
+        return Denoised(batches, sharing, "srgb", CORES, sharing.coverage).picture()
 
     for way, call in (
-        ("full + oidn", lambda: denoiser.denoise(picture)),
+        ("full + oidn", lambda: plain(picture, samples)),
         ("pooled", pooled),
     ):
         seconds, result = timed(call)
@@ -187,7 +188,7 @@ def _denoised(
         curves[way].append({**found, **judge(result)})
 
 
-def guided_denoiser(stage: Stage, effort: str) -> Any:
+def guided_denoiser(stage: Stage, kind: str, shares: bool = True) -> Any:
     """The denoiser of a pooled picture."""
     from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 
@@ -199,8 +200,8 @@ def guided_denoiser(stage: Stage, effort: str) -> Any:
         box_filter=True,
         memory=4 << 30,
         threads=CORES,
-        effort=lambda: effort,
-        shares=True,
+        kind=kind,
+        shares=shares,
     )
 
 

@@ -96,15 +96,15 @@ def _job(stage: Stage, options: dict[str, Any]) -> Any:
 
 def _stock(stage: Stage, judge: Judge) -> dict[str, dict[str, Any]]:
     """For each quality the fewest samples with which stock views have it, and their time."""
-    looked = {effort: timed(lambda e=effort: _guides(stage, e)) for effort in ("fast", "high")}
+    guiding, guides = timed(lambda: _guides(stage))
     _stock_views(stage, 1)  # compiles
     found: dict[str, dict[str, Any]] = {}
     samples, seconds, curve = 1, 0.0, [-1.0]
     while samples <= MOST_OF_STOCK and len(found) < len(QUALITIES):
         traced, noisy = timed(lambda n=samples: _stock_views(stage, n))
         curve.append(curve[-1])
-        for effort, (guiding, guides) in looked.items():
-            denoising, picture = timed(lambda e=effort, g=guides, v=noisy: _without_noise(stage, v, g, e))
+        for effort in ("fast", "high"):
+            denoising, picture = timed(lambda e=effort, v=noisy: _without_noise(stage, v, guides, e))
             psnr, seconds = judge(picture)["psnr"], traced + guiding + denoising
             curve[-1] = max(curve[-1], psnr)
             for quality in QUALITIES:
@@ -119,11 +119,11 @@ def _stock(stage: Stage, judge: Judge) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _guides(stage: Stage, effort: Any) -> Any:
-    from lippmann.rendering.denoise.cost_model import GUIDE_SAMPLES
+def _guides(stage: Stage) -> Any:
+    from lippmann.rendering.denoise.tuning import TUNING
     from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
 
-    plan = plan_guides(stage.source, GUIDE_SAMPLES[effort], 4 << 30)
+    plan = plan_guides(stage.source, TUNING.guide_samples, 4 << 30)
     return trace_guides(stage.built, stage.source, plan, stage.display_from_world, seed=77)
 
 

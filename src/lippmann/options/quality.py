@@ -109,8 +109,8 @@ class QualityOptions(Options):
     )
     denoise: Denoiser = _quality(
         "auto",
-        "none, or oidn: take the noise out with Open Image Denoise, with the effort that the rays deserve (oidn-fast "
-        "and oidn-high: with a given one). auto: with `method` pooled, which auto takes.",
+        "none, or oidn: take the noise out with Open Image Denoise, with the effort that the samples deserve "
+        "(oidn-fast and oidn-high: with a given one). auto: with `method` pooled, which auto takes.",
         metavar="[auto|none|oidn]",
     )
     caustics: Caustics = _quality(

@@ -175,7 +175,7 @@ def forecast(
         "trace": found.compile + frames * samples * found.seconds_per_sample,
     }
     if request.denoises:
-        seconds["denoise"] = frames * _denoise_seconds(session, source, placement, found)
+        seconds["denoise"] = frames * _denoise_seconds(session, source, placement)
     seconds["total"] = sum(seconds.values())
     per_pixel = display.panel.pixel_pitch / display.gap / display.lens_array.pitch
     share_beyond = probe.share_beyond(session, placement) * source.width * source.height / (width * height)
@@ -328,14 +328,12 @@ def _count_at(samples: int, counts: list[tuple[int, int]]) -> float:
     return below + (samples - low) * (above - below) / (high - low)
 
 
-def _denoise_seconds(session: Session, source: DisplayRays | WindowRays, placement: Placement, found: _Found) -> float:
-    from lippmann.rendering.denoise.cost_model import effort_of, traced_work
+def _denoise_seconds(session: Session, source: DisplayRays | WindowRays, placement: Placement) -> float:
     from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
     from lippmann.rendering.transport.ray_source import SubpixelRays
 
     request = session.request
     traced = SubpixelRays(source) if request.keeps_colors(source.display) else source
-    rays_per_pixel = traced.channels * request.samples * traced_work(1, found.rays["shadow"], found.rays["secondary"])
     denoiser = GuidedDenoiser(
         session.built,
         traced,
@@ -344,9 +342,9 @@ def _denoise_seconds(session: Session, source: DisplayRays | WindowRays, placeme
         box_filter=request.box_filter,
         memory=session.memory,
         threads=session.engine.threads,
-        effort=lambda: effort_of(request.denoise, rays_per_pixel),
+        kind=request.denoise,
     )
-    return denoiser.probe()
+    return denoiser.probe(request.samples)
 
 
 def _working_bytes(source: DisplayRays | WindowRays, session: Session) -> int:

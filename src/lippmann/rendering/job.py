@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +15,6 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Session
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays
-
-if TYPE_CHECKING:
-    from lippmann.rendering.denoise.exposure_survey import Treatment
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,15 +29,15 @@ class Job:
         What is gathered along which rays.
     display_from_world:
         ``(4, 4)`` affine map to the display's frame (mm).
-    treatment:
-        Of a part of a picture that is denoised: how all its parts are.
+    is_part:
+        Of a picture that is denoised in parts, which is put together and assessed elsewhere.
     """
 
     session: Session
     integrator: Integrator
     source: DisplayRays | WindowRays | QuiltRays
     display_from_world: NDArray[np.float64]
-    treatment: Treatment | None = None
+    is_part: bool = False
 
     @property
     def request(self) -> RenderRequest:

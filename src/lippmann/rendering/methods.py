@@ -14,16 +14,14 @@ from lippmann.options.choices import Method
 from lippmann.rendering.adaptive.goal import Goal, goal_of
 from lippmann.rendering.adaptive.stopping import Outcome, reach
 from lippmann.rendering.adaptive.tuning import TUNING
-from lippmann.rendering.denoise.cost_model import effort_of, traced_work
 from lippmann.rendering.denoise.dual_buffer import Denoised, clean_light, remove_excess
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 from lippmann.rendering.denoise.outlines import exchange_coverage
-from lippmann.rendering.denoise.subpixels import SubpixelBatches
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
 from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts
 from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
-from lippmann.rendering.film.wavefront import Frame, RayTotals, trace_frame
+from lippmann.rendering.film.wavefront import Frame, trace_frame
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.job import Job, Traced
 from lippmann.rendering.light_statements import is_among_mirrors
@@ -50,7 +48,7 @@ def trace_samples(job: Job) -> Traced:
     why = why_no_estimate(job.request)
     if why is not None:
         return _denoised_whole(job, _one_stream(job, why))
-    if job.treatment is not None:
+    if job.is_part:
         return _denoised_part(job)
     is_plain = job.request.denoise == "none" and not job.request.is_open_ended
     return _fixed_samples(job) if is_plain else _in_rounds(job)
@@ -116,10 +114,10 @@ def _fixed_samples(job: Job) -> Traced:
 def _in_rounds(job: Job) -> Traced:
     """As many samples as the goal takes, denoised unless the noise is to stay."""
     batches = _batches(job)
-    denoiser = None if job.request.denoise == "none" else _denoiser(job, batches)
+    denoiser = None if job.request.denoise == "none" else _denoiser(job)
     picture = batches if denoiser is None else _denoised(job, batches, denoiser)
     goal = _timed_goal(job)
-    assessment = 0.0 if denoiser is None or goal.max_time is None else denoiser.probe()
+    assessment = 0.0 if denoiser is None or goal.max_time is None else denoiser.probe(TUNING.first_denoised)
     first = TUNING.first_plain if denoiser is None else TUNING.first_denoised
     outcome = reach(
         goal,
@@ -168,8 +166,7 @@ def _traced(
 
 def _batches(job: Job) -> FullInBatches:
     source = job.traced
-    kind = SubpixelBatches if isinstance(source, SubpixelRays) else FullInBatches
-    return kind(
+    return FullInBatches(
         job.integrator,
         source,
         seed=job.request.seed,
@@ -184,17 +181,13 @@ def _denoised_part(job: Job) -> Traced:
     """So many samples without their noise, for a picture that is put together and assessed elsewhere."""
     batches = _batches(job)
     batches.add(job.request.samples, job.progress)
-    denoiser = _denoiser(job, batches)
+    denoiser = _denoiser(job)
     picture = _denoised(job, batches, denoiser)
     return _traced(job, batches, picture, denoiser, errors=picture.squared_error(), estimate=None)
 
 
 def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Denoised:
     return Denoised(batches, denoiser, job.request.transfer, job.session.engine.threads, denoiser.coverage)
-
-
-def _rays_per_pixel(job: Job, rays: RayTotals) -> float:
-    return traced_work(rays.primary, rays.shadow, rays.secondary) / (job.traced.width * job.traced.height)
 
 
 def _estimator(job: Job) -> PictureEstimator:
@@ -239,18 +232,16 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     if job.request.denoise == "none":
         return traced
     frame, source = traced.frame, job.traced
-    denoiser = _denoiser(job, frame)
+    denoiser = _denoiser(job)
     noisy = frame.pixels
     if frame.coverage is not None and (further := denoiser.coverage()) is not None:
         noisy = exchange_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)
-    cleaned = remove_excess(clean_light(noisy, frame.seen, denoiser), frame.excess)
+    cleaned = remove_excess(clean_light(noisy, frame.seen, denoiser, traced.samples), frame.excess)
     frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
     return replace(traced, options=_denoiser_options(denoiser), seconds={"denoise": denoiser.seconds})
 
 
-def _denoiser(job: Job, samples: FullInBatches | Frame) -> GuidedDenoiser:
-    """By the effort that the rays of ``samples`` are worth, or by that of all parts of the picture."""
-    common, asked = job.treatment, job.request.denoise
+def _denoiser(job: Job) -> GuidedDenoiser:
     return GuidedDenoiser(
         job.session.built,
         job.traced,
@@ -259,8 +250,7 @@ def _denoiser(job: Job, samples: FullInBatches | Frame) -> GuidedDenoiser:
         box_filter=job.request.box_filter,
         memory=job.session.memory,
         threads=job.session.engine.threads,
-        effort=lambda: effort_of(asked, _rays_per_pixel(job, samples.rays)) if common is None else common.effort,
-        exposure=None if common is None else common.exposure,
+        kind=job.request.denoise,
         shares=job.request.shares_light,
         progress=job.progress,
     )

@@ -14,7 +14,7 @@ from lippmann.display.pixel_window import PixelWindow
 from lippmann.image.encoding import stored_values
 from lippmann.journal.tile_file import TileResult
 from lippmann.progress import ProgressCallback, silent
-from lippmann.rendering.denoise.exposure_survey import Treatment, survey
+from lippmann.rendering.denoise.guided_denoiser import effort_of
 from lippmann.rendering.estimate.pixel_errors import ErrorSums, PixelErrors
 from lippmann.rendering.estimate.psnr import ERROR_LAYER
 from lippmann.rendering.film.sample_batches import FullInBatches
@@ -42,7 +42,7 @@ OF_SAMPLES = "samples "
 class Prepared:
     """A job with its scene on the device. Make one with :func:`prepare`, once in a process.
 
-    ``no_estimate`` says why tiles have no ``sums``, None if they have; ``treatment`` how all tiles are denoised.
+    ``no_estimate`` says why tiles have no ``sums``, None if they have.
     """
 
     job: TileJob
@@ -51,7 +51,6 @@ class Prepared:
     no_estimate: str | None
     integrator: Integrator
     source: DisplayRays
-    treatment: Treatment | None
 
     @property
     def options(self) -> dict[str, object]:
@@ -60,9 +59,10 @@ class Prepared:
         if job.surroundings is None:
             return {}
         cut: dict[str, object] = {"tile_side": job.side, "tile_margin": job.surroundings.margin}
-        if self.treatment is None:
+        if not job.request.denoises:
             return cut
-        return {**cut, "denoise": "oidn", "denoise_effort": self.treatment.effort, "denoise_form": "raw"}
+        effort = effort_of(job.request.denoise, job.request.samples)
+        return {**cut, "denoise": "oidn", "denoise_effort": effort, "denoise_form": "raw"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,10 +95,9 @@ def prepare(job: TileJob, progress: ProgressCallback = silent) -> Prepared:
     placement = session.place(job.display)
     source = DisplayRays(job.display, placement.world_from_display, bool(request.subpixels))
     integrator = session.integrator(source, placement.display_from_world, placement.exposure)
-    treatment = survey(integrator, source, request) if request.denoises else None
     # Tiles are traced in silence, whoever counts them.
     quiet = replace(session, watch=Stopwatch())
-    return Prepared(job, quiet, placement, why_no_estimate(request), integrator, source, treatment)
+    return Prepared(job, quiet, placement, why_no_estimate(request), integrator, source)
 
 
 def render_tile(prepared: Prepared, index: int) -> TileResult:
@@ -157,7 +156,7 @@ def _trace_window(prepared: Prepared, index: int) -> TracedTile:
             prepared.integrator,
             WindowRays(prepared.source, window),
             prepared.placement.display_from_world,
-            prepared.treatment,
+            is_part=job.request.denoises,
         )
     )
     inside = tile.relative_to(window).slices

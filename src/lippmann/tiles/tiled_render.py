@@ -235,8 +235,7 @@ def _summed(prepared: Prepared, store: TileStore) -> Provenance:
     size = grid.rows, grid.columns
     # Of denoised pictures the samples' errors, too.
     sums = {
-        before: ErrorSums.none(size[0] * size[1])
-        for before in (("",) if prepared.treatment is None else ("", OF_SAMPLES))
+        before: ErrorSums.none(size[0] * size[1]) for before in (("", OF_SAMPLES) if job.request.denoises else ("",))
     }
     # By their first places, each once.
     notes = dict.fromkeys(prepared.placement.warnings)

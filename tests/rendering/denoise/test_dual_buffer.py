@@ -63,7 +63,7 @@ class Noise:
         return PixelErrors(difference, blur=self.blurred)
 
 
-def blur(picture, turned=False):
+def blur(picture, samples=2, turned=False):
     padded = np.pad(picture, ((2, 2), (2, 2), (0, 0)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, (5, 5), axis=(0, 1))
     return windows.mean(axis=(-1, -2)).astype(np.float32)
@@ -79,7 +79,7 @@ def told_and_true(renderer, denoise):
     return float(told.values.mean()), true_error(denoised.picture(), renderer.truth)
 
 
-DENOISERS = {"blur": blur, "flat": lambda p, _: np.full_like(p, 0.3), "brighter": lambda p, _: p + np.float32(0.05)}
+DENOISERS = {"blur": blur, "flat": lambda p, *_: np.full_like(p, 0.3), "brighter": lambda p, *_: p + np.float32(0.05)}
 
 
 @pytest.mark.slow
@@ -101,14 +101,14 @@ def test_samples_that_take_the_place_of_worse_pixels_do_not_flatter(denoise):
 def test_noise_that_both_halves_share_would_not_be_seen_but_theirs_is_their_own():
     """The judge of a half is the other one: a denoiser that does nothing is told its whole noise."""
     renderer = Noise()
-    told = Denoised(renderer, lambda picture, _: picture, "srgb").squared_error()
+    told = Denoised(renderer, lambda picture, *_: picture, "srgb").squared_error()
     noise = true_error(np.mean(renderer.traced_halves(), axis=0), renderer.truth)
     assert float(told.values.mean()) == pytest.approx(noise, rel=0.2)
 
 
 def test_what_the_halves_differ_by_is_known():
     renderer = Noise()
-    told = Denoised(renderer, lambda picture, _: picture, "srgb").squared_error()
+    told = Denoised(renderer, lambda picture, *_: picture, "srgb").squared_error()
     # Halves that are their samples have nothing wrong in common.
     assert float(told.apart.mean()) == pytest.approx(float(told.values.mean()), rel=0.2)
     assert told.apart.min() >= 0
@@ -126,7 +126,7 @@ def test_seen_light_goes_past_the_denoiser(as_denoised):
         half += light
     given = []
 
-    def denoise(picture, turned):
+    def denoise(picture, samples, turned):
         given.append(picture.max())
         return blur(picture)
 
@@ -177,7 +177,7 @@ def test_an_emitter_in_a_narrow_lobe_does_not_light_the_pixels_beside_it():
         half[50, 50] += 30.0
     given = []
 
-    def denoise(picture, turned):
+    def denoise(picture, samples, turned):
         given.append(picture)
         return picture
 
@@ -219,10 +219,10 @@ def test_a_pixel_that_both_halves_hit_hard_does_not_hide_what_is_wrong_elsewhere
     """A caustic's rare light: the product of two hits is larger than any error of a code. Of few samples it counts."""
     renderer = Noise()
     renderer.samples = samples
-    clear = float(Denoised(renderer, lambda p, _: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
+    clear = float(Denoised(renderer, lambda p, *_: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
     for half in renderer.traced_halves():
         half[100, 100] += 15
-    told = float(Denoised(renderer, lambda p, _: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
+    told = float(Denoised(renderer, lambda p, *_: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
     assert (told > 2 * clear) == hidden
 
 
@@ -240,17 +240,17 @@ def test_more_samples_are_cleaned_anew():
     renderer = Noise()
     calls = []
 
-    def denoise(picture, turned):
-        calls.append(turned)
+    def denoise(picture, samples, turned):
+        calls.append((samples, turned))
         return picture
 
     denoised = Denoised(renderer, denoise, "srgb")
     denoised.picture(), denoised.squared_error()
     # Halves that the network sees another way: of itself it gets other things wrong.
-    assert calls == [False, True]
+    assert calls == [(2, False), (2, True)]
     renderer.add(4)
     denoised.picture()
-    assert (len(calls), renderer.added) == (4, 4)
+    assert (calls[2:], renderer.added) == ([(6, False), (6, True)], 4)
     renderer.add(2)
     denoised.picture()
     assert len(calls) == 6
@@ -259,7 +259,7 @@ def test_more_samples_are_cleaned_anew():
 def test_a_single_sample_has_no_halves():
     renderer = Noise()
     renderer.samples = 1
-    assert np.array_equal(Denoised(renderer, lambda p, _: p * 2, "srgb").picture(), 2 * renderer.picture())
+    assert np.array_equal(Denoised(renderer, lambda p, *_: p * 2, "srgb").picture(), 2 * renderer.picture())
 
 
 @pytest.mark.long
@@ -285,12 +285,12 @@ def test_light_spread_beyond_white_is_not_lost_where_codes_are_cut_off(transfer,
     random = np.random.default_rng(4)
     renderer = Noise()
     renderer._halves = [truth + random.normal(0, 0.02, SHAPE).astype(np.float32) for _ in range(2)]
-    told = Denoised(renderer, lambda p, _: np.full_like(p, 1.2), transfer).squared_error()
+    told = Denoised(renderer, lambda p, *_: np.full_like(p, 1.2), transfer).squared_error()
     code = encode_srgb(np.float64(0.35)) if transfer == "srgb" else 0.35
     assert float(told.values.mean()) == pytest.approx((1 - code) ** 2, rel=0.05)
     # White beyond white is as white.
     renderer._halves = [half + np.float32(2) for half in renderer._halves]
-    assert float(np.abs(Denoised(renderer, lambda p, _: p + 1, transfer).squared_error().values).max()) < 1e-12
+    assert float(np.abs(Denoised(renderer, lambda p, *_: p + 1, transfer).squared_error().values).max()) < 1e-12
 
 
 def test_where_codes_are_steep_the_whole_step_counts(as_denoised):
@@ -299,7 +299,7 @@ def test_where_codes_are_steep_the_whole_step_counts(as_denoised):
     random = np.random.default_rng(5)
     renderer = Noise()
     renderer._halves = [truth + random.normal(0, 0.0005, SHAPE).astype(np.float32) for _ in range(2)]
-    told = Denoised(renderer, lambda p, _: np.full_like(p, 0.02), "srgb").squared_error()
+    told = Denoised(renderer, lambda p, *_: np.full_like(p, 0.02), "srgb").squared_error()
     step = float(encode_srgb(np.float64(0.02)) - encode_srgb(np.float64(0.001)))
     assert step**2 < 1.5 * float(told.values.mean())
     assert float(told.values.mean()) < step**2

@@ -6,7 +6,7 @@ import numpy as np
 import pyoidn
 import pytest
 
-from lippmann.rendering.denoise import oidn_device
+from lippmann.rendering.denoise import oidn
 from lippmann.rendering.denoise.oidn import denoise
 
 
@@ -20,10 +20,10 @@ def gpu(monkeypatch):
     """An engine on the GPU, and a device there; which one is told by its kind."""
 
     def be(kind):
-        monkeypatch.setattr(oidn_device.engine, "runs_on_gpu", lambda: True)
+        monkeypatch.setattr(oidn.engine, "runs_on_gpu", lambda: True)
         monkeypatch.setattr(pyoidn.Device, "is_cuda_available", staticmethod(lambda number=0: True))
         monkeypatch.setattr(pyoidn, "OIDN_DEVICE_TYPE_CUDA", kind)
-        monkeypatch.setattr(oidn_device, "_devices", {})
+        monkeypatch.setattr(oidn, "_devices", {})
 
     return be
 
@@ -32,11 +32,11 @@ def gpu(monkeypatch):
 @pytest.mark.parametrize("turned", [False, True])
 def test_buffers_hold_what_arrays_hold(gpu, effort, turned):
     color, albedo, normal = pictures()
-    options = {"clean_guides": True, "effort": effort, "turned": turned, "exposure": 0.7, "threads": 1}
+    options = {"clean_guides": True, "effort": effort, "turned": turned, "threads": 1}
     by_arrays = denoise(color, albedo, normal, **options)
     gpu(pyoidn.OIDN_DEVICE_TYPE_CPU)
     by_buffers = denoise(color, albedo, normal, **options)
-    assert list(oidn_device._devices) == [None]
+    assert list(oidn._devices) == [None]
     assert np.array_equal(by_buffers, by_arrays)
 
 
@@ -45,7 +45,7 @@ def test_what_the_gpu_cannot_do_is_left_to_the_cpu(gpu):
     expected = denoise(color, threads=1)
     gpu(pyoidn.OIDN_DEVICE_TYPE_HIP)  # such devices are in no package
     assert np.array_equal(denoise(color, threads=1), expected)
-    assert list(oidn_device._devices) == [1]
+    assert list(oidn._devices) == [1]
 
 
 def test_a_gpu_that_runs_out_of_memory_is_left_too(gpu, monkeypatch):
@@ -66,4 +66,4 @@ def test_a_gpu_that_runs_out_of_memory_is_left_too(gpu, monkeypatch):
     monkeypatch.setattr(pyoidn, "Buffer", Full)
     assert np.array_equal(denoise(color, threads=1), expected)
     assert not released
-    assert set(oidn_device._devices) == {None, 1}
+    assert set(oidn._devices) == {None, 1}

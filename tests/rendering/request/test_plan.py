@@ -7,7 +7,8 @@ import pytest
 
 from lippmann.display import load_display
 from lippmann.options.choices import ASKED
-from lippmann.rendering.denoise.cost_model import HIGH_FROM, denoising_cost, effort_of, traced_work
+from lippmann.rendering.denoise.guided_denoiser import effort_of
+from lippmann.rendering.denoise.tuning import TUNING
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import Choice, RenderRequest
 from lippmann.scene.readers.load import load_scene
@@ -75,16 +76,10 @@ def test_what_has_no_noise_is_not_denoised():
     assert "no noise" in found.reason
 
 
-def test_effort_follows_the_rays_unless_it_is_named():
-    assert [effort_of("oidn", rays) for rays in (HIGH_FROM - 1, HIGH_FROM)] == ["fast", "high"]
-    assert [effort_of(name, 1e6) for name in ("oidn-fast", "oidn-high")] == ["fast", "high"]
-    assert effort_of("oidn-high", 0) == "high"
-    assert denoising_cost("fast") < denoising_cost("high") < HIGH_FROM
-
-
-def test_shadow_rays_are_less_work_than_those_that_are_shaded():
-    assert traced_work(4, 0, 6) == 10
-    assert traced_work(4, 0, 6) < traced_work(4, 6, 6) < traced_work(4, 0, 12)
+def test_effort_follows_the_samples_unless_it_is_named():
+    assert [effort_of("oidn", samples) for samples in (TUNING.high_from - 1, TUNING.high_from)] == ["fast", "high"]
+    assert [effort_of(name, 1000) for name in ("oidn-fast", "oidn-high")] == ["fast", "high"]
+    assert effort_of("oidn-high", 1) == "high"
 
 
 def test_a_photograph_has_one_ray_a_pixel_and_keeps_its_colours():

@@ -43,9 +43,9 @@ if TYPE_CHECKING:
     from lippmann.rendering.film.batched_picture import BatchedPicture
 
 Floats = NDArray[np.float32]
-#: A clean picture from a noisy one; and whether that is to be turned, see
+#: A clean picture from a noisy one of so many samples; and whether that is to be turned, see
 #: :func:`~lippmann.rendering.denoise.oidn.denoise`.
-Denoise = Callable[[Floats, bool], Floats]
+Denoise = Callable[[Floats, int, bool], Floats]
 
 
 class Denoised:
@@ -117,14 +117,17 @@ class Denoised:
         if coverage is not None:
             (paths, further), (more_paths, more_further) = coverage
             noisy = exchange_coverage(noisy, paths + more_paths, further + more_further, threads=self._threads)
-        return self._renderer.shown(clean_light(noisy, self._renderer.seen(), self._denoise))
+        return self._renderer.shown(clean_light(noisy, self._renderer.seen(), self._denoise, self._renderer.samples))
 
     def _clean_halves(self) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
         if self._halves is None or self._samples_of_halves != self._renderer.samples:
             self._samples_of_halves = self._renderer.samples
             traced, seen = self._noisy_halves(), self._renderer.seen_halves() or (None, None)
             first, second = (
-                self._renderer.shown(clean_light(traced[k], seen[k], self._denoise, turned=k == 1)) for k in (0, 1)
+                self._renderer.shown(
+                    clean_light(traced[k], seen[k], self._denoise, self._renderer.samples, turned=k == 1)
+                )
+                for k in (0, 1)
             )
             noisy = self._renderer.shown(traced[0]), self._renderer.shown(traced[1])
             own = weigh_samples(noisy, (first, second), self._transfer, threads=self._threads)
@@ -162,7 +165,7 @@ class Denoised:
         return slope
 
 
-def clean_light(noisy: Floats, seen: Floats | None, denoise: Denoise, turned: bool = False) -> Floats:
+def clean_light(noisy: Floats, seen: Floats | None, denoise: Denoise, samples: int, turned: bool = False) -> Floats:
     """What was traced without its noise, but for light that goes past the denoiser.
 
     Seen light, where the renderer keeps it apart, has hardly any noise, and highlights that a denoiser takes for such:
@@ -179,13 +182,13 @@ def clean_light(noisy: Floats, seen: Floats | None, denoise: Denoise, turned: bo
         ``(H, W, 3)`` linear.
     seen:
         What of it is seen light; None where that is not known.
-    denoise, turned:
+    denoise, samples, turned:
         From a noisy picture to a clean one; see :data:`Denoise`.
     """
     limit = np.float32(TUNING.far_beyond_white)
     past = np.float32(0) if seen is None else np.where(seen > limit, np.maximum(noisy - limit, seen), seen)
     rest = noisy - past
-    clean = denoise(np.minimum(rest, limit), turned) + past
+    clean = denoise(np.minimum(rest, limit), samples, turned) + past
     if (rest > limit).any():
         clean += np.where(clean - past >= np.float32(0.75) * limit, np.maximum(rest - limit, 0), np.float32(0))
     return clean

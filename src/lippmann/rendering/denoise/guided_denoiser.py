@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.options.choices import Denoiser
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.denoise.cost_model import GUIDE_SAMPLES, RUN_COST, SHARING_STOP, denoising_cost
 from lippmann.rendering.denoise.oidn import Effort, denoise
-from lippmann.rendering.denoise.oidn_masked import SurfacePart, denoise_seen
-from lippmann.rendering.denoise.pixel_order import best_form, denoise_views
+from lippmann.rendering.denoise.pixel_order import SurfacePart, best_form, denoise_seen, denoise_views
+from lippmann.rendering.denoise.tuning import TUNING
 from lippmann.rendering.film.coverage import Coverage
 from lippmann.rendering.film.feature_buffers import Guides, plan_guides, trace_guides
 from lippmann.rendering.sharing.cross_lens import lens_numbers, lens_numbers_in_full_color, share_light
@@ -38,10 +37,8 @@ class GuidedDenoiser:
         Bytes that may be used.
     threads:
         Of the denoiser.
-    effort:
-        Asked before every picture.
-    exposure:
-        As of :func:`~lippmann.rendering.denoise.oidn.denoise`, for windows.
+    kind:
+        The network's effort, or "oidn" for that which the samples are worth.
     shares:
         Micro-images share their light, see :mod:`lippmann.rendering.sharing.cross_lens`, and so do the views of a
         quilt, see :mod:`lippmann.rendering.sharing.cross_view`.
@@ -64,8 +61,7 @@ class GuidedDenoiser:
         box_filter: bool,
         memory: int,
         threads: int,
-        effort: Callable[[], Effort],
-        exposure: float | None = None,
+        kind: Denoiser,
         shares: bool = False,
         progress: ProgressCallback = silent,
     ) -> None:
@@ -76,27 +72,25 @@ class GuidedDenoiser:
         self._box_filter = box_filter
         self._memory = memory
         self._threads = threads
-        self._effort = effort
-        self._exposure = exposure
+        self._kind: Denoiser = kind
         self._shares = shares
         self._lenses: NDArray[np.int32] | None = None
         self._progress = progress
         self._guides: Guides | None = None
-        self._guide_samples = 0
         #: Of every tile of the source, by the guides.
         self._surfaces: list[SurfacePart | None] = []
         self._form: Literal["raw", "views"] | None = None
         self.seconds = 0.0
         self.used: Effort = "fast"
 
-    def __call__(self, pixels: Floats, turned: bool = False) -> Floats:
+    def __call__(self, pixels: Floats, samples: int, turned: bool = False) -> Floats:
         """A picture without its noise, which has shared its light: views of a quilt before it is clean.
 
-        ``turned`` is that of :func:`~lippmann.rendering.denoise.oidn.denoise`.
+        ``samples`` are those of each pixel, ``turned`` is that of :func:`~lippmann.rendering.denoise.oidn.denoise`.
         """
         started = time.perf_counter()
         self._progress(Progress("denoise", 0, 1))
-        self.used = self._effort()
+        self.used = effort_of(self._kind, samples)
         guides = self.guides()
         if self._shares and isinstance(self._source, QuiltRays):
             pixels = share_views(pixels, self._source, guides)
@@ -122,28 +116,27 @@ class GuidedDenoiser:
             clean,
             source.display,
             self.guides(),
-            stop=SHARING_STOP[self.used],
+            stop=TUNING.sharing_stop,
             lenses=self._lenses,
             columns=3 if isinstance(source, SubpixelRays) else 1,
         )
 
     def coverage(self) -> tuple[Coverage, Coverage] | None:
-        """By either half of the rays of the guides that the next picture is cleaned with."""
+        """By either half of the rays of the guides."""
         started = time.perf_counter()
-        self.used = self._effort()
         found = self.guides().coverage
         self.seconds += time.perf_counter() - started
         return found
 
-    def probe(self) -> float:
-        """Seconds that a picture cleaned by halves takes, guides included, by a small one."""
+    def probe(self, samples: int) -> float:
+        """Seconds that a picture of so many samples takes, cleaned by halves, guides included, by a small one."""
         side = 128
         small = np.zeros((side, side, 3), dtype=np.float32)
         denoise(small, small, small, clean_guides=True, effort="fast", threads=self._threads)  # starts its threads
         started = time.perf_counter()
         denoise(small, small, small, clean_guides=True, effort="fast", threads=self._threads)
-        spent = (time.perf_counter() - started) / RUN_COST["fast"] * denoising_cost(self._effort())
-        return spent * self._source.width * self._source.height / side**2
+        runs = TUNING.high_runs if effort_of(self._kind, samples) == "high" else TUNING.fast_runs
+        return runs * (time.perf_counter() - started) * self._source.width * self._source.height / side**2
 
     def _cleaned(self, pixels: Floats, guides: Guides, turned: bool) -> Floats:
         source = self._source
@@ -158,7 +151,6 @@ class GuidedDenoiser:
                 guides.albedo[tile],
                 guides.normal[tile],
                 surfaces,
-                exposure=self._exposure,
                 effort=self.used,
                 turned=turned,
                 threads=self._threads,
@@ -166,14 +158,12 @@ class GuidedDenoiser:
         return result
 
     def guides(self) -> Guides:
-        """Albedo and normal of what the pixels see, of as many samples as the effort is worth."""
-        samples = GUIDE_SAMPLES[self.used]
-        if self._guides is None or samples > self._guide_samples:
-            self._guide_samples, self._surfaces = samples, []
+        """Albedo and normal of what the pixels see."""
+        if self._guides is None:
             self._guides = trace_guides(
                 self._built,
                 self._source,
-                plan_guides(self._source, samples, self._memory),
+                plan_guides(self._source, TUNING.guide_samples, self._memory),
                 self._display_from_world,
                 # Samples of their own: with those of one half of the picture the guides would show its noise, and the
                 # denoised other half would agree with it.
@@ -193,3 +183,10 @@ class GuidedDenoiser:
                 # together that they are more alike than views' pixels.
                 self._form = "views" if isinstance(self._source, QuiltRays) else "raw"
         return self._form
+
+
+def effort_of(kind: Denoiser, samples: int) -> Effort:
+    """The effort that the user's word names, or that so many samples of each pixel deserve where it names none."""
+    if kind in ("oidn-fast", "oidn-high"):
+        return "fast" if kind == "oidn-fast" else "high"
+    return "high" if samples >= TUNING.high_from else "fast"

@@ -7,21 +7,24 @@ Dr.Jit's: neither pins them to cores.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import ModuleType
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.errors import UsageError
-from lippmann.rendering.denoise.oidn_device import filtered
-from lippmann.runtime import machine
+from lippmann.errors import EngineError, UsageError
+from lippmann.runtime import engine, machine
 from lippmann.runtime.engine_lock import exclusive
 
 if TYPE_CHECKING:
+    from pyoidn import Device as OidnDevice
     from pyoidn import Filter as OidnFilter
 
 FloatArray = NDArray[np.float32]
+SetUp = Callable[["OidnFilter"], None]
 Effort = Literal["high", "fast"]
 
 #: The network's names of the qualities. In between lies "balanced": with clean guides 0.5 dB better than "fast" for
@@ -38,7 +41,6 @@ def denoise(
     normal: NDArray[np.generic] | None = None,
     *,
     clean_guides: bool = False,
-    exposure: float | None = None,
     effort: Effort = "high",
     turned: bool = False,
     threads: int | None = None,
@@ -48,16 +50,13 @@ def denoise(
     Parameters
     ----------
     color:
-        ``(H, W, 3)`` linear RGB, finite.
+        ``(H, W, 3)`` linear RGB, finite; white is 1.
     albedo, normal:
         Guides of the same shape: reflectance in [0, 1], and vectors with components in [-1, 1] of any frame (the zero
         vector where nothing is seen). They may be noisy. A normal needs an albedo beside it.
     clean_guides:
         The guides hold no noise: finer detail is kept, and so would noise be. With the effort
         ``high`` that takes twice the time.
-    exposure:
-        What values are multiplied by for the network, and divided by again: the same for all parts of one picture. None
-        suits it to the picture's brightness.
     effort:
         ``fast`` takes half the time of ``high``, a fifth with clean guides, for about 1 dB.
     turned:
@@ -91,12 +90,23 @@ def denoise(
                 rule = f"that of the picture is {images['color'].shape}"
                 raise UsageError(f"the {name} has the shape {images[name].shape}", parameter="denoise", rule=rule)
     options = {"hdr": True, "cleanAux": clean_guides and albedo is not None}
+    pyoidn = load_denoiser()
+
+    def set_up(work: OidnFilter) -> None:
+        for name, value in options.items():
+            work.set_bool(name, value)
+        # White is 1, in every part of a picture and however bright it is.
+        work.set_float("inputScale", 1.0)
+        work.set_quality(getattr(pyoidn, _QUALITY[effort]))
+
+    shown = {name: _turned(image) for name, image in images.items()} if turned else images
+    # One device serves one filter at a time, and its threads do not survive a fork.
+    with exclusive():
+        result = _filtered(pyoidn, shown, set_up, threads or machine.usable_cores())
     if not turned:
-        return _filtered(images, options, effort, threads, exposure)
-    shown = {name: _turned(image) for name, image in images.items()}
+        return result
     height, width = images["color"].shape[:2]
-    result = _filtered(shown, options, effort, threads, exposure)[-height:, -width:]
-    return np.ascontiguousarray(result[::-1, ::-1])
+    return np.ascontiguousarray(result[-height:, -width:][::-1, ::-1])
 
 
 def _turned(image: FloatArray) -> FloatArray:
@@ -119,27 +129,6 @@ def _picture(values: NDArray[np.generic], name: str) -> FloatArray:
         # The network would smear a single one over its whole neighbourhood.
         raise UsageError(f"the {name} holds values that are not finite", parameter="denoise", fix="replace them")
     return array
-
-
-def _filtered(
-    images: dict[str, FloatArray],
-    options: dict[str, bool],
-    effort: Effort,
-    threads: int | None,
-    exposure: float | None = None,
-) -> FloatArray:
-    pyoidn = load_denoiser()
-
-    def set_up(work: OidnFilter) -> None:
-        for name, value in options.items():
-            work.set_bool(name, value)
-        if exposure is not None:
-            work.set_float("inputScale", exposure)
-        work.set_quality(getattr(pyoidn, _QUALITY[effort]))
-
-    # One device serves one filter at a time, and its threads do not survive a fork.
-    with exclusive():
-        return filtered(pyoidn, images, set_up, threads or machine.usable_cores())
 
 
 def load_denoiser() -> ModuleType:
@@ -172,3 +161,109 @@ def denoiser_version() -> str | None:
     except (UsageError, OSError):  # not installed, or a library that does not load: reported where it is used
         return None
     return f"{'.'.join(map(str, numbers))} (pyoidn {version('pyoidn')})"
+
+
+# ---- Devices: the GPU if the engine runs there, else the CPU ----
+
+#: Devices by their CPU threads, made once: that takes longer than a small picture. No threads: the GPU's.
+_devices: dict[int | None, OidnDevice] = {}
+
+
+def _filtered(pyoidn: ModuleType, images: dict[str, FloatArray], set_up: SetUp, threads: int) -> FloatArray:
+    """What a filter makes of ``images``, packed ``(H, W, 3)`` by the filter's names for them.
+
+    A GPU that cannot do it, for want of memory say, leaves it to the CPU.
+
+    Raises
+    ------
+    EngineError
+        Open Image Denoise fails on the CPU.
+    """
+    if engine.runs_on_gpu() and pyoidn.Device.is_cuda_available(0):
+        try:
+            return _on_gpu(pyoidn, images, set_up)
+        except EngineError:
+            pass
+    return _on_cpu(pyoidn, images, set_up, threads)
+
+
+def _on_cpu(pyoidn: ModuleType, images: dict[str, FloatArray], set_up: SetUp, threads: int) -> FloatArray:
+    output = np.empty_like(next(iter(images.values())))
+    device = _cpu(pyoidn, threads)
+    with _filter(pyoidn, device) as work:
+        for name, image in (*images.items(), ("output", output)):
+            work.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
+        _run(device, work, set_up)
+    return output
+
+
+def _on_gpu(pyoidn: ModuleType, images: dict[str, FloatArray], set_up: SetUp) -> FloatArray:
+    """The same by copies in the GPU's memory, which does not see the processor's."""
+    output = np.empty_like(next(iter(images.values())))
+    height, width = output.shape[:2]
+    device = _gpu(pyoidn)
+    buffers = []
+    try:
+        with _filter(pyoidn, device) as work:
+            for name, image in (*images.items(), ("output", output)):
+                buffer = pyoidn.Buffer(device, image.nbytes)
+                buffers.append(buffer)
+                _check(device)
+                if image is not output:
+                    buffer.write(0, image.nbytes, _bytes(image))
+                work.set_image(name, buffer, pyoidn.OIDN_FORMAT_FLOAT3, width, height)
+            _run(device, work, set_up)
+            buffers[-1].read(0, output.nbytes, _bytes(output))
+            _check(device)
+    finally:
+        for buffer in buffers:
+            buffer.release()
+    return output
+
+
+def _bytes(image: FloatArray) -> NDArray[np.uint8]:
+    return image.reshape(-1).view(np.uint8)
+
+
+@contextmanager
+def _filter(pyoidn: ModuleType, device: OidnDevice) -> Iterator[OidnFilter]:
+    work = pyoidn.Filter(device, pyoidn.OIDN_FILTER_TYPE_RT)
+    try:
+        yield work
+    finally:
+        work.release()
+
+
+def _run(device: OidnDevice, work: OidnFilter, set_up: SetUp) -> None:
+    set_up(work)
+    work.commit()
+    work.execute()
+    _check(device)
+
+
+def _cpu(pyoidn: ModuleType, threads: int) -> OidnDevice:
+    if threads not in _devices:
+        device = pyoidn.Device(pyoidn.OIDN_DEVICE_TYPE_CPU)
+        device.set_int("numThreads", threads)
+        # Dr.Jit's threads share the cores: pinned ones would wait for each other.
+        device.set_bool("setAffinity", False)
+        _devices[threads] = _ready(device)
+    return _devices[threads]
+
+
+def _gpu(pyoidn: ModuleType) -> OidnDevice:
+    if None not in _devices:
+        _devices[None] = _ready(pyoidn.Device(pyoidn.OIDN_DEVICE_TYPE_CUDA))
+    return _devices[None]
+
+
+def _ready(device: OidnDevice) -> OidnDevice:
+    device.commit()
+    _check(device)
+    return device
+
+
+def _check(device: OidnDevice) -> None:
+    message = device.get_error()
+    if message:
+        raise EngineError(f"Open Image Denoise fails: {message}", parameter="denoise", fix='render with denoise="none"')

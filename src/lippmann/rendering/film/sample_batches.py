@@ -39,7 +39,7 @@ from lippmann.rendering.film.wavefront import (
 from lippmann.rendering.film.wavefront_plan import Run, cut_batches
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
-from lippmann.rendering.transport.ray_source import PixelRays, RaySource, pixel_number
+from lippmann.rendering.transport.ray_source import PixelRays, RaySource, SubpixelRays, pixel_number
 
 Floats = NDArray[np.float32]
 
@@ -133,6 +133,10 @@ class FullInBatches(BatchedPicture):
             self._taken = taken
         self.seconds_compile += compiled
         self.seconds_trace += time.perf_counter() - started - compiled
+
+    def shown(self, values: Floats) -> Floats:
+        """``(..., H, W, 3)``; of sub-pixels whose rays keep all colours, ``(..., H, 3 W, 3)``, each its own colour."""
+        return self._source.own_colors(values) if isinstance(self._source, SubpixelRays) else values
 
     def _runs(self, samples: int) -> Iterator[Run]:
         """Wavefronts that take ``samples`` more of every pixel."""

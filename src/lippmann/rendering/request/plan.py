@@ -299,7 +299,7 @@ def _denoise(facts: _Facts, method: Choice[Method]) -> Choice[Denoiser]:
         (facts.scene.lies_off_surfaces, "none", "light that lies on no surface is not denoised"),
         (request.denoise != "auto", request.denoise, ASKED),
         (is_draft, "oidn-fast", "a draft"),
-        (method.value == "pooled", "oidn", "pooled light is denoised, with the effort that its rays are worth"),
+        (method.value == "pooled", "oidn", "pooled light is denoised, with the effort that its samples are worth"),
         (request.method == "full", "none", "full rendering for references"),
         (True, "none", method.reason),
     )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lippmann.rendering.denoise import oidn_masked as module
-from lippmann.rendering.denoise.oidn_masked import EDGE, MARGIN, SurfacePart, denoise_seen
+from lippmann.rendering.denoise import pixel_order as module
+from lippmann.rendering.denoise.pixel_order import EDGE, MARGIN, SurfacePart, denoise_seen
 
 SHAPE = (200, 260)
 
@@ -35,9 +35,7 @@ def layers(*surfaces):
 
 def test_the_rectangle_of_all_surfaces_is_shown_and_they_are_cleaned(calls):
     color, albedo, normal = layers((70, 100), (90, 47))
-    result = denoise_seen(
-        color, albedo, normal, SurfacePart.of(normal), effort="fast", exposure=2.0, turned=True, threads=1
-    )
+    result = denoise_seen(color, albedo, normal, SurfacePart.of(normal), effort="fast", turned=True, threads=1)
     cleaned = np.zeros(SHAPE, bool)
     for row, column in ((70, 100), (90, 47)):
         cleaned[row - EDGE : row + EDGE + 1, column - EDGE : column + EDGE + 1] = True
@@ -47,7 +45,7 @@ def test_the_rectangle_of_all_surfaces_is_shown_and_they_are_cleaned(calls):
     for part, whole in zip(shown, (color, albedo, normal), strict=True):
         # It begins where the network's steps do.
         np.testing.assert_array_equal(part, whole[48 : 91 + MARGIN, 16 : 101 + MARGIN])
-    assert options == {"effort": "fast", "exposure": 2.0, "turned": True, "threads": 1, "clean_guides": True}
+    assert options == {"effort": "fast", "turned": True, "threads": 1, "clean_guides": True}
 
 
 def test_at_the_edge_the_picture_ends(calls):
