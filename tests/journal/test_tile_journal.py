@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 from lippmann.errors import OutputError, PictureError
-from lippmann.journal import DamagedTile, TileGrid, TileResult, TileStore, encode, journal_of
+from lippmann.journal import DamagedTile, TileGrid, TileResult, TileStore, encode, journal_of, tile_journal
 from lippmann.journal.tile_journal import sweep_beside
+from lippmann.runtime.unfinished import undo_all
 
 GRID = TileGrid(100, 70, 32)
 JOB = {"spp": "4", "scene": "room"}
@@ -228,3 +229,40 @@ def test_a_name_too_long_for_the_journal_is_refused_at_once(tmp_path):
         pass
     with pytest.raises(OutputError, match=r"the name is too long for the journal beside it; 1 bytes less fit"):
         TileStore.open(tmp_path / ("a" * (longest - 3) + ".tif"), JOB, TileGrid(100, 70, 32), resume=False)
+
+
+@pytest.mark.parametrize("struck", ["locked", "_is_begun", "replacing"])
+def test_a_journal_that_is_interrupted_while_it_is_made_leaves_nothing(output, monkeypatch, struck):
+    """Each of the steps is done, and Ctrl-C strikes before the next one."""
+    real, calls = getattr(tile_journal, struck), []
+
+    def interrupted(*words, **more):
+        calls.append(real(*words, **more))
+        if struck == "_is_begun" and len(calls) == 1:
+            return calls[0]
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(tile_journal, struck, interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        opened(output)
+    monkeypatch.undo()
+    if struck == "locked":
+        calls[0].close()  # as the end of the process does
+    undo_all()
+    assert list(output.parent.iterdir()) == []
+
+
+def test_an_interrupt_while_a_journal_is_put_away_leaves_nothing(output, monkeypatch):
+    with opened(output) as store:
+        for index in range(len(GRID)):
+            store.put(tile(index))
+        monkeypatch.setattr(tile_journal, "clear", _struck)
+        with pytest.raises(KeyboardInterrupt):
+            store.finish()
+    monkeypatch.undo()
+    undo_all()
+    assert list(output.parent.iterdir()) == []
+
+
+def _struck(*words: object) -> None:
+    raise KeyboardInterrupt

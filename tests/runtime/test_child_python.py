@@ -125,3 +125,29 @@ def test_spawned_processes_do_not_hear_interrupts():
     with child_python.spawn_safely(), context.Pool(1) as pool:
         assert pool.apply(signal.pthread_sigmask, (signal.SIG_BLOCK, ())) == {signal.SIGINT}
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+#: A process that leaves without a word while a child's semaphore is not released.
+LEAKS = """
+import multiprocessing, os
+from lippmann.runtime.child_python import end_children, spawn_safely
+context = multiprocessing.get_context("spawn")
+if __name__ == "__main__":
+    with spawn_safely():
+        semaphore = context.Semaphore()
+        child = context.Process(target=print, args=("never",))
+        child.start()
+        end_children(for_good=True)
+        assert not child.is_alive()
+        try:
+            context.Process(target=print).start()
+        except OSError as error:
+            print(error, flush=True)
+        os._exit(3)
+"""
+
+
+@pytest.mark.slow
+def test_children_that_are_ended_leave_nothing_to_say():
+    done = subprocess.run([sys.executable, "-c", LEAKS], capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout.splitlines()[-1:], done.stderr) == (3, ["this process is ending"], "")

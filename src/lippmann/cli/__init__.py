@@ -1,6 +1,7 @@
 """The command line: parse, call the library, leave with an exit code (:mod:`~lippmann.cli.outcome`).
 
-Nothing is imported here that takes time: Ctrl-C is one line from the first moment.
+Nothing is imported here that takes time: Ctrl-C is one line from the first moment. SIGTERM, and SIGHUP of a terminal
+that is closed, end a command as Ctrl-C does.
 """
 
 from __future__ import annotations
@@ -14,15 +15,26 @@ import time
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from typing import NoReturn
+
+#: Signals that end a command, and what they do by default.
+_ENDS = (
+    (_signal.SIGINT, _signal.default_int_handler),
+    *((getattr(_signal, name), _signal.SIG_DFL) for name in ("SIGTERM", "SIGHUP") if hasattr(_signal, name)),
+)
+#: Seconds after such a signal in which others are not heard, so that files and workers are put in order. After that the
+#: end itself has come to a halt.
+_DEAF = 5.0
+
+_heard_at = -_DEAF
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run one command and leave the process with its exit code."""
-    # A process that was started with interrupts ignored leaves them so.
-    is_heard = _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler
-    if is_heard:
-        _signal.signal(_signal.SIGINT, _leave_early)
+    # Signals that the process was started to ignore, as by nohup, stay ignored.
+    ends = [number for number, default in _ENDS if _signal.getsignal(number) == default]
+    _hear(ends, _leave_early)
     from lippmann.cli import app, outcome
     from lippmann.cli.shared import standard_streams
     from lippmann.cli.shared.exit_codes import INTERRUPTED
@@ -33,17 +45,30 @@ def main(arguments: list[str] | None = None) -> None:
     words = [word for word in words if word != "--debug"]
     app.app_of(words)  # while an interrupt still ends the process at once
     try:
-        if is_heard:
-            sys.unraisablehook = _hear_again
-            _signal.signal(_signal.SIGINT, _signal.default_int_handler)
+        sys.unraisablehook = _hear_again
+        _hear(ends, _interrupt)
         code = outcome.run(words, debug=debug)
     except KeyboardInterrupt:
         code = outcome.stopped()
-    if is_heard:
-        _signal.signal(_signal.SIGINT, lambda *_: os._exit(code))
+    if code == INTERRUPTED:
+        _put_in_order()
+    _hear(ends, lambda *_: os._exit(code))
     if code == INTERRUPTED:
         _end_at_once(code)
     sys.exit(code)
+
+
+def _hear(numbers: Sequence[int], handler: object) -> None:
+    for number in numbers:
+        _signal.signal(number, handler)
+
+
+def _interrupt(*_: object) -> None:
+    """Ctrl-C during a command."""
+    global _heard_at
+    if time.monotonic() - _heard_at >= _DEAF:
+        _heard_at = time.monotonic()
+        raise KeyboardInterrupt
 
 
 def run(words: list[str], *, debug: bool = False) -> int:
@@ -63,7 +88,9 @@ def _leave_early(*_: object) -> NoReturn:
 
 def _hear_again(error: sys.UnraisableHookArgs) -> None:
     """An interrupt that struck where nothing can be raised, such as in a destructor, comes again."""
+    global _heard_at
     if issubclass(error.exc_type, KeyboardInterrupt):
+        _heard_at = -_DEAF
         _thread.start_new_thread(_interrupt_soon, ())
     else:
         sys.__unraisablehook__(error)
@@ -74,16 +101,20 @@ def _interrupt_soon() -> None:
     os.kill(os.getpid(), _signal.SIGINT)
 
 
+def _put_in_order() -> None:
+    """End the processes and remove the files of a command that Ctrl-C has ended, where it struck in that very work."""
+    from lippmann.runtime import child_python, unfinished
+
+    child_python.end_children(for_good=True)
+    unfinished.undo_all()
+
+
 def _end_at_once(code: int) -> NoReturn:
     """Leave the process without taking the interpreter down.
 
-    Wherever Ctrl-C struck, files and folders are in order again by now; but an engine that was stopped in the middle of
-    loading or compiling may still be at work in threads of its own, and breaks an interpreter that ends under it.
+    An engine that was stopped in the middle of loading or compiling may still be at work in threads of its own, and
+    breaks an interpreter that ends under it.
     """
-    import multiprocessing
-
-    for child in multiprocessing.active_children():
-        child.kill()
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()

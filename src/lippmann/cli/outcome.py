@@ -8,6 +8,7 @@ from __future__ import annotations
 import errno
 import re
 import sys
+from contextlib import suppress
 
 from typer import BadParameter
 
@@ -15,6 +16,7 @@ from lippmann.cli.shared import command_clock
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.errors import LippmannError, UsageError
 from lippmann.printable import one_line
+from lippmann.runtime import unfinished
 from lippmann.runtime.atomic_write import reason_and_fix
 
 #: The base of all complaints about the command line itself; its home moved between releases of typer.
@@ -24,6 +26,7 @@ _ComplaintError = BadParameter.__mro__[2]
 def run(words: list[str], *, debug: bool = False) -> int:
     """Run one command; errors become one line on standard error unless ``debug`` asks for the traceback."""
     command_clock.start()
+    unfinished.remark("")
     from lippmann.cli.app import app_of
 
     try:
@@ -48,7 +51,9 @@ def _told(error: Exception) -> int:
     from lippmann.cli.shared.option_names import in_options
 
     if isinstance(error, LippmannError):
-        return _leave(in_options(error), error.exit_code)
+        line = in_options(error)
+        left = "" if "--resume" in line else _left()
+        return _leave(f"{line}; {left}" if left else line, error.exit_code)
     if isinstance(error, _ComplaintError):
         return _leave(_usage(error), 2)
     if _is_out_of_memory(error):
@@ -79,8 +84,17 @@ def _is_out_of_memory(error: BaseException | None) -> bool:
 
 
 def stopped() -> int:
-    """The exit code of Ctrl-C, which is told in one line."""
-    return _leave("stopped; nothing was written", INTERRUPTED)
+    """The exit code of Ctrl-C, which is told in one line, with what is left on disk on purpose."""
+    return _leave(f"stopped; {_left() or 'nothing was written'}", INTERRUPTED)
+
+
+def _left() -> str:
+    text = unfinished.last_remark()
+    if not text:
+        return ""
+    from lippmann.cli.shared.option_names import translated
+
+    return translated(text)
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
@@ -120,5 +134,6 @@ def _usage(error: BaseException) -> str:
 
 
 def _leave(line: str, code: int) -> int:
-    print(f"lippmann: {one_line(line)}", file=sys.stderr)
+    with suppress(OSError):  # the terminal may be closed
+        print(f"lippmann: {one_line(line)}", file=sys.stderr)
     return code

@@ -27,7 +27,7 @@ from lippmann.cluster.tasks import THREADS_VARIABLE
 from lippmann.cluster.worker_roster import Roster
 from lippmann.errors import ClusterError, UsageError
 from lippmann.runtime import machine
-from lippmann.runtime.child_python import spawn_safely
+from lippmann.runtime.child_python import end_children, spawn_safely
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -141,7 +141,7 @@ def _started_here(distributed: Any, count: int, threads: int | None) -> Iterator
     each = max(1, (threads or machine.usable_cores()) // count)
     security = temporary_security()
     with private_scratch() as folder, spawn_safely(), ExitStack() as stack:
-        stack.callback(_end_children, frozenset(multiprocessing.active_children()))
+        stack.callback(end_children, frozenset(multiprocessing.active_children()))
         # Dask's HTTP servers answer everyone and cannot be disabled, so they get no pages.
         pages: dict[str, Any] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
         with dask.config.set({"temporary-directory": folder, **pages}):
@@ -187,13 +187,6 @@ def _in_time(close: Callable[[], object]) -> None:
 def _close_quietly(close: Callable[[], object]) -> None:
     with suppress(Exception):  # what is not closed is killed
         close()
-
-
-def _end_children(others: frozenset[object]) -> None:
-    """Kill the processes of multiprocessing but ``others``: workers that did not end by themselves."""
-    for child in multiprocessing.active_children():
-        if child not in others:
-            child.kill()
 
 
 @contextmanager

@@ -5,8 +5,8 @@ How formats code values is described in :mod:`lippmann.image.encoding`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +30,7 @@ from lippmann.image.metadata import Metadata, metadata_of, to_text
 from lippmann.image.picture import Picture
 from lippmann.image.stored_values import FloatArray, Layer, Stored, Values
 from lippmann.runtime.atomic_write import check_folder_writable, check_writable, replacing, replacing_folder
+from lippmann.runtime.unfinished import remark
 
 
 def format_for(path: Path, bits: int | None = None, *, source: Stored = "float32") -> tuple[FormatName, Stored]:
@@ -165,7 +166,8 @@ def write_plain_picture(
     _write(path, target, lambda first, last: pixels[first:last], (width, height), transfer, maps=maps)
 
 
-def replacing_output(path: Path, name: FormatName) -> AbstractContextManager[Path]:
+@contextmanager
+def replacing_output(path: Path, name: FormatName) -> Iterator[Path]:
     """Temporary path for a picture file, renamed to ``path`` when the block succeeds; a folder for Zarr.
 
     Raises
@@ -173,7 +175,9 @@ def replacing_output(path: Path, name: FormatName) -> AbstractContextManager[Pat
     OutputError
         If ``path`` cannot be written.
     """
-    return replacing_folder(path) if name == "zarr" else replacing(path)
+    with replacing_folder(path) if name == "zarr" else replacing(path) as temporary:
+        yield temporary
+    remark(f"{path} was written")
 
 
 def check_output(path: Path, name: FormatName) -> None:

@@ -11,14 +11,15 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, TypeGuard
 
-from lippmann.errors import OutputError, PictureError
+from lippmann.errors import LippmannError, OutputError, PictureError
 from lippmann.journal.file_lock import locked
 from lippmann.journal.fingerprint import differences
+from lippmann.runtime.unfinished import Unfinished, remark
 
 #: Added to the sequence's name.
 ENDING = ".journal"
@@ -39,10 +40,11 @@ class FrameJournal:
         The journal's file.
     """
 
-    def __init__(self, path: Path, file: IO[bytes], sums: dict[int, str]) -> None:
+    def __init__(self, path: Path, file: IO[bytes], sums: dict[int, str], begun: Unfinished) -> None:
         self.path = path
         self._file = file
         self._sums = sums
+        self._begun = begun
 
     @classmethod
     def open(cls, path: Path, fingerprint: Mapping[str, str], *, resume: bool) -> FrameJournal:
@@ -66,11 +68,13 @@ class FrameJournal:
         """
         if path.is_symlink():
             raise _no_journal(path, "it is a symbolic link")
-        try:
-            file = locked(path, path)
-        except OSError as error:
-            raise OutputError(f"cannot be written: {error.strerror or error}", where=str(path)) from error
-        try:
+        begun = Unfinished(lambda: _remove_without_frames(path))
+        with ExitStack() as stack:
+            stack.callback(begun.undo)
+            try:
+                file = stack.enter_context(locked(path, path))
+            except OSError as error:
+                raise OutputError(f"cannot be written: {error.strerror or error}", where=str(path)) from error
             file.seek(0)
             line = file.readline(_MOST_HEAD)
             head = _head_of(line, path)
@@ -81,13 +85,11 @@ class FrameJournal:
                 sums, length = _frames_of(file.read())
                 length += len(line)
             file.truncate(length)
-            journal = cls(path, file, sums)
+            journal = cls(path, file, sums, begun)
             if not length:
                 journal._add({_KEY: _VERSION, "fingerprint": dict(fingerprint)})
-        except BaseException:
-            file.close()
-            raise
-        return journal
+            stack.pop_all()
+            return journal
 
     def holds(self, frame: int, file: Path) -> bool:
         """Whether a frame is finished and its file (or folder) has not changed since."""
@@ -120,11 +122,7 @@ class FrameJournal:
 
     def finish(self) -> None:
         """Remove the journal, after the last frame."""
-        with suppress(OSError):  # some systems keep what is open
-            self.path.unlink()
-        self._file.close()
-        with suppress(OSError):
-            self.path.unlink(missing_ok=True)
+        _remove(self.path, self._file)
 
     def __contains__(self, frame: int) -> bool:
         return frame in self._sums
@@ -135,9 +133,12 @@ class FrameJournal:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is not None and not self._sums:
-            self.finish()  # what failed before its first frame leaves nothing behind
         self._file.close()
+        if kind is not None:
+            self._begun.undo()
+            if self._sums:
+                remark(f"finished frames are listed in {self.path.name}: with resume=True the command goes on")
+        self._begun.settle()
 
     def _add(self, values: Mapping[str, object]) -> None:
         try:
@@ -146,6 +147,25 @@ class FrameJournal:
             os.fsync(self._file.fileno())
         except OSError as error:
             raise OutputError(f"cannot be written: {error.strerror or error}", where=str(self.path)) from error
+
+
+def _remove(path: Path, file: IO[bytes]) -> None:
+    with suppress(OSError):  # some systems keep what is open
+        path.unlink()
+    file.close()
+    with suppress(OSError):
+        path.unlink(missing_ok=True)
+
+
+def _remove_without_frames(path: Path) -> None:
+    """Remove a journal to which no frame came, unless another process works on it."""
+    with suppress(OSError, LippmannError):
+        if path.exists():
+            with locked(path, path) as file:
+                file.seek(0)
+                _head_of(file.readline(_MOST_HEAD), path)
+                if not _frames_of(file.read())[0]:
+                    _remove(path, file)
 
 
 def _head_of(line: bytes, path: Path) -> dict[str, object]:

@@ -15,7 +15,7 @@ import json
 import os
 import re
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, NamedTuple
@@ -27,6 +27,7 @@ from lippmann.journal.fingerprint import differences
 from lippmann.journal.journal_folder import JOB, LOCK, TILE, clear, foreign_names, holds_tiles, is_tile, no_tile, sweep
 from lippmann.journal.tile_file import MARK, DamagedTile, TileResult, decode, encode, whole_length
 from lippmann.runtime.atomic_write import pattern_of, remove, replacing
+from lippmann.runtime.unfinished import Unfinished, remark, undone
 
 #: Added to the picture's name.
 ENDING = ".parts"
@@ -65,10 +66,11 @@ class TileStore:
         Number of tiles that were finished when the folder was opened.
     """
 
-    def __init__(self, folder: Path, grid: TileGrid, lock: IO[bytes]) -> None:
+    def __init__(self, folder: Path, grid: TileGrid, lock: IO[bytes], begun: Unfinished) -> None:
         self.folder = folder
         self.grid = grid
         self._lock = lock
+        self._begun = begun
         self.resumed = len(grid) - len(self.missing())
 
     @classmethod
@@ -97,22 +99,22 @@ class TileStore:
         _check_name(output, folder)
         job = Job(dict(fingerprint), [grid.width, grid.height, grid.side])
         _is_begun(output, folder, job, resume)  # refuses before anything is created
-        with _reported(folder):
-            folder.mkdir(exist_ok=True)
-        if (folder / LOCK).is_symlink():
-            raise _no_journal(folder, "its lock is a symbolic link")
-        with _reported(folder):
-            lock = locked(folder / LOCK, folder)
-        try:
+        begun = Unfinished(lambda: _remove_without_tiles(folder))
+        with ExitStack() as stack:
+            stack.callback(begun.undo)
             with _reported(folder):
+                folder.mkdir(exist_ok=True)
+            if (folder / LOCK).is_symlink():
+                raise _no_journal(folder, "its lock is a symbolic link")
+            with _reported(folder):
+                lock = stack.enter_context(locked(folder / LOCK, folder))
                 sweep(folder)
             if not _is_begun(output, folder, job, resume):  # again: another process may have begun and ended meanwhile
                 text = json.dumps({_KEY: _VERSION, **job._asdict()}, indent=1, sort_keys=True) + "\n"
                 _write(folder / JOB, text.encode())
-            return cls(folder, grid, lock)
-        except BaseException:
-            lock.close()
-            raise
+            store = cls(folder, grid, lock, begun)
+            stack.pop_all()
+            return store
 
     def missing(self) -> list[int]:
         """Numbers of the unfinished tiles."""
@@ -178,11 +180,12 @@ class TileStore:
         A sentence for the user if the folder stays, because it holds files that are no part of the journal.
         """
         place, tiles = self.folder, {self._name(index) for index in range(len(self.grid))}
-        with _reported(self.folder):
+        # Under another name first: a journal half removed would look like one half made.
+        old = self.folder.with_name(f".{self.folder.name}-{os.urandom(4).hex()}.old")
+        with _reported(self.folder), undone(lambda: _clear_old(old)):
             if not foreign_names(self.folder, tiles.__contains__):
-                # Under another name first: a journal half removed would look like one half made.
-                place = self.folder.with_name(f".{self.folder.name}-{os.urandom(4).hex()}.old")
-                os.rename(self.folder, place)
+                os.rename(self.folder, old)
+                place = old
             left = clear(place, tiles.__contains__, self.close)
             if not left:
                 return ()
@@ -201,10 +204,13 @@ class TileStore:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with suppress(OSError):  # it is the first error that counts
-            if kind is not None and not holds_tiles(self.folder):
-                clear(self.folder, no_tile, self.close)  # what failed before its first tile leaves nothing behind
         self.close()
+        if kind is not None:
+            self._begun.undo()
+            with suppress(OSError):  # it is the first error that counts
+                if holds_tiles(self.folder):
+                    remark(f"finished tiles are kept in {self.folder.name}: with resume=True the command goes on")
+        self._begun.settle()
 
     def _most_bytes(self, index: int) -> int:
         rows, columns = self.grid[index].shape
@@ -309,6 +315,20 @@ def _is_begun(output: Path, folder: Path, job: Job, resume: bool) -> bool:
             fix=f"put that back as it was, or {_put_away(folder)} and begin anew",
         )
     return True
+
+
+def _remove_without_tiles(folder: Path) -> None:
+    """Remove a journal to which no tile came, unless another process works on it."""
+    with suppress(OSError, OutputError):
+        if folder.is_dir() and not (folder / LOCK).is_symlink():
+            with locked(folder / LOCK, folder) as lock:
+                if not holds_tiles(folder):
+                    clear(folder, no_tile, lock.close)
+
+
+def _clear_old(folder: Path) -> None:
+    with suppress(OSError):  # not found, mostly
+        clear(folder, is_tile)
 
 
 def _put_away(folder: Path) -> str:

@@ -26,6 +26,7 @@ from pathlib import Path
 from lippmann.errors import OutputError
 from lippmann.printable import one_line
 from lippmann.runtime.folder_list import CONTENTS_FILE, listed, write_list
+from lippmann.runtime.unfinished import undone
 
 #: Bytes of a name that are kept.
 _KEPT = 64
@@ -85,8 +86,10 @@ def scratch_folder(prefix: str, above: str | None = None) -> Iterator[str]:
         for name in os.listdir(above):
             if name.startswith(prefix) and _is_dead(name.removeprefix(prefix)[:20]):
                 remove(Path(above, name))
-    with tempfile.TemporaryDirectory(prefix=f"{prefix}{_number()}-", dir=above, ignore_cleanup_errors=True) as folder:
-        yield folder
+    folder = Path(above, f"{prefix}{_number()}")
+    with undone(lambda: remove(folder)):
+        folder.mkdir(mode=0o700)
+        yield str(folder)
 
 
 def remove(path: Path) -> None:
@@ -164,16 +167,12 @@ def replacing(path: Path) -> Iterator[Path]:
     temporary = temporary_file(place)
     with _reported(path, temporary):
         sweep(place)
-        try:
+        with undone(lambda: remove(temporary)):
             _create(temporary, like=place)
             yield temporary
             _flush(temporary)
             os.replace(temporary, place)
             _flush_folder(place.parent)
-        except BaseException:
-            with suppress(OSError):
-                temporary.unlink(missing_ok=True)
-            raise
 
 
 @contextmanager
@@ -194,7 +193,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
     temporary = temporary_folder(place)
     with _reported(path, temporary):
         sweep(place)
-        try:
+        with undone(lambda: remove(temporary)):
             temporary.mkdir()
             yield temporary
             names = sorted(_files(temporary))
@@ -204,18 +203,14 @@ def replacing_folder(path: Path) -> Iterator[Path]:
             _refuse_foreign_files(place, path)  # again: the block may have taken hours
             _exchange(temporary, place)
             _flush_folder(place.parent)
-        except BaseException:
-            shutil.rmtree(temporary, ignore_errors=True)
-            raise
 
 
 def check_writable(path: Path) -> None:
     """Raise :class:`OutputError` if :func:`replacing` cannot write ``path``, for a check before a long render."""
     place = _place(path)
     temporary = place.with_name(f".{secrets.token_hex(8)}.part")
-    with _reported(path, temporary):
+    with _reported(path, temporary), undone(lambda: remove(temporary)):
         _create(temporary, like=place)
-        temporary.unlink()
 
 
 def check_folder_writable(path: Path) -> None:
@@ -223,9 +218,8 @@ def check_folder_writable(path: Path) -> None:
     render."""
     place = _place(path, folder=True)
     temporary = place.with_name(f".{secrets.token_hex(8)}.part")
-    with _reported(path, temporary):
+    with _reported(path, temporary), undone(lambda: remove(temporary)):
         temporary.mkdir()
-        temporary.rmdir()
 
 
 def _place(path: Path, *, folder: bool = False) -> Path:
@@ -324,13 +318,15 @@ def _exchange(temporary: Path, place: Path) -> None:
         return
     # A folder cannot be renamed onto one that is not empty: for an instant the old one has another name.
     old = temporary.with_suffix(".old")
-    os.rename(place, old)
-    try:
+
+    def put_in_order() -> None:
+        if old.exists() and not place.exists():
+            os.rename(old, place)
+        shutil.rmtree(old, ignore_errors=True)
+
+    with undone(put_in_order):
+        os.rename(place, old)
         os.rename(temporary, place)
-    except BaseException:
-        os.rename(old, place)
-        raise
-    shutil.rmtree(old, ignore_errors=True)
 
 
 @contextmanager

@@ -14,16 +14,22 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NoReturn
 
 VARIABLE = "PYTHONSAFEPATH"
+
+#: Seconds that a killed process may take to be gone: it may wait for a disk.
+_END_SECONDS = 1.0
 
 _KNOWS_VARIABLE = sys.version_info >= (3, 11)
 
 # ``sys`` is built into the interpreter: importing it searches no folder. ``-c`` adds the entry as an empty string.
 _REMOVE_ENTRY = "import sys; sys.path[:1] == [''] and sys.path.pop(0)\n"
+
+# The process that removes the semaphores of those that were killed would warn of each.
+_BE_QUIET = "import warnings; warnings.simplefilter('ignore')\n"
 
 _lock = threading.Lock()
 _users = 0
@@ -64,6 +70,27 @@ def spawn_safely() -> Iterator[None]:
                 _undo()
 
 
+def end_children(others: Container[object] = (), *, for_good: bool = False) -> None:
+    """Kill the processes of :mod:`multiprocessing` but ``others``, and wait until they are gone.
+
+    ``for_good``: this process ends; threads that would start new ones cannot.
+    """
+    import multiprocessing.util
+
+    if for_good:
+        util: Any = multiprocessing.util
+        util.spawnv_passfds = _refuse
+    children = [child for child in multiprocessing.active_children() if child not in others]
+    for child in children:
+        child.kill()
+    for child in children:
+        child.join(_END_SECONDS)
+
+
+def _refuse(*_: object) -> NoReturn:
+    raise OSError("this process is ending")
+
+
 def _wrap_spawn(prefix: str) -> Callable[[], None]:
     """Wrap the one function by which multiprocessing starts children, resource tracker and fork server.
 
@@ -78,7 +105,8 @@ def _wrap_spawn(prefix: str) -> Callable[[], None]:
 
     def wrapped(path: Any, args: Any, passfds: Any) -> Any:
         words = list(args)
-        words[words.index("-c") + 1] = prefix + words[words.index("-c") + 1]
+        place = words.index("-c") + 1
+        words[place] = prefix + (_BE_QUIET if "resource_tracker" in words[place] else "") + words[place]
         heard = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             return spawn(path, words, passfds)

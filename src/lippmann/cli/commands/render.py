@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,7 +26,7 @@ from lippmann.options.placement import PlacementOptions
 from lippmann.options.prints import FinishOptions, PrintOptions
 from lippmann.options.quality import MachineOptions, QualityOptions
 from lippmann.options.scene import SceneOptions
-from lippmann.progress import Progress, ProgressCallback
+from lippmann.progress import Progress
 from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
@@ -203,27 +201,6 @@ def is_tiled(output: Path, bits: int | None, display: Display, request: RenderRe
     return not fits_whole(display, request)
 
 
-@contextmanager
-def _kept(output: Path, console: Console) -> Iterator[ProgressCallback]:
-    """The console's progress; whatever ends the work once tiles are rendered, say what is left of it."""
-    from lippmann.journal.tile_journal import journal_of
-
-    has_begun = False
-
-    def watching(report: Progress) -> None:
-        nonlocal has_begun
-        has_begun = has_begun or report.stage == "tiles"
-        progress(report)
-
-    try:
-        with console.progress() as progress:
-            yield watching
-    except BaseException:
-        if has_begun:
-            console.remark(f"finished tiles are kept in {journal_of(output).name}: with --resume the command goes on")
-        raise
-
-
 def _render_tiled(
     source: SceneSource,
     display: Display,
@@ -240,7 +217,7 @@ def _render_tiled(
     from lippmann.tiles.tiled_render import render_to_file
 
     started = time.perf_counter()
-    with _kept(output, console) as progress:
+    with console.progress() as progress:
         rendered = render_to_file(
             source.load(),
             display,

@@ -12,14 +12,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lippmann.cli.shared.console import Console
-from lippmann.errors import OutputError, PictureError, UsageError
+from lippmann.errors import OutputError, UsageError
 from lippmann.options.outputs import SequenceOptions
 from lippmann.options.texts import triple
 
 if TYPE_CHECKING:
     from lippmann.cli.shared.scene_source import SceneSource
     from lippmann.display import Display
-    from lippmann.progress import ProgressCallback
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.sequences.files import SavedFrame
     from lippmann.sequences.films import FilmEye, Filming
@@ -31,7 +30,7 @@ if TYPE_CHECKING:
 #: Endings of outputs that are films themselves; ``.png`` stays a picture's.
 _FILMS = (".mp4", ".apng")
 _NUMBER = re.compile(r"%(?:0(\d{1,2}))?d")
-_NUMERAL = re.compile(r"[\d.]+")
+_NUMERAL = re.compile(r"\([^()]*\)|[\d.]+")
 _FOLDER_PATTERN = "frame_%04d"
 
 
@@ -145,7 +144,7 @@ def render_frames(
             "the frames cannot hold layers", where="--layers", rule="OpenEXR can", fix="name them %04d.exr"
         )
     done: list[dict[str, Any]] = []
-    notes: dict[str, list[str]] = {}
+    notes: dict[str, dict[int, str]] = {}
 
     def noted(frame: SavedFrame) -> SavedFrame:
         made = frame.provenance
@@ -160,13 +159,13 @@ def render_frames(
             }
         )
         for note in made.notes:
-            # The same remark of several frames differs in its numbers at most.
-            notes.setdefault(_NUMERAL.sub("", note), []).append(note)
+            # The same remark of several frames differs in its numbers at most, and in what stands in parentheses.
+            notes.setdefault(_NUMERAL.sub("", note), {})[frame.number] = note
         return frame
 
     with (
         _places(output, path_of(frames[0]), wanted.video),
-        _kept(output, path_of(frames[0]), console) as progress,
+        console.progress() as progress,
         saved_sequence(
             motion,
             output,
@@ -197,8 +196,9 @@ def render_frames(
                 quilt=layout_of_video(wanted.video),
             )
     for alike in notes.values():
-        only = f" ({len(alike)} of {len(done)} frames)" if len(alike) < len(done) else ""
-        console.remark(f"{alike[0]}{' and the like' if len(set(alike)) > 1 else ''}{only}")
+        where = next(iter(alike))
+        only = f" ({len(alike)} of {len(done)} frames, the first is {where})" if len(alike) < len(done) else ""
+        console.remark(f"{alike[where]}{' and the like' if len(set(alike.values())) > 1 else ''}{only}")
     film = "" if wanted.video is None else f", {wanted.video}"
     seconds, found = sum(one["seconds"] for one in done), sum(one["found"] for one in done)
     before = f", {found} of them found" if found else ""
@@ -263,23 +263,6 @@ def _eye(text: str | None) -> FilmEye:
     return x, y, z
 
 
-@contextmanager
-def _kept(output: Path, first: Path, console: Console) -> Iterator[ProgressCallback]:
-    """The console's progress; if the work ends early, say what is left of it."""
-    from lippmann.sequences.files import journal_of
-
-    journal = journal_of(output, first)
-    try:
-        with console.progress() as progress:
-            yield progress
-    except PictureError:
-        raise  # it says what to do about the journal
-    except BaseException:
-        if journal.exists():
-            console.remark(f"finished frames are listed in {journal.name}: with --resume the command goes on")
-        raise
-
-
 def frame_range(text: str) -> FrameRange:
     """``FIRST:STOP[:STEP]``, parts of it left out, or one number.
 
@@ -327,19 +310,22 @@ def numbered(output: Path, frames: int, ending: str = "") -> Callable[[int], Pat
 def _places(output: Path, first: Path, video: Path | None) -> Iterator[None]:
     """See that frames and film can be written, in a new folder that goes again if no frame comes to lie in it."""
     from lippmann.runtime.atomic_write import check_writable
+    from lippmann.runtime.unfinished import undone
 
     is_new = first.parent == output and not output.is_dir()
-    if is_new:
-        try:
-            output.mkdir()
-        except OSError as error:
-            raise OutputError(f"cannot be made ({error.strerror or error})", where=str(output)) from None
-    try:
+
+    def remove_empty() -> None:
+        if is_new:
+            with suppress(OSError):  # it holds something
+                output.rmdir()
+
+    with undone(remove_empty):
+        if is_new:
+            try:
+                output.mkdir()
+            except OSError as error:
+                raise OutputError(f"cannot be made ({error.strerror or error})", where=str(output)) from None
         check_writable(first)
         if video is not None:
             check_writable(video)
         yield
-    finally:
-        if is_new:
-            with suppress(OSError):  # it holds something
-                output.rmdir()

@@ -12,7 +12,6 @@ from lippmann.cli.commands import view as viewing
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import only, with_options
 from lippmann.cli.shared.console import Console
-from lippmann.cli.shared.end_signals import ended_by_signals
 from lippmann.options.outputs import AccessOptions
 from lippmann.options.quality import MachineOptions
 from lippmann.options.scene import SceneOptions
@@ -56,10 +55,8 @@ def studio(
 
     console = Console(quiet, as_json)
     first = _state(state, model, display, asked)
-    with (
-        ended_by_signals(),
-        open_session(first, folder, RenderRequest.from_options(machine), allow_outside=access.allow_outside) as session,
-    ):
+    request = RenderRequest.from_options(machine)
+    with open_session(first, folder, request, allow_outside=access.allow_outside) as session:
         viewing.serve(
             StudioSite(session, "jpeg" if viewing.is_remote() else "rgb"),
             f"studio, {Path(first.scene).name} on {first.display}",

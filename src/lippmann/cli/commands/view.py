@@ -14,7 +14,6 @@ import typer
 from lippmann.cli.commands.quilt import Aspect, Layout, layout_of
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
-from lippmann.cli.shared.end_signals import ended_by_signals
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.cli.shared.option_names import in_options
 from lippmann.errors import LippmannError, UsageError
@@ -180,7 +179,7 @@ def serve(
     from lippmann.viewer.http_server import WebServer
     from lippmann.viewer.request_guard import is_loopback
 
-    with ended_by_signals(), WebServer(content, host, port, folder=folder) as server:
+    with WebServer(content, host, port, folder=folder) as server:
         # The address is printed last: its reader may send Ctrl-C at once.
         if not is_loopback(host):
             console.remark("everyone who can reach this machine can open the page")

@@ -6,15 +6,15 @@ memory.
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.pbr.materials import Finish
 from lippmann.device.types import BSDF, Shape
+from lippmann.runtime.atomic_write import scratch_folder
 from lippmann.scene.values.description import FloatArray, Matrix, Mesh, Round
 
 #: Bytes of a body: in its shape, in the acceleration structure, and while both are built (measured for a million).
@@ -80,13 +80,11 @@ def curves(matrices: Matrix, bsdf: BSDF) -> Shape:
     radius = np.linalg.norm(matrices[:, :3, 0], axis=1, keepdims=True)
     rods = np.concatenate([start, radius, end, radius], axis=1).reshape(-1, 2, 4)
     # Mitsuba reads curves from files alone. An empty line parts them.
-    file, path = tempfile.mkstemp(suffix=".txt")
-    try:
-        with os.fdopen(file, "w") as text:
+    with scratch_folder("lippmann-curves-") as folder:
+        path = Path(folder, "curves.txt")
+        with path.open("w", encoding="ascii") as text:
             text.writelines(
                 "".join(" ".join(f"{number:.9g}" for number in point) + "\n" for point in rod) + "\n"
                 for rod in rods.tolist()
             )
-        return mi.load_dict({"type": "linearcurve", "filename": path, "bsdf": bsdf})
-    finally:
-        os.unlink(path)
+        return mi.load_dict({"type": "linearcurve", "filename": str(path), "bsdf": bsdf})

@@ -112,7 +112,7 @@ def _run(command: list[str], environment: dict[str, str], log: Path, where: str)
     with log.open("wb") as said:
         process = subprocess.Popen(
             command,
-            env=environment,
+            env={**environment, "TMPDIR": str(log.parent)},  # its own temporary files go with ours
             cwd=log.parent,
             stdin=subprocess.DEVNULL,
             stdout=said,

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from lippmann.errors import MemoryLimitError, SceneError
+from lippmann.runtime.atomic_write import scratch_folder
 from lippmann.scene.readers.blend.export import Exported, export
 from lippmann.scene.readers.environment_map import read_environment
 from lippmann.scene.readers.gltf import read_gltf
@@ -39,7 +39,7 @@ def read_blend(path: Path, *, allow_outside: bool = False) -> SceneDescription:
 @contextmanager
 def exported(path: Path, *, allow_outside: bool, is_animated: bool = False) -> Iterator[Exported]:
     """The files that Blender wrote, which are gone afterwards; errors within are the Blender file's."""
-    with TemporaryDirectory(prefix="lippmann-blend-") as folder:
+    with scratch_folder("lippmann-blend-") as folder:
         files = export(path, Path(folder), allow_outside=allow_outside, is_animated=is_animated)
         try:
             yield files

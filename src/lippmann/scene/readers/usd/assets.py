@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import tempfile
 import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
+from lippmann.runtime.atomic_write import scratch_folder
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import MissingFileError, NamedFiles, decode_image, read_bytes
 from lippmann.scene.parsing.texture_maps import unit
@@ -100,7 +100,7 @@ class Assets:
             path = self._path(asset)
             if path is not None:
                 return self._sky(path)
-            with tempfile.TemporaryDirectory() as folder:
+            with scratch_folder("lippmann-usd-") as folder:
                 path = Path(folder) / Path(asset["name"]).name
                 path.write_bytes(self._bytes(asset))
                 return self._sky(path)
