@@ -268,3 +268,15 @@ def test_what_ends_before_its_first_frame_leaves_no_folder(lippmann, tmp_path, m
     monkeypatch.setattr("lippmann.sequences.files.saved_sequence", interrupted)
     assert lippmann("render", "teapot", "--turntable", "2", "-o", tmp_path / "frames").code == 130
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_what_the_panel_cuts_is_said_once_with_the_first_frame_concerned(engine, lippmann, moving_ball, tmp_path):
+    """A ball in front of the panel that comes to its right edge."""
+    place = ("--display", "mla-square", "--place", "fit", "--scale", "0.5", "--shift", "12,0,8")
+    quick = ("--integrator", "normal", "--spp", "1", "--device", "cpu")
+    done = lippmann("render", moving_ball, "--frames", "0:25:6", *place, "-o", tmp_path / "out", *quick)
+    assert done.code == 0, done.err
+    (line,) = [line for line in done.err.splitlines() if "the panel's edge cuts" in line]
+    assert "(right " in line
+    assert line.endswith("sets it behind and the like (2 of 5 frames, the first is 18)")

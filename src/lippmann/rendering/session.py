@@ -21,7 +21,6 @@ from lippmann.image.provenance import Provenance
 from lippmann.options.choices import LIGHT, POOLED_LIGHT, REUSING
 from lippmann.options.integrators import INTEGRATORS
 from lippmann.options.option import Options
-from lippmann.options.placement import PlacementOptions
 from lippmann.options.quality import QualityOptions
 from lippmann.options.texts import settings_of
 from lippmann.progress import Progress, ProgressCallback, silent
@@ -110,7 +109,7 @@ class Session:
     def place(self, display: Display) -> Placement:
         """Where ``display`` stands in the scene; light that follows the viewer is turned toward it.
 
-        What the panel's edge cuts in front of the lens plane is said, unless the scene was fitted within it.
+        What the panel's edge cuts in front of the lens plane is said.
 
         Raises
         ------
@@ -119,20 +118,17 @@ class Session:
         """
         placement = self.find_place(display)
         self.face_viewer(rotation_of(placement.world_from_display))
-        options = self.request.placement
-        if isinstance(options, PlacementOptions) and not (placement.mode == "fit" and self._is_whole(options)):
-            return replace(placement, warnings=(*placement.warnings, *self._warn_of_cut(display, placement, options)))
-        return placement
+        return replace(placement, warnings=(*placement.warnings, *self._warn_of_cut(display, placement)))
 
-    def _is_whole(self, options: PlacementOptions) -> bool:
-        """Whether a fitted scene lies within the panel in all views, or is a photograph, which is to be cut."""
-        return self.scene.fills_panel or (options.scale <= 1.0 and not any(options.shift))
-
-    def _warn_of_cut(self, display: Display, placement: Placement, options: PlacementOptions) -> tuple[str, ...]:
+    def _warn_of_cut(self, display: Display, placement: Placement) -> tuple[str, ...]:
         from lippmann.rendering.transport.cut_edges import find_cut_edges
 
+        options = placement.may_cut
+        if options is None:
+            return ()
         cut = self.watch.stage(
-            "build", lambda: find_cut_edges(self.built, trimmed(display), placement.world_from_display)
+            "build",
+            lambda: find_cut_edges(self.built, trimmed(display), placement.world_from_display, self.engine.threads),
         )
         if cut is None:
             return ()

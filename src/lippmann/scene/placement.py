@@ -39,7 +39,8 @@ class Placement:
     lens is shifted. ``depth_range`` is (back, front): the lowest and highest z of the scene's bounding box in
     millimetres of the display frame; ``resolvable_range`` the same for what the display resolves. ``warnings`` say, one
     line each, what was compressed, and what will be blurred, cut or outside. ``exposure`` is that of the camera that
-    places the display, in stops.
+    places the display, in stops. ``may_cut`` holds the options of a placement by which the panel's edge may cut what
+    stands in front of it; None where all of the scene lies within the panel, or is to be cut as a photograph.
     """
 
     world_from_display: Matrix
@@ -48,6 +49,7 @@ class Placement:
     mode: Mode
     warnings: tuple[str, ...] = ()
     exposure: float = 0.0
+    may_cut: PlacementOptions | None = None
 
     @property
     def display_from_world(self) -> Matrix:
@@ -178,7 +180,8 @@ def place(
     display_from_world = translation(options.shift) @ display_from_world
     where = inverse(display_from_world)
     found = stand(where, bounds, display, mode=mode, bounds_in=bounds_in, warnings=warnings)
-    return replace(found, exposure=exposure)
+    is_whole = mode == "fit" and (fills_panel or (options.scale <= 1.0 and not any(options.shift)))
+    return replace(found, exposure=exposure, may_cut=None if is_whole else options)
 
 
 def stand(

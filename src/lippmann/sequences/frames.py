@@ -77,7 +77,7 @@ class Stand:
     """Where the display stands in every frame; call it with a frame's number.
 
     ``camera`` is the name of the scene's camera that the display follows, if it follows one of the scene's own.
-    ``warnings`` hold for all frames, in place of those of each.
+    ``warnings`` hold for all frames, in place of those of each. ``may_cut`` is that of all placements.
     """
 
     motion: Motion
@@ -87,6 +87,7 @@ class Stand:
     camera: str | None = None
     first_pose: Matrix | None = None
     warnings: tuple[str, ...] | None = None
+    may_cut: PlacementOptions | None = None
 
     def __call__(self, frame: int) -> Placement:
         scene = self.motion.scene(frame)
@@ -96,7 +97,7 @@ class Stand:
             camera = cast(Camera, self.motion.camera(frame, self.camera))
             where, exposure = _pose(camera) @ np.linalg.inv(self.first_pose) @ self.first, camera.exposure
         found = stand(where, scene.bounds, self.display, mode=self.mode, bounds_in=scene.bounds_in)
-        found = replace(found, exposure=exposure)
+        found = replace(found, exposure=exposure, may_cut=self.may_cut)
         return found if self.warnings is None else replace(found, warnings=self.warnings)
 
 
@@ -110,7 +111,7 @@ def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> S
     """
     own = motion.placement(display, options)
     if own is not None:
-        return Stand(motion, display, own.mode, own.world_from_display, warnings=own.warnings)
+        return Stand(motion, display, own.mode, own.world_from_display, warnings=own.warnings, may_cut=own.may_cut)
     camera = motion.camera(0, options.camera)
     if camera is None and options.place == "camera":
         cameras = motion.scene(0).cameras
@@ -120,14 +121,15 @@ def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> S
         camera = motion.camera(0, options.camera)
     if camera is None:
         placement = place(motion.bounds(), display, options=options)
-        return Stand(motion, display, placement.mode, placement.world_from_display)
+        return Stand(motion, display, placement.mode, placement.world_from_display, may_cut=placement.may_cut)
     if options.place not in (None, "camera"):
         raise UsageError(
             f"placement '{options.place}' beside a flight", parameter="place", rule="the display follows the camera"
         )
     following = replace(options, place="camera", camera=camera.name)
     placement = place(motion.bounds(), display, cameras=(camera,), options=following)
-    return Stand(motion, display, "camera", placement.world_from_display, options.camera, _pose(camera))
+    where, first_pose = placement.world_from_display, _pose(camera)
+    return Stand(motion, display, "camera", where, options.camera, first_pose, may_cut=placement.may_cut)
 
 
 def render_sequence(

@@ -12,6 +12,10 @@ from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session
 from lippmann.scene.values.description import Camera, Instance, Material, Mesh, SceneDescription
+from lippmann.scene.values.splats import Splats
+from lippmann.scene.values.volume import TransferFunction, Volume
+from lippmann.sequences.frames import find_stand
+from lippmann.sequences.turntable import Turntable, open_turntable
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -106,3 +110,76 @@ def test_pictures_say_it():
     options = PlacementOptions(place="display")
     image = lippmann.render(scene(card(HALF, 0.0, FRONT)), DISPLAY, placement=options, spp=1, integrator="normal")
     assert any("the panel's edge cuts" in note for note in image.provenance.notes)
+
+
+def cloud(x, y, z, opacity=0.99):
+    """Gaussians of 0.5 mm that fill a square of 8 mm across the view."""
+    places = np.arange(-4.0, 4.01, 0.5)
+    across, up = (axis.ravel() for axis in np.meshgrid(places, places))
+    centers = np.stack([across + x, up + y, np.full_like(up, z)], axis=1).astype(np.float32)
+    count = len(centers)
+    return Splats(
+        centers,
+        np.full((count, 3), 0.25, np.float32),
+        np.tile(np.float32([0, 0, 0, 1]), (count, 1)),
+        np.full(count, opacity, np.float32),
+        np.zeros((count, 1, 3), np.float32),
+    )
+
+
+def slab(x, y, z, opacity):
+    """A volume of 8 x 8 x 4 mm whose front is at ``z``."""
+    where = np.array([[4.0, 0, 0, x - 2], [0, 4, 0, y - 2], [0, 0, 1, z - 3.5], [0, 0, 0, 1]])
+    shown = TransferFunction(np.array([0.0, 1.0]), np.ones((2, 3)), np.full(2, opacity), shading=0.0)
+    return Volume(np.zeros((4, 2, 2), np.int16), where, shown)
+
+
+@pytest.mark.parametrize(
+    ("more", "height", "near"),
+    [
+        ({"splats": cloud(HALF, 0.0, FRONT)}, FRONT, 0.5),
+        # Each millimetre lets half of the light through.
+        ({"volume": slab(HALF, 0.0, FRONT, 0.5)}, FRONT - 1.0, 0.3),
+        ({"splats": cloud(HALF, 0.0, FRONT, opacity=0.02)}, None, 0.0),
+        ({"volume": slab(HALF, 0.0, FRONT, 0.05)}, None, 0.0),
+        ({"splats": cloud(0.0, 0.0, FRONT)}, None, 0.0),
+        ({"volume": slab(HALF, 0.0, -5.0, 0.5)}, None, 0.0),
+    ],
+    ids=["splats", "volume", "faint splats", "faint volume", "splats in the middle", "volume behind"],
+)
+def test_splats_and_volumes_are_cut_as_meshes_are(more, height, near):
+    request = RenderRequest(placement=PlacementOptions(place="display"))
+    described = replace(scene(card(0.0, 0.0, -30.0)), **more)
+    placed = open_session(lippmann.load_scene(described, environment="none"), request).place(DISPLAY)
+    lines = [line for line in placed.warnings if "panel's edge cuts" in line]
+    if height is None:
+        assert not lines
+    else:
+        (line,) = lines
+        assert float(re.search(r"up to ([\d.]+) mm", line)[1]) == pytest.approx(height, abs=near)
+        assert "(right 3" in line or "(right 4" in line
+
+
+def cuts(motion, options, frames):
+    """What the frames of a sequence say."""
+    where = find_stand(motion, DISPLAY, options)
+    for frame in frames:
+        session = open_session(motion.scene(frame), RenderRequest(placement=where(frame)))
+        yield any("panel's edge cuts" in line for line in session.place(DISPLAY).warnings)
+
+
+def test_a_sequence_says_it_of_the_frames_that_it_is_true_of():
+    """An arm that comes out of the panel's edge only where it is turned to the side."""
+    arm = lippmann.load_scene(scene(card(0.0, 0.0, FRONT, half=2.0), card(0.0, 0.0, -FRONT, half=2.0)))
+    options = PlacementOptions(place="display")
+    motion = Turntable(arm, 4, swing=80.0)
+    shown = list(cuts(motion, options, range(4)))
+    assert shown == [False, True, False, True]
+
+
+def test_a_fitted_model_is_whole_in_all_frames_of_a_turn():
+    bars = scene(card(0.0, 0.0, 2.0, half=3.0), wall(5.0, 6.0, -6.0) / np.float32([1, 999, 1]))
+    for options in (PlacementOptions(), PlacementOptions(turn=(0.0, 25.0, 0.0))):
+        motion = open_turntable(lippmann.load_scene(bars), 6, placement=options)
+        assert not any(cuts(motion, options, range(6)))
+    assert any(cuts(motion, PlacementOptions(scale=2.0, shift=(0.0, 0.0, 8.0)), range(6)))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lippmann.device.half_stopped import half_stopped_by
 from lippmann.display import Display
 from lippmann.display.view_cone import size_seen, zone_slopes
 from lippmann.rendering.transport.depth_probe import Reals, first_hits
@@ -35,10 +36,13 @@ class CutEdges:
     height: float
 
 
-def find_cut_edges(built: BuiltScene | BuiltClassic, display: Display, world_from_display: Matrix) -> CutEdges | None:
+def find_cut_edges(
+    built: BuiltScene | BuiltClassic, display: Display, world_from_display: Matrix, threads: int
+) -> CutEdges | None:
     """What the panel's edge cuts in front of the lens plane, in the middle and the outermost views; None for nothing.
 
     A point at height z counts where it moves, from the first view to the last, by more than the display resolves.
+    Splats and a volume count where they stop half of the light. ``threads`` of the CPU trace those.
     """
     side, _ = slopes = zone_slopes(display)
     views = [(0.0, 0.0), (-side, 0.0), (side, 0.0)]
@@ -53,7 +57,10 @@ def find_cut_edges(built: BuiltScene | BuiltClassic, display: Display, world_fro
     directions = np.concatenate([-steps, np.full((*steps.shape[:-1], 1), -1.0)], axis=-1)
     seen, points = first_hits(built, world_from_display, origins, directions)
     heights = np.where(seen, transform_points(inverse(world_from_display), points)[:, 2], -np.inf)
-    is_cut = (heights > display.resolved_size / (2.0 * side)).reshape(steps.shape[:-1])
+    least = display.resolved_size / (2.0 * side)
+    for half_stopped in half_stopped_by(built, world_from_display, origins, directions, least, threads):
+        heights = np.maximum(heights, half_stopped)
+    is_cut = (heights > least).reshape(steps.shape[:-1])
     if not is_cut.any():
         return None
     shares = dict(zip(SIDES, is_cut.mean(axis=-1).max(axis=0).tolist(), strict=True))
