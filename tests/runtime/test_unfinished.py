@@ -7,7 +7,8 @@ from lippmann.runtime.unfinished import Unfinished, undo_all, undone
 
 
 @pytest.fixture(autouse=True)
-def _none_left():
+def _none_left(monkeypatch):
+    monkeypatch.setattr(unfinished, "_undos", {})
     yield
     assert not unfinished._undos
 
