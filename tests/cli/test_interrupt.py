@@ -10,7 +10,7 @@ import time
 import pytest
 
 import lippmann.cli.app
-from lippmann.runtime import unfinished
+from lippmann.runtime import atomic_write
 
 
 def test_an_interrupt_inside_a_compiled_loop_is_an_interrupt(monkeypatch, capsys):
@@ -124,7 +124,7 @@ def test_an_interrupt_that_strikes_the_end_itself_leaves_nothing(tmp_path):
 
 def test_the_line_says_what_lies_on_disk(monkeypatch, capsys):
     def command(*arguments, **options):
-        unfinished.remark("finished tiles are kept in x.tif.parts: with resume=True the command goes on")
+        atomic_write.remark("finished tiles are kept in x.tif.parts: with resume=True the command goes on")
         raise KeyboardInterrupt
 
     monkeypatch.setattr(lippmann.cli.app, "app_of", lambda words: command)
@@ -133,4 +133,4 @@ def test_the_line_says_what_lies_on_disk(monkeypatch, capsys):
     assert capsys.readouterr().err == line
     monkeypatch.setattr(lippmann.cli.app, "app_of", lambda words: lambda *_, **__: 0)
     assert lippmann.cli.run(["info"]) == 0
-    assert unfinished.last_remark() == ""
+    assert atomic_write.last_remark() == ""

@@ -17,7 +17,7 @@ import pytest
 from lippmann.errors import OutputError, PictureError
 from lippmann.journal import DamagedTile, TileGrid, TileResult, TileStore, encode, journal_of, tile_journal
 from lippmann.journal.tile_journal import sweep_beside
-from lippmann.runtime.unfinished import undo_all
+from lippmann.runtime.atomic_write import undo_all
 
 GRID = TileGrid(100, 70, 32)
 JOB = {"spp": "4", "scene": "room"}

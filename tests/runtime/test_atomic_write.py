@@ -10,12 +10,15 @@ import pytest
 from lippmann.errors import OutputError
 from lippmann.runtime import atomic_write
 from lippmann.runtime.atomic_write import (
+    Unfinished,
     pattern_of,
     replacing,
     replacing_folder,
     scratch_folder,
     temporary_file,
     temporary_folder,
+    undo_all,
+    undone,
 )
 
 KILLED = """
@@ -398,4 +401,45 @@ def test_a_library_that_quotes_the_system_is_understood(tmp_path):
     with pytest.raises(OutputError, match="cannot be written: no space is left on the disk; free some space"):  # noqa: SIM117
         with atomic_write.replacing(tmp_path / "x.exr"):
             raise OSError('Failed to write pixel data to image file "x.part.exr". No space left on device.')
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def none_begun(monkeypatch):
+    monkeypatch.setattr(atomic_write, "_undos", {})
+    yield None
+    assert not atomic_write._undos
+
+
+def test_a_block_is_undone_at_its_end(tmp_path, none_begun):
+    place = tmp_path / "half"
+    with undone(lambda: place.unlink(missing_ok=True)):
+        place.touch()
+    assert not place.exists()
+
+
+def test_an_interrupt_in_the_very_end_is_made_good(tmp_path, none_begun):
+    place, tries = tmp_path / "half", []
+
+    def undo() -> None:
+        tries.append(1)
+        if len(tries) == 1:
+            raise KeyboardInterrupt
+        place.unlink(missing_ok=True)
+
+    with pytest.raises(KeyboardInterrupt), undone(undo):
+        place.touch()
+    assert place.exists()
+    undo_all()
+    assert not place.exists()
+
+
+def test_one_that_cannot_be_undone_does_not_keep_the_others(tmp_path, none_begun):
+    place = tmp_path / "half"
+    place.touch()
+    Unfinished(place.unlink)
+    Unfinished((tmp_path / "missing").unlink)
+    settled = Unfinished(tmp_path.rmdir)
+    settled.settle()
+    undo_all()
     assert list(tmp_path.iterdir()) == []

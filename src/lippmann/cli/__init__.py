@@ -103,10 +103,10 @@ def _interrupt_soon() -> None:
 
 def _put_in_order() -> None:
     """End the processes and remove the files of a command that Ctrl-C has ended, where it struck in that very work."""
-    from lippmann.runtime import child_python, unfinished
+    from lippmann.runtime import atomic_write, child_python
 
     child_python.end_children(for_good=True)
-    unfinished.undo_all()
+    atomic_write.undo_all()
 
 
 def _end_at_once(code: int) -> NoReturn:

@@ -16,7 +16,7 @@ from lippmann.cli.shared import command_clock
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.errors import LippmannError, UsageError
 from lippmann.printable import one_line
-from lippmann.runtime import unfinished
+from lippmann.runtime import atomic_write
 from lippmann.runtime.atomic_write import reason_and_fix
 
 #: The base of all complaints about the command line itself; its home moved between releases of typer.
@@ -26,7 +26,7 @@ _ComplaintError = BadParameter.__mro__[2]
 def run(words: list[str], *, debug: bool = False) -> int:
     """Run one command; errors become one line on standard error unless ``debug`` asks for the traceback."""
     command_clock.start()
-    unfinished.remark("")
+    atomic_write.remark("")
     from lippmann.cli.app import app_of
 
     try:
@@ -89,7 +89,7 @@ def stopped() -> int:
 
 
 def _left() -> str:
-    text = unfinished.last_remark()
+    text = atomic_write.last_remark()
     if not text:
         return ""
     from lippmann.cli.shared.option_names import translated

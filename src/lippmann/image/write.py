@@ -29,8 +29,7 @@ from lippmann.image.encoding import (
 from lippmann.image.metadata import Metadata, metadata_of, to_text
 from lippmann.image.picture import Picture
 from lippmann.image.stored_values import FloatArray, Layer, Stored, Values
-from lippmann.runtime.atomic_write import check_folder_writable, check_writable, replacing, replacing_folder
-from lippmann.runtime.unfinished import remark
+from lippmann.runtime.atomic_write import check_folder_writable, check_writable, remark, replacing, replacing_folder
 
 
 def format_for(path: Path, bits: int | None = None, *, source: Stored = "float32") -> tuple[FormatName, Stored]:

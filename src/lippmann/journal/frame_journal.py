@@ -19,7 +19,7 @@ from typing import IO, Any, TypeGuard
 from lippmann.errors import LippmannError, OutputError, PictureError
 from lippmann.journal.file_lock import locked
 from lippmann.journal.fingerprint import differences
-from lippmann.runtime.unfinished import Unfinished, remark
+from lippmann.runtime.atomic_write import Unfinished, remark
 
 #: Added to the sequence's name.
 ENDING = ".journal"

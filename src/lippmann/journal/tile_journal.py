@@ -26,8 +26,7 @@ from lippmann.journal.file_lock import locked
 from lippmann.journal.fingerprint import differences
 from lippmann.journal.journal_folder import JOB, LOCK, TILE, clear, foreign_names, holds_tiles, is_tile, no_tile, sweep
 from lippmann.journal.tile_file import MARK, DamagedTile, TileResult, decode, encode, whole_length
-from lippmann.runtime.atomic_write import pattern_of, remove, replacing
-from lippmann.runtime.unfinished import Unfinished, remark, undone
+from lippmann.runtime.atomic_write import Unfinished, pattern_of, remark, remove, replacing, undone
 
 #: Added to the picture's name.
 ENDING = ".parts"

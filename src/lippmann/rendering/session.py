@@ -126,10 +126,8 @@ class Session:
         options = placement.may_cut
         if options is None:
             return ()
-        cut = self.watch.stage(
-            "build",
-            lambda: find_cut_edges(self.built, trimmed(display), placement.world_from_display, self.engine.threads),
-        )
+        where = trimmed(display), placement.world_from_display
+        cut = self.watch.stage("build", lambda: find_cut_edges(self.built, *where, self.engine.threads))
         if cut is None:
             return ()
         sides = ", ".join(f"{side} {100 * share:.0f} %" for side, share in cut.shares.items())

@@ -3,6 +3,10 @@
 A file or folder is written under a temporary name beside its path, flushed to disk, and renamed. A failure (full disk,
 error in the writer, Ctrl-C) leaves the path as it was.
 
+Who makes something temporary says beforehand how to undo it (:func:`undone`). It is undone where its block ends,
+whatever ends it. An interrupt may strike in that very end; therefore the command line, before it leaves the process
+after Ctrl-C, undoes what is left once more (:func:`undo_all`).
+
 What a killed writer left under such a name is removed by the next one (:func:`sweep`).
 ``tempfile`` names them no better: its files are their owner's alone, and here they get the permissions of an output.
 """
@@ -18,7 +22,7 @@ import secrets
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -26,7 +30,6 @@ from pathlib import Path
 from lippmann.errors import OutputError
 from lippmann.printable import one_line
 from lippmann.runtime.folder_list import CONTENTS_FILE, listed, write_list
-from lippmann.runtime.unfinished import undone
 
 #: Bytes of a name that are kept.
 _KEPT = 64
@@ -36,6 +39,56 @@ _NOT_ON_DISK = dict.fromkeys(map(ord, '/\\:*?"<>|' if os.name == "nt" else "/"),
 
 #: The number, for patterns: machine, process, random digits.
 NUMBER = "[0-9a-f]{20}"
+
+
+#: What is begun and not finished, and how to undo it.
+_undos: dict[object, Callable[[], None]] = {}
+_remark = ""
+
+
+class Unfinished:
+    """Something that is undone by :func:`undo_all` unless it was settled before."""
+
+    def __init__(self, undo: Callable[[], None]) -> None:
+        self.undo = undo
+        _undos[self] = undo
+
+    def settle(self) -> None:
+        """Nothing is left to undo."""
+        _undos.pop(self, None)
+
+
+@contextmanager
+def undone(undo: Callable[[], None]) -> Iterator[None]:
+    """Call ``undo`` at the end of the block. It may be called twice, and has nothing to do after a success.
+
+    After an error it stays known to :func:`undo_all`: processes that were killed may have gone on for a moment.
+    """
+    begun = Unfinished(undo)
+    try:
+        yield
+    finally:
+        undo()
+    begun.settle()
+
+
+def undo_all() -> None:
+    """Undo what is not finished, the last first."""
+    while _undos:
+        _, undo = _undos.popitem()
+        with suppress(Exception):  # the others come all the same
+            undo()
+
+
+def remark(text: str) -> None:
+    """Note what lies on disk on purpose if this process ends early, such as finished tiles; empty as work begins."""
+    global _remark
+    _remark = text
+
+
+def last_remark() -> str:
+    """What was noted last; empty if nothing was."""
+    return _remark
 
 
 def temporary_file(place: Path) -> Path:

@@ -309,8 +309,7 @@ def numbered(output: Path, frames: int, ending: str = "") -> Callable[[int], Pat
 @contextmanager
 def _places(output: Path, first: Path, video: Path | None) -> Iterator[None]:
     """See that frames and film can be written, in a new folder that goes again if no frame comes to lie in it."""
-    from lippmann.runtime.atomic_write import check_writable
-    from lippmann.runtime.unfinished import undone
+    from lippmann.runtime.atomic_write import check_writable, undone
 
     is_new = first.parent == output and not output.is_dir()
 

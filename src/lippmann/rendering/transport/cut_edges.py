@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lippmann.device.half_stopped import half_stopped_by
+from lippmann.device.pbr.half_stopped import half_stopped_by
 from lippmann.display import Display
 from lippmann.display.view_cone import size_seen, zone_slopes
 from lippmann.rendering.transport.depth_probe import Reals, first_hits
