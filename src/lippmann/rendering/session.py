@@ -123,8 +123,8 @@ class Session:
     def _warn_of_cut(self, display: Display, placement: Placement) -> tuple[str, ...]:
         from lippmann.rendering.transport.cut_edges import find_cut_edges
 
-        options, where = placement.may_cut, (trimmed(display), placement.world_from_display)
-        cut = options and self.watch.stage("build", lambda: find_cut_edges(self.built, *where, self.engine.threads))
+        options, where = placement.may_cut, (trimmed(display), placement.world_from_display, self.engine.threads)
+        cut = None if options is None else self.watch.stage("build", lambda: find_cut_edges(self.built, *where))
         if options is None or cut is None:
             return ()
         sides = ", ".join(f"{side} {100 * share:.0f} %" for side, share in cut.shares.items())
