@@ -6,11 +6,12 @@ import numpy as np
 
 from lippmann.display import Display
 from lippmann.rendering.reprojection.arrays.backward_warp import BackwardWarp
-from lippmann.rendering.reprojection.common.gap_filling import Gaps, Settled
+from lippmann.rendering.reprojection.common.averaging import average_neighbors
 from lippmann.rendering.reprojection.common.lens_map import LensField
-from lippmann.rendering.reprojection.common.pixel_tracer import PixelTracer
-from lippmann.rendering.reprojection.common.point_image import WANTED, PointImage
-from lippmann.rendering.reprojection.common.schedule import Lenses, Step, odd_and_even, refine
+from lippmann.rendering.reprojection.common.missed_runs import bridge, thin_out
+from lippmann.rendering.reprojection.common.pixel_tracer import Pixels, PixelTracer
+from lippmann.rendering.reprojection.common.point_image import MISSED, WANTED, PointImage
+from lippmann.rendering.reprojection.common.schedule import Lenses, odd_and_even, refine
 from lippmann.rendering.reprojection.common.thresholds import Rules
 from lippmann.rendering.reprojection.lenticular.forward_warp import ForwardWarp
 from lippmann.rendering.reprojection.retrace.adaptive_retrace import choose_neighborhoods, search
@@ -23,29 +24,15 @@ class DefaultOrder:
     Under straight cylindrical lenses every row of pixels is a world of its own: a forward warp of spans takes a seventh
     of the time of the backward warp, which slanted sheets, square and hexagonal arrays need.
 
-    Parameters
-    ----------
-    points:
-        Where the picture comes to be; nothing is known of it yet.
-    settled:
-        Called with the number of pixels that have just been traced.
+    ``points`` is where the picture comes to be; nothing is known of it yet.
     """
 
-    def __init__(
-        self,
-        display: Display,
-        points: PointImage,
-        tracer: PixelTracer,
-        bands: Bands,
-        rules: Rules,
-        settled: Settled,
-    ) -> None:
-        self._points = points
+    def __init__(self, display: Display, points: PointImage, tracer: PixelTracer, bands: Bands, rules: Rules) -> None:
+        self._points, self._tracer, self._bands, self._rules = points, tracer, bands, rules
+        self._display = display
         self._field = LensField.of(display)
         warp = ForwardWarp if display.lattice.rows_are_alike else BackwardWarp
         self._warp: ForwardWarp | BackwardWarp = warp(points, self._field, bands, rules)
-        self._gaps = Gaps(points, self._field, tracer, bands, rules, settled)
-        self._search = (choose_neighborhoods(display, self._field.reach), tracer, bands, rules, settled)
 
     def lens_view(self) -> None:
         """Every micro-image from its neighbours, near or far; what no point reached is traced."""
@@ -57,22 +44,20 @@ class DefaultOrder:
 
         Corresponding pixels are those whose light lines are nearest to parallel. The last micro-image of an even number
         has one neighbour, whose colours it takes where reuse need not be careful. Pixels for which neither neighbour
-        has a corresponding one are treated as the missed ones of :meth:`lens_view`, and with them, where reuse is
-        careful, those that have one neighbour only or two that disagree.
+        has a corresponding one are traced, and with them, where reuse is careful, those that have one neighbour only or
+        two that disagree.
         """
         odd, even = odd_and_even(self._field.columns, self._field.rows)
         self._make(odd)
         if len(even.targets):
-            self._receive(even)
-            self._gaps.average()
-            if isinstance(self._warp, BackwardWarp):
-                # Without them arrays lose 3 dB where reuse is careful; straight sheets are better by 1 dB without.
-                self._gaps.trace_samples()
-            self._gaps.fill()
+            self._warp.receive(even)
+            average_neighbors(self._points, self._field, self._wanted(), self._rules, self._bands)
+            self._trace_wanted()
 
     def correct(self) -> None:
         """Trace what reprojection has falsified, as far as it can be found."""
-        search(self._points, self._field, *self._search)
+        neighborhoods = choose_neighborhoods(self._display, self._field.reach)
+        search(self._points, self._field, neighborhoods, self._tracer, self._bands, self._rules)
 
     def _make(self, columns: Lenses) -> None:
         field, status = self._field, self._points.status
@@ -80,20 +65,23 @@ class DefaultOrder:
         for row in range(len(status)):
             # All probes are traced now, whether or not their micro-images are made.
             status[row, self._warp.probes(row)] = WANTED
+        self._tracer.trace(self._wanted(), self._points)
         is_key = np.isin(np.arange(len(field.center)), keys)
-        begins, ends = field.first[:, :-1], field.first[:, 1:]
-        rows = np.arange(len(status))[:, None]
-        lens_of_run = field.lens[rows, np.minimum(begins, status.shape[1] - 1)]
-        self._gaps.unsettled[...] = is_key[lens_of_run] & (ends > begins)
-        self._gaps.trace_samples()
-        self._gaps.fill()
+        status[is_key[field.lens] & (status == MISSED)] = WANTED
+        self._trace_wanted()
         self._warp.finish(keys)
         for step in steps:
-            self._receive(step)
-            self._gaps.trace_samples()
-            self._gaps.fill()
+            self._warp.receive(step)
+            self._trace_wanted()
             self._warp.finish(step.targets)
 
-    def _receive(self, step: Step) -> None:
-        self._gaps.unsettled[...] = False
-        self._warp.receive(step, self._gaps.unsettled)
+    def _wanted(self) -> Pixels:
+        return np.flatnonzero(self._points.status == WANTED).astype(np.uint32)
+
+    def _trace_wanted(self) -> None:
+        """Trace some of the wanted pixels, bridge the others from them, and trace those that care does not bridge."""
+        arguments = self._points, self._field.lens, self._rules
+        self._bands.lines(thin_out, len(self._points.status), *arguments)
+        self._tracer.trace(self._wanted(), self._points)
+        self._bands.lines(bridge, len(self._points.status), *arguments)
+        self._tracer.trace(self._wanted(), self._points)

@@ -1,4 +1,4 @@
-"""The paper's own order: lens by lens, colours as they are."""
+"""The paper's own order: lens by lens, each point to the nearest pixel, colours as they are."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.rendering.reprojection.common import gap_kernels
-from lippmann.rendering.reprojection.common.gap_filling import Settled
+from lippmann.rendering.reprojection.common.array_types import IntArray
+from lippmann.rendering.reprojection.common.averaging import average_neighbors
 from lippmann.rendering.reprojection.common.lens_map import LensField
 from lippmann.rendering.reprojection.common.pixel_tracer import Pixels, PixelTracer
-from lippmann.rendering.reprojection.common.point_image import MISSED, PointImage
-from lippmann.rendering.reprojection.common.thresholds import Rules
-from lippmann.rendering.reprojection.paper_order_kernels import carry
+from lippmann.rendering.reprojection.common.point_image import BACKGROUND, MISSED, REPROJECTED, PointImage
+from lippmann.rendering.reprojection.common.thresholds import Rules, nearer
+from lippmann.runtime.numba_jit import uncounted
 from lippmann.runtime.row_threads import Bands
 
 #: The mean of two colours is taken whatever they are.
-_ANY_COLOR = Rules(careful=False, tolerance=1.0, coded=False, probe_rows=1, probe_stride=1, longest_gap=1, overhang=0)
+_ANY_COLOR = Rules(careful=False, tolerance=1.0, coded=False, probe_rows=1, probe_stride=1, run_step=1)
 
 
 class PaperOrder:
@@ -31,21 +31,11 @@ class PaperOrder:
     Under square and hexagonal lenses every row of lenses is such a display of its own, its first micro-image traced.
     The rows go side by side, a column of lenses at a time, so that a picture takes as many calls as a row has lenses.
 
-    Parameters
-    ----------
-    points:
-        Where the picture comes to be; nothing is known of it yet.
-    settled:
-        Called with the number of pixels that have just been traced.
+    ``points`` is where the picture comes to be; nothing is known of it yet.
     """
 
-    def __init__(
-        self, display: Display, points: PointImage, tracer: PixelTracer, bands: Bands, settled: Settled
-    ) -> None:
-        self._points = points
-        self._tracer = tracer
-        self._bands = bands
-        self._settled = settled
+    def __init__(self, display: Display, points: PointImage, tracer: PixelTracer, bands: Bands) -> None:
+        self._points, self._tracer, self._bands = points, tracer, bands
         self._field = LensField.of(display)
         self._beside = np.zeros((*points.status.shape, 2), dtype=np.float32)
         columns = self._field.columns
@@ -71,23 +61,17 @@ class PaperOrder:
         self._pass_on(range(0, columns, 2), 2)
         even = range(1, columns, 2)
         for column in even:
-            carry(self._points, self._beside, self._field, self._of_column(column - 1), 1)
+            _carry(self._points, self._beside, self._field, self._of_column(column - 1), 1)
             if column + 1 < columns:
-                carry(self._points, self._beside, self._field, self._of_column(column + 1), -1)
-        self._average(self._missed(even))
-        self._trace(self._missed(even))
+                _carry(self._points, self._beside, self._field, self._of_column(column + 1), -1)
+        average_neighbors(self._points, self._field, self._missed(even), _ANY_COLOR, self._bands)
+        self._tracer.trace(self._missed(even), self._points)
 
     def _pass_on(self, columns: range, step: int) -> None:
         for column in columns:
             if column >= step:
-                carry(self._points, self._beside, self._field, self._of_column(column - step), step)
-            self._trace(self._missed(range(column, column + 1)))
-
-    def _average(self, numbers: Pixels) -> None:
-        if not len(numbers):
-            return
-        sides = self._field.corresponding_beside(numbers)
-        self._bands.pixels(gap_kernels.average, len(numbers), self._points, numbers, *sides, _ANY_COLOR)
+                _carry(self._points, self._beside, self._field, self._of_column(column - step), step)
+            self._tracer.trace(self._missed(range(column, column + 1)), self._points)
 
     def _missed(self, columns: range) -> Pixels:
         status = self._points.status.ravel()
@@ -99,7 +83,46 @@ class PaperOrder:
         numbers: NDArray[np.uint32] = self._numbers[self._starts[column] : self._starts[column + 1]]
         return numbers
 
-    def _trace(self, numbers: Pixels) -> None:
-        if len(numbers):
-            self._tracer.trace(numbers, self._points)
-            self._settled(len(numbers))
+
+#: Where a point lies beside the centre of its pixel, ``(H, W, 2)`` in pixels (x, y). A point that has been carried lies
+#: where it always lay: were it moved to the pixel's centre, points would drift from lens to lens.
+Beside = NDArray[np.float32]
+
+
+@uncounted
+def _carry(points: PointImage, beside: Beside, field: LensField, numbers: IntArray, step: int) -> None:
+    """Carry the points of the pixels ``numbers`` (linear, all settled) to the lenses ``step`` further on in the row.
+
+    Each goes to the pixel nearest to its projection, if that has no traced colour. Where several meet, the nearest to
+    the viewer wins; of two at the same distance the first. What receives a point becomes :data:`REPROJECTED`. A pixel
+    that shows the background has hit nothing, and has no point to give.
+    """
+    height, width = points.status.shape
+    lenses = len(field.center)
+    for k in range(len(numbers)):
+        row, column = divmod(int(numbers[k]), width)
+        source = field.lens[row, column]
+        target = source + step
+        if target < 0 or target >= lenses or points.status[row, column] < 0:
+            continue
+        if points.disparity[row, column] == np.float32(BACKGROUND):
+            continue
+        s = np.float64(points.disparity[row, column])
+        x = column + beside[row, column, 0] + (field.center[target, 0] - field.center[source, 0]) * (1.0 + s)
+        y = row + beside[row, column, 1] + (field.center[target, 1] - field.center[source, 1]) * (1.0 + s)
+        # Points near to the lens plane are seen by no other lens; whole numbers do not reach as far as their places.
+        if not (x > -1.0 and x < width and y > -1.0 and y < height):
+            continue
+        # What lies on the border of two pixels belongs to the pixel after it: rounding must not decide.
+        c, r = int(np.floor(x + (0.5 + 1e-5))), int(np.floor(y + (0.5 + 1e-5)))
+        if c < 0 or c >= width or r < 0 or r >= height or field.lens[r, c] != target:
+            continue
+        taken = points.status[r, c] == REPROJECTED and not nearer(s, np.float64(points.disparity[r, c]))
+        if taken or not (points.status[r, c] == MISSED or points.status[r, c] == REPROJECTED):
+            continue
+        for channel in range(3):
+            points.color[r, c, channel] = points.color[row, column, channel]
+        points.disparity[r, c] = points.disparity[row, column]
+        points.fragile[r, c] = points.fragile[row, column]
+        points.status[r, c] = REPROJECTED
+        beside[r, c, 0], beside[r, c, 1] = x - c, y - r

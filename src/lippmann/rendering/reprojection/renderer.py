@@ -12,7 +12,6 @@ from lippmann.color.transfer import Transfer
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.memory_model import PICTURE, POINT_IMAGE, SMALLEST_LANES, lanes_within
 from lippmann.rendering.film.wavefront import Frame
-from lippmann.rendering.reprojection.common.gap_filling import Settled
 from lippmann.rendering.reprojection.common.pixel_tracer import PixelTracer
 from lippmann.rendering.reprojection.common.point_image import (
     INTERPOLATED,
@@ -95,12 +94,12 @@ def trace_reused(
             most_lanes=most_lanes,
             display_from_world=display_from_world,
             bands=bands,
+            progress=progress,
         )
-        settled = _report(progress, source.width * source.height)
         arguments = source.display, points, tracer, bands
         rules = choose_rules(careful=careful, coded=transfer == "srgb")
         is_paper = order == "paper"
-        maker = PaperOrder(*arguments, settled) if is_paper else DefaultOrder(*arguments, rules, settled)
+        maker = PaperOrder(*arguments) if is_paper else DefaultOrder(*arguments, rules)
         if method == "lens-view":
             maker.lens_view()
         else:
@@ -135,14 +134,3 @@ def wavefront_lanes(memory: int, width: int, height: int, samples: int) -> int:
     needed = max(samples, min(SMALLEST_LANES, width * height * samples))
     kept = width * height * (PICTURE + POINT_IMAGE)
     return max(needed, lanes_within(memory, kept, needed, f"{width}x{height} pixels and their points"))
-
-
-def _report(progress: ProgressCallback, total: int) -> Settled:
-    done = 0
-
-    def settled(pixels: int) -> None:
-        nonlocal done
-        done += pixels
-        progress(Progress("trace", min(done, total), total))
-
-    return settled

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from lippmann.rendering.reprojection.arrays.bilinear import color_at, is_trusted
 from lippmann.rendering.reprojection.arrays.epipolar_march import look_along, mark_nearest
-from lippmann.rendering.reprojection.common.array_types import BoolArray, RealArray
+from lippmann.rendering.reprojection.common.array_types import RealArray
 from lippmann.rendering.reprojection.common.lens_map import LensField
-from lippmann.rendering.reprojection.common.point_image import BACKGROUND, REPROJECTED, TRACED, PointImage
+from lippmann.rendering.reprojection.common.point_image import BACKGROUND, REPROJECTED, TRACED, WANTED, PointImage
 from lippmann.rendering.reprojection.common.schedule import Lenses, Step
 from lippmann.rendering.reprojection.common.thresholds import Rules, alike, coded_value, nearer
 from lippmann.rendering.reprojection.common.tuning import TUNING
@@ -69,16 +69,16 @@ class BackwardWarp:
         """Columns of the probes in a row."""
         return np.arange(row * self._probe_shift % self._probe_stride, self._field.lens.shape[1], self._probe_stride)
 
-    def receive(self, step: Step, unsettled: BoolArray) -> None:
-        """Give the targets of a step the points of their sources; ``unsettled`` as for :func:`gather`."""
+    def receive(self, step: Step) -> None:
+        """Give the targets of a step the points of their sources."""
         lenses = len(self._field.center)
         target = np.zeros(lenses, dtype=np.bool_)
         target[step.targets] = True
         source = np.full((lenses, 2), -1, dtype=np.int64)
         source[step.targets] = step.sources
         gathering = Gathering(target, source, self._probe_stride, self._probe_shift, round(sqrt(self._probe_stride)))
-        arguments = self._points, self._field, gathering, self._rules, self._nearest, unsettled
-        self._bands.lines(gather, len(unsettled), *arguments)
+        arguments = self._points, self._field, gathering, self._rules, self._nearest
+        self._bands.lines(gather, len(self._nearest), *arguments)
 
     def finish(self, lenses: Lenses) -> None:
         """Others receive from these lenses now."""
@@ -130,28 +130,21 @@ def gather(
     gathering: Gathering,
     rules: Rules,
     nearest: RealArray,
-    unsettled: BoolArray,
 ) -> None:
     """Give the pixels of the targets the points of their sources.
 
-    Pixels that get a point become :data:`REPROJECTED`; traced ones stay as they are. ``nearest (H, W)`` as of
-    :func:`mark_nearest`; ``unsettled (H, runs)`` says which stretches of the targets have missed pixels left.
+    Pixels that get a point become :data:`REPROJECTED`, missed ones :data:`WANTED`; traced ones stay as they are.
+    ``nearest (H, W)`` as of :func:`mark_nearest`.
     """
     sources = gathering.source.shape[1]
     depth = np.empty(sources)
     share = np.empty(sources)
     color = np.empty((sources, 3))
     for row in range(first_row, last_row):
-        for run in range(unsettled.shape[1]):
-            begin, end = field.first[row, run], field.first[row, run + 1]
-            if begin == end or not gathering.target[field.lens[row, begin]]:
-                continue
-            missed = 0
-            for column in range(begin, end):
-                if points.status[row, column] != TRACED:
-                    got = _gather_pixel(points, field, gathering, rules, nearest, row, column, depth, share, color)
-                    missed += not got
-            unsettled[row, run] = missed > 0
+        for column in range(points.status.shape[1]):
+            if points.status[row, column] != TRACED and gathering.target[field.lens[row, column]]:
+                got = _gather_pixel(points, field, gathering, rules, nearest, row, column, depth, share, color)
+                points.status[row, column] = REPROJECTED if got else WANTED
 
 
 @uncounted
@@ -226,5 +219,4 @@ def _gather_pixel(
             return False
         points.color[row, column, channel] = value / total
     points.disparity[row, column] = mean
-    points.status[row, column] = REPROJECTED
     return True

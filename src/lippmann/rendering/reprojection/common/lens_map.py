@@ -29,16 +29,12 @@ class LensField(NamedTuple):
         ``(H, W)`` number of each pixel's lens.
     center:
         ``(lenses, 2)`` their centres (x, y); of cylindrical lenses the foot of a perpendicular on the axis.
-    first:
-        ``(H, runs + 1)`` columns at which the stretches of one lens begin and end in each row. Stretches may be empty.
-        Under straight cylindrical lenses there is one for each lens.
     columns:
         Lenses in a row.
     """
 
     lens: NDArray[np.int32]
     center: NDArray[np.float64]
-    first: NDArray[np.int64]
     columns: int
 
     @property
@@ -49,7 +45,8 @@ class LensField(NamedTuple):
     @property
     def reach(self) -> int:
         """Columns of the widest micro-image."""
-        return int(np.diff(self.first, axis=1).max())
+        begins = np.flatnonzero(np.diff(self.lens, axis=1, prepend=-1))
+        return int(np.diff(begins, append=self.lens.size).max())
 
     @staticmethod
     def of(display: Display) -> LensField:
@@ -58,18 +55,15 @@ class LensField(NamedTuple):
         if display.lattice.rows_are_alike:
             across = np.arange(panel.width) + 0.5
             i, _ = display.lens_of(*display.panel_point(across, np.full(panel.width, 0.5)), NUMPY)
-            edges = np.searchsorted(i, np.arange(grid.columns + 1))
             lens = np.broadcast_to(i.astype(np.int32), (panel.height, panel.width))
-            first = np.broadcast_to(edges, (panel.height, len(edges)))
         else:
             i, j = pixel_lenses(display)
             lens = (j * np.int32(grid.columns) + i).astype(np.int32)
-            first = _stretches(lens)
         rows, columns = (a.ravel().astype(np.float64) for a in np.indices((grid.rows, grid.columns)))
         zero = np.zeros_like(columns)
         x, y = display.lens_center(columns, rows, zero, zero, NUMPY)
         u, v = display.pixel_coordinates(x, y)
-        return LensField(lens, np.stack([u - 0.5, v - 0.5], axis=1), first, grid.columns)
+        return LensField(lens, np.stack([u - 0.5, v - 0.5], axis=1), grid.columns)
 
     def lens_beside(self, down: int, right: int) -> NDArray[np.int64]:
         """``(lenses,)``: the lens so many rows down and columns to the right of each; -1 for none."""
@@ -98,15 +92,3 @@ class LensField(NamedTuple):
         x, y = np.where(exists, x, 0), np.where(exists, y, 0)
         exists &= self.lens[y, x] == other
         return np.where(exists, y * width + x, -1)
-
-
-def _stretches(lens: NDArray[np.int32]) -> NDArray[np.int64]:
-    height, width = lens.shape
-    begins = np.ones(lens.shape, dtype=np.bool_)
-    begins[:, 1:] = lens[:, 1:] != lens[:, :-1]
-    counts = begins.sum(axis=1)
-    first = np.full((height, int(counts.max()) + 1), width, dtype=np.int64)
-    row, column = np.nonzero(begins)
-    starts = np.cumsum(counts) - counts
-    first[row, np.arange(len(row)) - starts[row]] = column
-    return first

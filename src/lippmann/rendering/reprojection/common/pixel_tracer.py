@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
 from lippmann.device.types import Array, Float, Ray3f, UInt32
+from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.batched_picture import STREAMS
 from lippmann.rendering.film.wavefront import RayTotals, compile_seconds
 from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray, RealArray
@@ -45,7 +46,9 @@ class PixelTracer:
         most_lanes: int,
         display_from_world: NDArray[np.float64],
         bands: Bands,
+        progress: ProgressCallback = silent,
     ) -> None:
+        self._progress = progress
         self._bands = bands
         self._integrator = integrator
         self._source = source
@@ -71,6 +74,8 @@ class PixelTracer:
             self.seconds_compile += compiling
             self.seconds_trace += time.perf_counter() - started - compiling
             self._bands.pixels(_enter, len(part), points, part, self._samples, *found)
+            done = self.rays.primary // self._samples
+            self._progress(Progress("trace", min(done, points.status.size), points.status.size))
 
     def _trace(self, numbers: Pixels) -> tuple[NDArray[np.generic], ...]:
         """Red, green, blue, disparity and whether it is fragile of all samples, pixel by pixel."""

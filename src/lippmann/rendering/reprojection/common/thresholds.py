@@ -26,10 +26,8 @@ class Rules(NamedTuple):
         Every so many rows have probes, two in each micro-image, under straight cylindrical lenses.
     probe_stride:
         One pixel in so many is a probe, under all other lenses.
-    longest_gap:
-        Pixels from one traced pixel to the next in what no point reached; what lies between them is bridged.
-    overhang:
-        Pixels at the end of a micro-image that may be extrapolated.
+    run_step:
+        Pixels from one traced pixel of a run of missed ones to the next.
     """
 
     careful: bool
@@ -37,15 +35,14 @@ class Rules(NamedTuple):
     coded: bool
     probe_rows: int
     probe_stride: int
-    longest_gap: int
-    overhang: int
+    run_step: int
 
 
 def choose_rules(*, careful: bool, coded: bool) -> Rules:
     """The rules of a picture; ``careful`` and ``coded`` as in :class:`Rules`."""
     if careful:
-        return Rules(True, 0.06, coded, probe_rows=4, probe_stride=16, longest_gap=3, overhang=0)
-    return Rules(False, 0.12, coded, probe_rows=16, probe_stride=32, longest_gap=5, overhang=1)
+        return Rules(True, 0.06, coded, probe_rows=4, probe_stride=16, run_step=3)
+    return Rules(False, 0.12, coded, probe_rows=16, probe_stride=32, run_step=4)
 
 
 @inlined

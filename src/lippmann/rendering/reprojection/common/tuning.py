@@ -23,13 +23,10 @@ class Tuning(NamedTuple):
         a lens.
     one_point:
         Sources on two sides show one point if their disparities agree to this part.
+    one_height:
+        Pixels of a run see one surface, too, if their heights differ by at most this part of the display's gap.
     one_probed_surface:
         Two probes, some pixels apart, see one surface if their disparities agree to this part.
-    one_surface_per_pixel:
-        Across a gap disparities of one surface change by at most this part per pixel ...
-    height_per_pixel:
-        ... or its height by this part of the display's gap: near to the lens plane disparities are huge and change
-        their sign.
     on_center:
         Pixels. A point this near to a pixel's centre lies on it: rounding must not decide.
     longest_piece:
@@ -53,9 +50,8 @@ class Tuning(NamedTuple):
     strides: tuple[int, int, int] = (16, 4, 1)
     one_surface: float = 0.2
     one_point: float = 0.15
+    one_height: float = 0.06
     one_probed_surface: float = 0.3
-    one_surface_per_pixel: float = 0.06
-    height_per_pixel: float = 0.02
     on_center: float = 1e-3
     longest_piece: float = 3.0
     smallest_share: float = 0.25

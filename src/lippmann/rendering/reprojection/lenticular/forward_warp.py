@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray, RealArray
+from lippmann.rendering.reprojection.common.array_types import IntArray, RealArray
 from lippmann.rendering.reprojection.common.lens_map import LensField
-from lippmann.rendering.reprojection.common.point_image import BACKGROUND, REPROJECTED, TRACED, PointImage
+from lippmann.rendering.reprojection.common.point_image import BACKGROUND, REPROJECTED, TRACED, WANTED, PointImage
 from lippmann.rendering.reprojection.common.schedule import Lenses, Step
 from lippmann.rendering.reprojection.common.thresholds import Rules, alike, coded_value, color_difference, nearer
 from lippmann.rendering.reprojection.common.tuning import TUNING
@@ -52,7 +52,7 @@ class ForwardWarp:
         self._points = points
         self._bands = bands
         self._rules = rules
-        self._rows = Rows(field.first[0].copy(), field.center[:, 0].copy())
+        self._rows = Rows(np.searchsorted(field.lens[0], np.arange(field.columns + 1)), field.center[:, 0].copy())
 
     def probes(self, row: int) -> NDArray[np.int64]:
         """Columns of the probes in a row: two in each micro-image of some rows."""
@@ -62,11 +62,10 @@ class ForwardWarp:
         place = count * (first_place(row // self._rules.probe_rows) + np.array([[0], [4]])) // 8
         return np.unique((first + place)[place < count])
 
-    def receive(self, step: Step, unsettled: BoolArray) -> None:
-        """Give the targets of a step the points of their sources; ``unsettled`` as for :func:`receive`."""
-        self._bands.lines(
-            receive, len(unsettled), self._points, self._rows, step.targets, step.sources, self._rules, unsettled
-        )
+    def receive(self, step: Step) -> None:
+        """Give the targets of a step the points of their sources."""
+        height = len(self._points.status)
+        self._bands.lines(receive, height, self._points, self._rows, step.targets, step.sources, self._rules)
 
     def finish(self, lenses: Lenses) -> None:
         """Others receive from these lenses now, which takes no preparation."""
@@ -100,12 +99,10 @@ def receive(
     targets: IntArray,
     sources: IntArray,
     rules: Rules,
-    unsettled: BoolArray,
 ) -> None:
     """Give the micro-images ``targets (n,)`` the points of ``sources (n, 2)``, to the left and right (-1: none).
 
-    Pixels that get a point become :data:`REPROJECTED`; traced ones stay as they are. ``unsettled (H, lenses)`` says
-    which rows of micro-images have missed pixels left.
+    Pixels that get a point become :data:`REPROJECTED`, missed ones :data:`WANTED`; traced ones stay as they are.
     """
     widest = 1
     for t in range(len(targets)):
@@ -114,7 +111,7 @@ def receive(
     scratch = Scratch(
         np.empty((2, widest)), np.empty((2, widest), np.int64), np.empty((2, widest)), np.empty((2, widest))
     )
-    _receive(first_row, last_row, points, rows, targets, sources, rules, unsettled, limits, scratch)
+    _receive(first_row, last_row, points, rows, targets, sources, rules, limits, scratch)
 
 
 @uncounted
@@ -126,7 +123,6 @@ def _receive(
     targets: IntArray,
     sources: IntArray,
     rules: Rules,
-    unsettled: BoolArray,
     limits: RealArray,
     scratch: Scratch,
 ) -> None:
@@ -146,7 +142,7 @@ def _receive(
                     scratch.hidden[side, place] = BACKGROUND
                 if source >= 0:
                     draw(points, rows, row, source, lens, side, scratch)
-            settle(points, rows, row, lens, scratch, weight, limits, t, rules, unsettled)
+            settle(points, rows, row, lens, scratch, weight, limits, t, rules)
 
 
 @inlined
@@ -259,7 +255,6 @@ def settle(
     limits: RealArray,
     entry: int,
     rules: Rules,
-    unsettled: BoolArray,
 ) -> None:
     """Decide what the pixels of one row of a micro-image take of the points drawn from its left and right source."""
     s, piece, part, hidden = scratch.disparity, scratch.piece, scratch.part, scratch.hidden
@@ -267,12 +262,11 @@ def settle(
     count = rows.first[lens + 1] - begin
     first_probe = (count * first_place(row // rules.probe_rows)) // 8
     second_probe = first_probe + count // 2
-    missed = 0
     for place in range(count):
         column = begin + place
         if points.status[row, column] == TRACED:
             continue
-        missed += 1
+        points.status[row, column] = WANTED
         from_left, from_right = piece[0, place] >= 0, piece[1, place] >= 0
         if not (from_left or from_right):
             continue
@@ -324,5 +318,3 @@ def settle(
             continue
         points.disparity[row, column] = depth
         points.status[row, column] = REPROJECTED
-        missed -= 1
-    unsettled[row, lens] = missed > 0

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from lippmann.display import Display
-from lippmann.rendering.reprojection.common.gap_filling import Settled
 from lippmann.rendering.reprojection.common.lens_map import LensField
 from lippmann.rendering.reprojection.common.pixel_tracer import PixelTracer
 from lippmann.rendering.reprojection.common.point_image import TRACED, PointImage
@@ -48,12 +47,8 @@ def search(
     tracer: PixelTracer,
     bands: Bands,
     rules: Rules,
-    settled: Settled,
 ) -> None:
-    """Trace what of the finished picture ``points`` is falsified, as far as it can be found.
-
-    ``settled`` is called with the number of pixels that have just been traced.
-    """
+    """Trace what of the finished picture ``points`` is falsified, as far as it can be found."""
     sides = ((0, -1), (0, 1), (-1, 0), (1, 0))
     reach, beside = field.reach, np.stack([field.lens_beside(*side) for side in sides], axis=1)
     wanted = np.zeros(points.status.shape, dtype=np.bool_)
@@ -73,7 +68,6 @@ def search(
         wanted[:] = False
         predicted = colors[numbers]
         tracer.trace(numbers, points)
-        settled(len(numbers))
         wrong = region_growing.wrong_predictions(points, numbers, predicted, rules.tolerance, rules.coded)
         region_growing.mark_near(points, field.lens, wrong, wanted)
         for each in neighborhoods.of_wrong:

@@ -1,0 +1,52 @@
+"""Missed pixels as the mean of the corresponding ones under the lenses to either side: the paper's interpolation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lippmann.rendering.reprojection.common.array_types import IntArray
+from lippmann.rendering.reprojection.common.lens_map import LensField
+from lippmann.rendering.reprojection.common.pixel_tracer import Pixels
+from lippmann.rendering.reprojection.common.point_image import INTERPOLATED, PointImage
+from lippmann.rendering.reprojection.common.thresholds import Rules, color_difference
+from lippmann.rendering.reprojection.common.tuning import TUNING
+from lippmann.runtime.numba_jit import uncounted
+from lippmann.runtime.row_threads import Bands
+
+
+def average_neighbors(points: PointImage, field: LensField, numbers: Pixels, rules: Rules, bands: Bands) -> None:
+    """Give the pixels ``numbers`` (linear) the mean colour of their corresponding ones, or of the one that there is.
+
+    Pixels without any stay missed; where ``careful`` is set, so do those with one neighbour, or with two that disagree.
+    """
+    bands.pixels(_average, len(numbers), points, numbers, *field.corresponding_beside(numbers), rules)
+
+
+@uncounted
+def _average(
+    first: int, last: int, points: PointImage, numbers: IntArray, left: IntArray, right: IntArray, rules: Rules
+) -> None:
+    """``left`` and ``right``: the corresponding pixels of each of ``numbers``; -1 for none."""
+    width = points.status.shape[1]
+    for i in range(first, last):
+        one, other = left[i], right[i]
+        if one < 0 and other < 0:
+            continue
+        if one < 0 or other < 0:
+            one = other = max(one, other)
+        row, column = divmod(int(numbers[i]), width)
+        one_row, one_column = divmod(one, width)
+        other_row, other_column = divmod(other, width)
+        if rules.careful and (
+            one == other
+            or points.fragile[one_row, one_column]
+            or points.fragile[other_row, other_column]
+            or color_difference(points.color, one_row, one_column, other_row, other_column, rules.coded)
+            > TUNING.averaged_tolerance * rules.tolerance
+        ):
+            continue
+        for channel in range(3):
+            total = points.color[one_row, one_column, channel] + points.color[other_row, other_column, channel]
+            points.color[row, column, channel] = np.float32(0.5) * total
+        points.disparity[row, column] = points.disparity[one_row, one_column]
+        points.status[row, column] = INTERPOLATED

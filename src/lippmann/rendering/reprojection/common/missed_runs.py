@@ -1,0 +1,76 @@
+"""Runs of missed pixels: a few are traced, and what lies between those that see one surface is bridged. Compiled.
+
+A run is a stretch of missed pixels of one row under one lens. A lens shows only a small piece of a surface near to the
+lens plane, and shows it magnified: there no other lens helps, but a few pixels tell most.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lippmann.rendering.reprojection.common.array_types import IntArray
+from lippmann.rendering.reprojection.common.point_image import REPROJECTED, WANTED, PointImage
+from lippmann.rendering.reprojection.common.thresholds import Rules, alike, color_difference
+from lippmann.rendering.reprojection.common.tuning import TUNING
+from lippmann.runtime.numba_jit import uncounted
+
+#: Status of the pixels of a run that are not traced, until they are bridged.
+_BRIDGED = WANTED - 1
+
+
+@uncounted
+def thin_out(first_row: int, last_row: int, points: PointImage, lens: IntArray, rules: Rules) -> None:
+    """Leave :data:`WANTED` only the first pixel of each run and one in ``run_step`` of the others.
+
+    From row to row the places shift, so that upright lines do not slip through.
+    """
+    for row in range(first_row, last_row):
+        place = 0
+        for column in range(points.status.shape[1]):
+            if points.status[row, column] != WANTED or (place and lens[row, column] != lens[row, column - 1]):
+                place = 0
+            if points.status[row, column] == WANTED:
+                if place and (place + row) % rules.run_step:
+                    points.status[row, column] = _BRIDGED
+                place += 1
+
+
+@uncounted
+def bridge(first_row: int, last_row: int, points: PointImage, lens: IntArray, rules: Rules) -> None:
+    """Fill what was left out between known pixels: with both where they see one surface, else with the nearer one.
+
+    Where reuse is careful, what lies between pixels that differ in surface, colour or fragility is wanted instead.
+    """
+    width = points.status.shape[1]
+    for row in range(first_row, last_row):
+        for start in range(1, width):
+            if points.status[row, start] != _BRIDGED:
+                continue
+            left, right = start - 1, start + 1
+            while right < width and points.status[row, right] == _BRIDGED and lens[row, right] == lens[row, left]:
+                right += 1
+            has_right = right < width and lens[row, right] == lens[row, left]
+            last = right if has_right else left
+            s, t = np.float64(points.disparity[row, left]), np.float64(points.disparity[row, last])
+            # Near to the lens plane disparities are huge and change their sign: there heights are compared.
+            is_one = has_right and (alike(s, t, TUNING.one_surface) or abs(s - t) <= TUNING.one_height * abs(s * t))
+            if rules.careful and (
+                not is_one
+                or points.fragile[row, left] != points.fragile[row, last]
+                or color_difference(points.color, row, left, row, last, rules.coded) > rules.tolerance
+            ):
+                points.status[row, start:right] = WANTED
+                continue
+            for column in range(start, right):
+                share = (column - left) / (right - left)
+                nearest = last if share > 0.5 else left
+                if not is_one:
+                    share = 1.0 if nearest == last else 0.0
+                for channel in range(3):
+                    one, other = points.color[row, left, channel], points.color[row, last, channel]
+                    points.color[row, column, channel] = (1.0 - share) * one + share * other
+                points.disparity[row, column] = points.disparity[row, nearest]
+                if s * t > 0.0:
+                    points.disparity[row, column] = (1.0 - share) * s + share * t
+                points.fragile[row, column] = points.fragile[row, left] or points.fragile[row, last]
+                points.status[row, column] = REPROJECTED
