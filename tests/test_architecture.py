@@ -426,9 +426,9 @@ WALK = (
 )
 
 #: How large the centre of the program may be. Raised by hand alone, and only where a user is worth it.
-MOST_LINES = 16_055
-MOST_CONSTANTS = 234
-MOST_BRANCHES = 188
+MOST_LINES = 15_730
+MOST_CONSTANTS = 220
+MOST_BRANCHES = 185
 #: Files of which a default render calls a function, and calls from a file to one of a part above its own.
 MOST_FILES = 156
 MOST_CLIMBING = 4

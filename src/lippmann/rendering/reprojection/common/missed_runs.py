@@ -9,13 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from lippmann.rendering.reprojection.common.array_types import IntArray
-from lippmann.rendering.reprojection.common.point_image import REPROJECTED, WANTED, PointImage
+from lippmann.rendering.reprojection.common.point_image import BRIDGED, REPROJECTED, WANTED, PointImage
 from lippmann.rendering.reprojection.common.thresholds import Rules, alike, color_difference
 from lippmann.rendering.reprojection.common.tuning import TUNING
 from lippmann.runtime.numba_jit import uncounted
-
-#: Status of the pixels of a run that are not traced, until they are bridged.
-_BRIDGED = WANTED - 1
 
 
 @uncounted
@@ -31,7 +28,7 @@ def thin_out(first_row: int, last_row: int, points: PointImage, lens: IntArray, 
                 place = 0
             if points.status[row, column] == WANTED:
                 if place and (place + row) % rules.run_step:
-                    points.status[row, column] = _BRIDGED
+                    points.status[row, column] = BRIDGED
                 place += 1
 
 
@@ -44,10 +41,10 @@ def bridge(first_row: int, last_row: int, points: PointImage, lens: IntArray, ru
     width = points.status.shape[1]
     for row in range(first_row, last_row):
         for start in range(1, width):
-            if points.status[row, start] != _BRIDGED:
+            if points.status[row, start] != BRIDGED:
                 continue
             left, right = start - 1, start + 1
-            while right < width and points.status[row, right] == _BRIDGED and lens[row, right] == lens[row, left]:
+            while right < width and points.status[row, right] == BRIDGED and lens[row, right] == lens[row, left]:
                 right += 1
             has_right = right < width and lens[row, right] == lens[row, left]
             last = right if has_right else left

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 #: Status of a pixel, as the paper keeps it: -1 is missed, 0 filled. What was filled without tracing keeps marks of its
 #: own, so that maps and counts can tell them apart.
 MISSED, TRACED, REPROJECTED, INTERPOLATED = range(-1, 3)
-#: A missed pixel that is about to be traced.
-WANTED = MISSED - 1
+#: Missed pixels that are about to be traced, and those that will be filled from such ones.
+WANTED, BRIDGED = range(-2, -4, -1)
 
 #: The layer of a picture that holds the status of its pixels.
 STATUS_LAYER = "status"
