@@ -103,14 +103,15 @@ def test_a_frame_journal_is_not_made_through_a_link(tmp_path):
     assert not (tmp_path / "nowhere").exists()
 
 
-def test_a_job_and_a_lock_are_not_written_through_links(output, tmp_path):
-    journal_of(output).mkdir()
-    (journal_of(output) / "job.json").symlink_to(tmp_path / "nowhere")
-    with pytest.raises(PictureError, match=r"holds 'job\.json' and no"):
-        opened(output)
-    (journal_of(output) / "job.json").unlink()
-    (journal_of(output) / "lock").symlink_to(tmp_path / "nowhere")
+def test_a_job_and_a_lock_are_not_written_through_links(output, folder, tmp_path):
+    (folder / "lock").unlink()
+    (folder / "lock").symlink_to(tmp_path / "nowhere")
     with pytest.raises(PictureError, match="its lock is a symbolic link"):
+        opened(output)
+    (folder / "lock").unlink()
+    (folder / "job.json").unlink()
+    (folder / "job.json").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(PictureError, match=r"holds 'job\.json' and no"):
         opened(output)
     assert not (tmp_path / "nowhere").exists()
 
