@@ -51,7 +51,7 @@ def _measure(path: Path, runs: int) -> dict[str, Any]:
     exports, reads = [], []
     for _ in range(runs + 1):
         begin = time.perf_counter()
-        with exported(path, allow_outside=False) as files:
+        with exported(path, None) as files:
             middle = time.perf_counter()
             description = complete(read_gltf(files.scene), files, path.stem, read_world(files))
             size = files.scene.stat().st_size

@@ -6,6 +6,7 @@ import trimesh
 
 from lippmann.errors import SceneError
 from lippmann.scene.mitsuba_xml import MOST_INCLUDE_LEVELS, MOST_LEVELS, MitsubaXml, read_mitsuba_xml
+from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.readers.load import load_scene
 
 MESH = '<shape type="ply"><string name="filename" value="{}"/></shape>'
@@ -232,7 +233,7 @@ class TestFolders:
     @pytest.mark.parametrize("body", OUTSIDE[:6])
     def test_unless_the_file_is_trusted(self, save, tmp_path, body):
         secret = put(tmp_path / "secret.ply")
-        document = read_mitsuba_xml(save(body.format(folder=tmp_path)), allow_outside=True)
+        document = read_mitsuba_xml(save(body.format(folder=tmp_path)), NamedFiles(tmp_path / "scene", True))
         assert [path.resolve() for path in document.files.values()] == [secret]
         assert list(document.files) == ["../secret.ply"]
 

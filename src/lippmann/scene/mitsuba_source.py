@@ -21,6 +21,7 @@ from lippmann.scene.mitsuba_plugins import check_plugins_of
 from lippmann.scene.mitsuba_trial import try_scene
 from lippmann.scene.mitsuba_trial_child import NO_ROOM
 from lippmann.scene.mitsuba_xml import MitsubaXml, read_mitsuba_xml
+from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.values.description import Camera, Color, Environment
 
 if TYPE_CHECKING:
@@ -133,7 +134,7 @@ class MitsubaSource:
         return _TEXT_POSITION.sub(lambda match: content.origin(int(match[1])), message)
 
 
-def read_mitsuba(path: Path, *, allow_outside: bool = False) -> MitsubaSource:
+def read_mitsuba(path: Path, *, files: NamedFiles | None = None) -> MitsubaSource:
     """A Mitsuba XML scene, read and checked but not yet loaded.
 
     Raises
@@ -141,7 +142,7 @@ def read_mitsuba(path: Path, *, allow_outside: bool = False) -> MitsubaSource:
     SceneError
         As of :func:`~lippmann.scene.mitsuba_xml.read_mitsuba_xml`.
     """
-    return MitsubaSource(path.stem, read_mitsuba_xml(path, allow_outside=allow_outside))
+    return MitsubaSource(path.stem, read_mitsuba_xml(path, files))
 
 
 def with_sky(scene: mi.Scene, sky: mi.Emitter) -> mi.Scene:

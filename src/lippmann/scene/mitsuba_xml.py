@@ -103,16 +103,16 @@ class MitsubaXml:
             stack += [element.tag, *reversed(element.children)]
 
 
-def read_mitsuba_xml(path: Path, *, allow_outside: bool = False) -> MitsubaXml:
+def read_mitsuba_xml(path: Path, files: NamedFiles | None = None) -> MitsubaXml:
     """Read a scene file and the files that it includes; the files that they name are found, but not opened.
 
     Raises
     ------
     SceneError
         A file is missing, is no XML or no scene, names a plugin or material that Mitsuba does not have, or names a
-        file that is not found or, without ``allow_outside``, not in the scene's folder.
+        file that is not found, or that is none of ``files``.
     """
-    reader = _Reader(NamedFiles(path.parent, allow_outside))
+    reader = _Reader(NamedFiles.of(path, files))
     root = reader.file(path, {}, [], "", level=0)
     if root.tag != "scene":
         raise SceneError(f"is XML of a '{root.tag[:40]}'", where=path.name, rule="a Mitsuba file holds a 'scene'")

@@ -17,6 +17,7 @@ from lippmann.options.placement import PlacementOptions
 from lippmann.options.scene import SceneOptions
 from lippmann.runtime.plugins import function_of
 from lippmann.scene.matrices import Bounds
+from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.placement import Placement
 from lippmann.scene.readers.load import kind_of_file, read_scene
 from lippmann.scene.readers.registry import READERS, MovingScene
@@ -148,7 +149,7 @@ def _open_moving(
     plugin = READERS.find(kind_of_file(path) or "")
     assert plugin is not None
     assert plugin.value.moving is not None
-    values = {"allow_outside": allow_outside, "variants": variants}
+    values = {"files": NamedFiles(path.parent, allow_outside), "variants": variants}
     chosen = {name: value for name, value in values.items() if value and name in plugin.value.options}
     with plugin.guarded(SceneError, path.name):
         moving: MovingScene = function_of(plugin.value.moving)(path, animation=animation, **chosen)

@@ -106,6 +106,11 @@ class NamedFiles:
     folder: Path
     anywhere: bool = False
 
+    @classmethod
+    def of(cls, path: Path, files: NamedFiles | None) -> NamedFiles:
+        """``files``; without, those that a scene file of this path may name by itself."""
+        return files or cls(path.parent)
+
     def find(self, name: str, *, where: str, what: str, folders: Sequence[Path] = ()) -> Path:
         """The file that ``name`` means, seen from the first of ``folders`` that has it; by default the scene's own.
 

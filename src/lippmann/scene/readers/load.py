@@ -19,7 +19,7 @@ from lippmann.runtime.plugins import Plugin, function_of
 from lippmann.scene.cloud_selection import SplatSelection, VolumeSelection
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.dicom_files import DICOM, holds_dicom
-from lippmann.scene.parsing.files import read_bytes
+from lippmann.scene.parsing.files import NamedFiles, read_bytes
 from lippmann.scene.readers.registry import READERS, VTK, Reader, ReaderOption, suffixes_with
 from lippmann.scene.readers.splats.sog_folder import holds_sog
 from lippmann.scene.scene import Scene, check_description, override_light
@@ -229,7 +229,7 @@ def _from_name(source: str | Path, allow_outside: bool, asked: SceneOptions) -> 
     plugin = _reader_of(path, suffix)
     reader = plugin.value
     values = {
-        "allow_outside": allow_outside,
+        "files": NamedFiles(path.parent, allow_outside),
         "variants": asked.variants,
         "depth_map": None if asked.depth_map is None else Path(asked.depth_map),
         "series": asked.series,

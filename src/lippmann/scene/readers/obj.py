@@ -76,13 +76,13 @@ class _Geometry:
 _MOST_LIBRARIES = 1000
 
 
-def read_obj(path: Path, *, allow_outside: bool = False) -> SceneDescription:
+def read_obj(path: Path, *, files: NamedFiles | None = None) -> SceneDescription:
     """Read an OBJ file; faces of one material become one mesh.
 
     Parameters
     ----------
-    allow_outside:
-        Follow material libraries and textures out of the file's folder.
+    files:
+        Those that it may name; by default those of its folder and below.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def read_obj(path: Path, *, allow_outside: bool = False) -> SceneDescription:
         fix = "points are drawn where 'p' names them" if statements.positions.bodies else "is it an OBJ file?"
         raise SceneError("holds no faces, lines or points", where=where, fix=fix)
     geometry = _assemble(statements, where)
-    named = NamedFiles(path.parent, allow_outside)
+    named = NamedFiles.of(path, files)
     records, missing = _read_libraries(statements.libraries, where, named)
     mapper = MaterialMapper(named)
     meshes: list[Mesh] = []

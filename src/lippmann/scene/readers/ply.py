@@ -40,7 +40,7 @@ _ELEMENTS = ("vertex", "face", "tristrips")
 _MOST_VERTICES = 1 << 53
 
 
-def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
+def read_ply(path: Path, *, files: NamedFiles | None = None) -> SceneDescription:
     """Read a PLY mesh with its vertex normals, colours and texture coordinates, a cloud of points, or Gaussian splats.
 
     Colours are taken as sRGB-coded. Without normals the facets are flat. Points become balls, unshaded where they
@@ -75,7 +75,7 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
         notes.append("colours of faces are not shown: vertices have their own")
     textures: list[Texture | None] = []
     for name in header.textures:
-        image = NamedFiles(path.parent, allow_outside).find(name, where=where, what="texture")
+        image = NamedFiles.of(path, files).find(name, where=where, what="texture")
         textures.append(Texture(read_image(image, where=where), srgb=True))
     if textures and not mesh.uvs:
         notes.append("the texture is not used: the file gives no texture coordinates")

@@ -14,9 +14,9 @@ from lippmann.options.scene import Up
 from lippmann.runtime.plugins import Door, Extension, Target
 from lippmann.scene.values.description import SceneDescription
 
-#: Options of a scene that are for some readers alone: ``allow_outside`` lets a file name files beside its own folder,
+#: Options of a scene that are for some readers alone: ``files`` are those that a file may name,
 #: ``variants`` chooses among those of a file, ``depth_map`` names a photograph's, ``series`` one of several volumes.
-ReaderOption = Literal["allow_outside", "variants", "depth_map", "series"]
+ReaderOption = Literal["files", "variants", "depth_map", "series"]
 
 _SUFFIX = re.compile(r"(\.[a-z0-9_+-]+){1,2}")
 
@@ -55,14 +55,15 @@ class Reader(Extension):
     beginnings:
         Suffixes by the first bytes of files of that kind; these tell files that are called otherwise.
     options:
-        Which of ``allow_outside``, ``variants``, ``depth_map`` and ``series`` ``read`` takes as keywords.
+        Which of ``files``, ``variants``, ``depth_map`` and ``series`` ``read`` takes as keywords. ``files.find(name,
+        where=..., what="texture")`` is the path of a file that the scene names, by the rules that hold for all scenes.
     up:
         The way that mostly is up in files which do not say it: ``"y"``, ``"z"`` or ``"-y"``. Users may then ask for
         another (``up``). None: files say it.
     moving:
         ``moving(path, animation=..., ...)`` returns an object with ``duration`` (seconds), ``at(seconds)``, a
         :class:`SceneDescription`, and ``content``, the plain values that all depends on. It takes those of ``options``
-        that are ``allow_outside`` or ``variants``. None: nothing moves.
+        that are ``files`` or ``variants``. None: nothing moves.
 
     Examples
     --------
@@ -98,31 +99,31 @@ _OWN = {
         (".blend",),
         f"{_HERE}.blend:read_blend",
         {b"BLENDER": ".blend"},
-        ("allow_outside",),
+        ("files",),
         moving=f"{_HERE}.blend.moving:MovingBlend",
     ),
-    "tachyon": Reader((".dat",), f"{_HERE}.tachyon.reader:read_tachyon", options=("allow_outside",)),
+    "tachyon": Reader((".dat",), f"{_HERE}.tachyon.reader:read_tachyon", options=("files",)),
     "gltf": Reader(
         (".glb", ".gltf"),
         f"{_HERE}.gltf:read_gltf",
         {b"glTF": ".glb", b"{": ".gltf"},
-        ("allow_outside", "variants"),
+        ("files", "variants"),
         moving=f"{_HERE}.gltf_animation.animated_file:MovingGltf",
     ),
     "nff": Reader((".nff",), f"{_HERE}.nff:read_nff"),
-    "obj": Reader((".obj",), f"{_HERE}.obj:read_obj", options=("allow_outside",), up="y"),
-    "ply": Reader((".ply",), f"{_HERE}.ply:read_ply", {b"ply\n": ".ply", b"ply\r": ".ply"}, ("allow_outside",), "y"),
-    "sog": Reader((".sog",), f"{_HERE}.splats.sog:read_sog", options=("allow_outside",), up="-y"),
+    "obj": Reader((".obj",), f"{_HERE}.obj:read_obj", options=("files",), up="y"),
+    "ply": Reader((".ply",), f"{_HERE}.ply:read_ply", {b"ply\n": ".ply", b"ply\r": ".ply"}, ("files",), "y"),
+    "sog": Reader((".sog",), f"{_HERE}.splats.sog:read_sog", options=("files",), up="-y"),
     "spz": Reader((".spz",), f"{_HERE}.splats.spz:read_spz", up="y"),
     "stl": Reader((".stl",), f"{_HERE}.stl:read_stl", up="z"),
     "usd": Reader(
         (".usd", ".usda", ".usdc", ".usdz"),
         f"{_HERE}.usd:read_usd",
         {b"#usda": ".usda", b"PXR-USDC": ".usdc"},
-        ("allow_outside", "variants"),
+        ("files", "variants"),
         moving=f"{_HERE}.usd.moving_stage:MovingStage",
     ),
-    "mitsuba": Reader((".xml",), "lippmann.scene.mitsuba_source:read_mitsuba", {b"<": ".xml"}, ("allow_outside",)),
+    "mitsuba": Reader((".xml",), "lippmann.scene.mitsuba_source:read_mitsuba", {b"<": ".xml"}, ("files",)),
     "nifti": Reader((".nii", ".nii.gz"), f"{_HERE}.volumes.nifti:read_nifti", options=("series",)),
     "numpy": Reader((".npy",), f"{_HERE}.volumes.numpy_arrays:read_array", up="y"),
     "numpy-archive": Reader((".npz",), f"{_HERE}.volumes.numpy_arrays:read_array", options=("series",), up="y"),

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from lippmann.errors import MemoryLimitError, SceneError
 from lippmann.runtime.machine import limit_inputs
+from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.readers.blend import export, read_blend
 from lippmann.scene.readers.load import load_scene
 
@@ -97,7 +98,7 @@ def test_blender_is_asked_for_no_scripts_and_no_input(give, blend, tmp_path):
     assert given == ""
     assert not Path(out).exists()
     give(triangle(), f"{TELL}\n{note}")
-    read_blend(blend, allow_outside=True)
+    read_blend(blend, files=NamedFiles(blend.parent, True))
     assert json.loads(json.loads(told.read_text())[0][-1])["folder"] is None
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.readers.blend import read_blend
 from lippmann.scene.readers.blend.find_blender import VARIABLE
 from lippmann.scene.readers.load import load_scene
@@ -147,7 +148,7 @@ def test_files_that_blender_cannot_give(real_blender, real_scenes, monkeypatch, 
         SceneError, match=r"^outside\.blend: names the file '.*secret\.png' outside its folder; pack it"
     ):
         read_blend(real_scenes / "outside.blend")
-    assert read_blend(real_scenes / "outside.blend", allow_outside=True).meshes
+    assert read_blend(real_scenes / "outside.blend", files=NamedFiles(real_scenes, True)).meshes
     with pytest.raises(SceneError, match=r"^empty\.blend: the file shows no triangles"):
         load_scene(real_scenes / "empty.blend")
     cut = tmp_path / "cut.blend"

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from lippmann.errors import SceneError, UsageError
+from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.readers.gltf import read_gltf
 from lippmann.scene.readers.load import load_scene
 
@@ -190,7 +191,7 @@ def test_files_outside_the_folder_need_leave(writer, tmp_path, form):
     path.write_text(json.dumps(writer.json))
     with pytest.raises(SceneError, match=r"secret\.bin' lies outside the scene's folder"):
         read_gltf(path)
-    assert len(read_gltf(path, allow_outside=True).meshes) == 1
+    assert len(read_gltf(path, files=NamedFiles(path.parent, True)).meshes) == 1
 
 
 @pytest.mark.parametrize("uri", ["https://example.org/scene.bin", "//example.org/scene.bin", "file:///etc/passwd"])

@@ -5,6 +5,7 @@ import pytest
 from PIL import Image
 
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.readers.tachyon.reader import read_tachyon
 
 TEXTURE = "TEXTURE AMBIENT 0 DIFFUSE 1 SPECULAR 0 OPACITY 1 COLOR 1 0 0 TEXFUNC {}"
@@ -77,7 +78,7 @@ def test_files_outside_the_folder_need_permission(tmp_path, item):
     with pytest.raises(SceneError, match="lies outside the scene's folder"):
         read_tachyon(path)
     if "PLANE" in item:
-        assert len(read_tachyon(path, allow_outside=True).images) == 1
+        assert len(read_tachyon(path, files=NamedFiles(path.parent, True)).images) == 1
 
 
 @pytest.mark.parametrize("item", ["INCLUDE nix.inc", f"PLANE CENTER 0 0 0 NORMAL 0 0 1 {PLANAR.format('nix.inc')}"])

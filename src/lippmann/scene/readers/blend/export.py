@@ -13,7 +13,7 @@ from typing import Any
 
 from lippmann.errors import SceneError
 from lippmann.runtime.child_python import python_command
-from lippmann.scene.parsing.files import read_bytes
+from lippmann.scene.parsing.files import NamedFiles, read_bytes
 from lippmann.scene.readers.blend.find_blender import find_blender
 
 #: Seconds that an export may take.
@@ -52,15 +52,15 @@ class Exported:
     notes: tuple[str, ...]
 
 
-def export(path: Path, out: Path, *, allow_outside: bool, is_animated: bool = False) -> Exported:
+def export(path: Path, out: Path, named: NamedFiles, *, is_animated: bool = False) -> Exported:
     """Have Blender write the scene of a file into the folder ``out``.
 
     Scripts inside the file do not run. Blender reads its linked libraries before anything can be refused.
 
     Parameters
     ----------
-    allow_outside:
-        Let the file name pictures and libraries outside its own folder.
+    named:
+        The pictures and libraries that the file may name.
     is_animated:
         Write the frames of the scene as one animation; else its present frame.
 
@@ -76,7 +76,7 @@ def export(path: Path, out: Path, *, allow_outside: bool, is_animated: bool = Fa
     place = path.resolve()
     request: dict[str, Any] = {
         "out": str(out),
-        "folder": None if allow_outside else str(place.parent),
+        "folder": None if named.anywhere else str(place.parent),
         "is_animated": is_animated,
         "open": None,
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.readers.blend.reader import complete, exported, read_world
 from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
 from lippmann.scene.values.description import SceneDescription
@@ -14,7 +15,7 @@ class MovingBlend:
 
     Parameters
     ----------
-    animation, allow_outside:
+    animation, files:
         As of :class:`lippmann.scene.readers.gltf_animation.animated_file.MovingGltf`.
 
     Raises
@@ -23,12 +24,12 @@ class MovingBlend:
         As :func:`lippmann.scene.readers.blend.read_blend`, and where nothing moves.
     """
 
-    def __init__(self, path: Path, *, animation: str | None = None, allow_outside: bool = False) -> None:
+    def __init__(self, path: Path, *, animation: str | None = None, files: NamedFiles | None = None) -> None:
         self._name = path.stem
-        with exported(path, allow_outside=allow_outside, is_animated=True) as files:
-            self._files = files
-            self._world = read_world(files)
-            self._moving = MovingGltf(files.scene, animation=animation)
+        with exported(path, files, is_animated=True) as made:
+            self._files = made
+            self._world = read_world(made)
+            self._moving = MovingGltf(made.scene, animation=animation)
 
     @property
     def content(self) -> object:

@@ -9,21 +9,22 @@ from pathlib import Path
 
 from lippmann.errors import MemoryLimitError, SceneError
 from lippmann.runtime.atomic_write import scratch_folder
+from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.readers.blend.export import Exported, export
 from lippmann.scene.readers.environment_map import read_environment
 from lippmann.scene.readers.gltf import read_gltf
 from lippmann.scene.values.description import Environment, SceneDescription
 
 
-def read_blend(path: Path, *, allow_outside: bool = False) -> SceneDescription:
+def read_blend(path: Path, *, files: NamedFiles | None = None) -> SceneDescription:
     """Read the scene of a ``.blend`` file at its present frame.
 
     Lengths are metres, as the file's unit scale has them. Lights keep the brightness that they have in Blender.
 
     Parameters
     ----------
-    allow_outside:
-        Let the file name pictures and libraries outside its own folder.
+    files:
+        Those that it may name; by default those of its folder and below.
 
     Raises
     ------
@@ -32,17 +33,17 @@ def read_blend(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     MemoryLimitError
         It takes more memory than is left.
     """
-    with exported(path, allow_outside=allow_outside) as files:
-        return complete(read_gltf(files.scene), files, path.stem, read_world(files))
+    with exported(path, files) as made:
+        return complete(read_gltf(made.scene), made, path.stem, read_world(made))
 
 
 @contextmanager
-def exported(path: Path, *, allow_outside: bool, is_animated: bool = False) -> Iterator[Exported]:
+def exported(path: Path, files: NamedFiles | None, *, is_animated: bool = False) -> Iterator[Exported]:
     """The files that Blender wrote, which are gone afterwards; errors within are the Blender file's."""
     with scratch_folder("lippmann-blend-") as folder:
-        files = export(path, Path(folder), allow_outside=allow_outside, is_animated=is_animated)
+        made = export(path, Path(folder), NamedFiles.of(path, files), is_animated=is_animated)
         try:
-            yield files
+            yield made
         except (SceneError, MemoryLimitError) as error:
             raise type(error)(error.what, where=path.name, rule=error.rule, fix=error.fix) from None
 

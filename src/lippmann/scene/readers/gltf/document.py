@@ -174,13 +174,13 @@ class Document:
         return SceneError(what, where=self.file, rule=rule, fix=fix)
 
 
-def open_document(path: Path, *, allow_outside: bool, variants: Mapping[str, str] | None = None) -> Document:
+def open_document(path: Path, *, files: NamedFiles | None, variants: Mapping[str, str] | None = None) -> Document:
     """Open a ``.glb`` or ``.gltf`` file; which of the two it is, its first bytes tell.
 
     Parameters
     ----------
-    allow_outside:
-        Let the file name buffers and images outside its own folder.
+    files:
+        Those that it may name; by default those of its folder and below.
     variants:
         ``{"materials": NAME}`` chooses a material variant.
 
@@ -197,7 +197,7 @@ def open_document(path: Path, *, allow_outside: bool, variants: Mapping[str, str
     else:
         text, binary_chunk = memoryview(data), None
     root = _parse(text, path.name)
-    named = NamedFiles(path.parent, allow_outside)
+    named = NamedFiles.of(path, files)
     document = Document(path.name, named, root, binary_chunk, _variant(root, variants or {}))
     _check_version(root)
     return document

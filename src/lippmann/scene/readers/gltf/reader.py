@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.readers.gltf.accessors import Accessors
 from lippmann.scene.readers.gltf.buffers import Buffers
 from lippmann.scene.readers.gltf.cameras_lights import read_camera, read_light
@@ -29,14 +30,14 @@ _MOST_INSTANCES = 1 << 21
 
 
 def read_gltf(
-    path: Path, *, allow_outside: bool = False, variants: Mapping[str, str] | None = None
+    path: Path, *, files: NamedFiles | None = None, variants: Mapping[str, str] | None = None
 ) -> SceneDescription:
     """Read the default scene of a ``.gltf`` or ``.glb`` file as it stands at rest.
 
     Parameters
     ----------
-    allow_outside:
-        Let the file name buffers and images outside its own folder.
+    files:
+        Those that it may name; by default those of its folder and below.
     variants:
         ``{"materials": NAME}`` chooses a material variant (KHR_materials_variants).
 
@@ -48,7 +49,7 @@ def read_gltf(
         The file, or one that it names, is missing, damaged or beyond its bounds; it requires an extension that is not
         understood; it holds nothing to see.
     """
-    document = open_document(path, allow_outside=allow_outside, variants=variants)
+    document = open_document(path, files=files, variants=variants)
     check_extensions(document)
     if document.root.children("animations"):
         document.notes.add("animations are not played without frames=...; the scene is shown at rest")

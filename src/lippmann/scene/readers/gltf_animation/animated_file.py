@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.readers.gltf.document import check_extensions, open_document
 from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.readers.gltf.points_lines import has_points_or_lines
@@ -22,7 +23,7 @@ class MovingGltf:
     ----------
     animation:
         Its name, or ``None`` for the first one.
-    allow_outside, variants:
+    files, variants:
         As of :func:`lippmann.scene.readers.gltf.read_gltf`.
 
     Attributes
@@ -41,10 +42,10 @@ class MovingGltf:
         path: Path,
         *,
         animation: str | None = None,
-        allow_outside: bool = False,
+        files: NamedFiles | None = None,
         variants: Mapping[str, str] | None = None,
     ) -> None:
-        document = open_document(path, allow_outside=allow_outside, variants=variants)
+        document = open_document(path, files=files, variants=variants)
         check_extensions(document)
         self._name = path.stem
         self._contents = Contents.of(document)

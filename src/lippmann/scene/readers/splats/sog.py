@@ -34,13 +34,13 @@ _FIRST_TURN = 252
 _MOST_BANDS = 3
 
 
-def read_sog(path: Path, *, allow_outside: bool = False) -> SceneDescription:
+def read_sog(path: Path, *, files: NamedFiles | None = None) -> SceneDescription:
     """Read a SOG file, or its unbundled form: a folder, or the meta.json in it.
 
     Parameters
     ----------
-    allow_outside:
-        Let meta.json name pictures outside its own folder.
+    files:
+        Those that it may name; by default those of its folder and below.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def read_sog(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     where = path.name or str(path)
     if holds_sog(path):
         folder = path if path.is_dir() else path.parent
-        return _read(_Folder(where, NamedFiles(folder, allow_outside)), folder.resolve().name)
+        return _read(_Folder(where, NamedFiles(folder, NamedFiles.of(path, files).anywhere)), folder.resolve().name)
     try:
         with zipfile.ZipFile(io.BytesIO(read_bytes(path))) as archive:
             return _read(_Bundle(where, archive), path.stem)

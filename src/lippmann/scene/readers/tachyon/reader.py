@@ -59,15 +59,15 @@ _REFUSED = {
 }
 
 
-def read_tachyon(path: str | Path, *, allow_outside: bool = False) -> ClassicScene:
+def read_tachyon(path: str | Path, *, files: NamedFiles | None = None) -> ClassicScene:
     """Read a Tachyon scene file with all that it includes.
 
     Parameters
     ----------
     path:
         The ``.dat`` file.
-    allow_outside:
-        Let the scene name files outside its own folder.
+    files:
+        Those that it may name; by default those of its folder and below.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def read_tachyon(path: str | Path, *, allow_outside: bool = False) -> ClassicSce
         without any primitive.
     """
     path = Path(path)
-    reader = _SceneReader(path, SceneFiles(NamedFiles(path.parent, allow_outside)))
+    reader = _SceneReader(path, SceneFiles(NamedFiles.of(path, files)))
     return reader.read()
 
 

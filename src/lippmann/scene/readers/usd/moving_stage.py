@@ -27,7 +27,7 @@ class MovingStage:
     ----------
     animation:
         None: a stage has one timeline, without a name.
-    allow_outside, variants:
+    files, variants:
         As of :func:`lippmann.scene.readers.usd.reader.read_usd`.
 
     Raises
@@ -41,7 +41,7 @@ class MovingStage:
         path: Path,
         *,
         animation: str | None = None,
-        allow_outside: bool = False,
+        files: NamedFiles | None = None,
         variants: Mapping[str, str] | None = None,
     ) -> None:
         if animation is not None:
@@ -51,8 +51,8 @@ class MovingStage:
         check_file(path)
         self._path = path
         self._variants = dict(variants or {})
-        self._allow_outside = allow_outside
-        self._assets = Assets(path, NamedFiles(path.resolve().parent, allow_outside))
+        self._named = NamedFiles(path.resolve().parent, NamedFiles.of(path, files).anywhere)
+        self._assets = Assets(path, self._named)
         tree, _ = self._ask(0.0)
         if tree["duration"] <= 0.0:
             raise SceneError(
@@ -82,4 +82,4 @@ class MovingStage:
         return describe(tree, arrays, self._path, self._assets)
 
     def _ask(self, seconds: float) -> tuple[Record, Stored]:
-        return ask_stage(self._path, self._variants, seconds, allow_outside=self._allow_outside)
+        return ask_stage(self._path, self._variants, seconds, self._named)

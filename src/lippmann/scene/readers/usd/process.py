@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lippmann.errors import SceneError
 from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
 from lippmann.runtime.machine import input_memory_left
+from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.readers.usd.records import Record, unpack
 
 #: Seconds that reading a stage may take.
@@ -22,7 +23,7 @@ _process = HelperProcess("from lippmann.scene.readers.usd.stage_child import mai
 
 
 def ask_stage(
-    path: Path, variants: Mapping[str, str], seconds: float | None, *, allow_outside: bool
+    path: Path, variants: Mapping[str, str], seconds: float | None, named: NamedFiles
 ) -> tuple[Record, list[NDArray[np.generic]]]:
     """What a stage shows: records, and the arrays that they refer to by number.
 
@@ -32,6 +33,8 @@ def ask_stage(
         ``{"set": "choice"}`` for all prims, ``{"/prim:set": "choice"}`` for one.
     seconds:
         Time since the stage's beginning; None for the stage at rest.
+    named:
+        The files that it may name.
 
     Raises
     ------
@@ -49,7 +52,7 @@ def ask_stage(
     request = {
         "path": str(place),
         "stamp": [status.st_mtime_ns, status.st_size, status.st_ino],
-        "folder": None if allow_outside else str(place.parent),
+        "folder": None if named.anywhere else str(named.folder),
         "variants": dict(variants),
         "seconds": seconds,
         "memory": input_memory_left(),

@@ -27,13 +27,15 @@ _UPRIGHT = {"Z": np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.
 _FARTHEST = 1e30
 
 
-def read_usd(path: Path, *, allow_outside: bool = False, variants: Mapping[str, str] | None = None) -> SceneDescription:
+def read_usd(
+    path: Path, *, files: NamedFiles | None = None, variants: Mapping[str, str] | None = None
+) -> SceneDescription:
     """Read a stage as it is at its beginning.
 
     Parameters
     ----------
-    allow_outside:
-        Let the stage name layers and textures outside its own folder.
+    files:
+        Those that it may name; by default those of its folder and below.
     variants:
         ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
 
@@ -44,10 +46,11 @@ def read_usd(path: Path, *, allow_outside: bool = False, variants: Mapping[str, 
         mesh; no prim has such a variant.
     """
     check_file(path)
-    tree, arrays = ask_stage(path, variants or {}, None, allow_outside=allow_outside)
+    named = NamedFiles(path.resolve().parent, NamedFiles.of(path, files).anywhere)
+    tree, arrays = ask_stage(path, variants or {}, None, named)
     if tree["duration"] > 0.0:
         tree["notes"].append("time samples are not played without frames=...; the stage is shown at its beginning")
-    return describe(tree, arrays, path, Assets(path, NamedFiles(path.resolve().parent, allow_outside)))
+    return describe(tree, arrays, path, Assets(path, named))
 
 
 def check_file(path: Path) -> None:
