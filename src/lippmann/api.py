@@ -277,6 +277,7 @@ def render_turntable(
     frames: int | None = None,
     *,
     swing: float | None = None,
+    fixed_noise: bool = False,
     placement: PlacementOptions | Mapping[str, object] | None = None,
     progress: ProgressCallback | None = None,
     **options: Unpack[RenderKeywords],
@@ -296,6 +297,8 @@ def render_turntable(
     swing:
         Degrees from one end of a swing to the other, above 0 and at most 360; None for a whole turn. Frame k of N is
         turned by ``swing / 2 sin(2 pi k / N)``.
+    fixed_noise:
+        Give all frames the same noise; by default each has its own, so that none stands still on the glass.
     placement:
         Where the display stands during the whole turn. Without a mode or a camera the scene is fitted.
     **options:
@@ -325,7 +328,15 @@ def render_turntable(
     where = options_of_sequence(placement)
     motion = open_turntable(_scene(scene), frames, swing=swing, placement=where, classic=classic)
     told = progress or silent
-    pictures = render_sequence(motion, display, range(motion.count), placement=where, progress=told, **options)
+    pictures = render_sequence(
+        motion,
+        display,
+        range(motion.count),
+        placement=where,
+        progress=told,
+        fixed_noise=fixed_noise,
+        **options,
+    )
     return (image for _, image in pictures)
 
 

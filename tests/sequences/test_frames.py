@@ -146,6 +146,38 @@ def test_every_frame_is_rendered_as_was_asked_for(moving_ball, display):
     assert asked == [("auto", "auto")] * 3
 
 
+def seeds(motion, frames, **options):
+    asked = []
+
+    class Form:
+        def render(self, scene, display, request, progress):
+            asked.append((request.seed, request.fixed_noise))
+            return Preview(np.zeros((2, 2, 3), np.float32), Provenance(method="full"))
+
+    display = load_display("seed-lenticular")
+    where = find_stand(motion, display, PlacementOptions())
+    list(render_frames(motion, display, frames, where, RenderRequest(**options), Form(), lambda _: None))
+    return asked
+
+
+def test_each_frame_has_noise_of_its_own_by_its_number_alone(moving_ball):
+    motion = open_motion(moving_ball)
+    every = seeds(motion, range(25))
+    assert len(set(every)) == 25
+    assert not any(is_fixed for _, is_fixed in every)
+    assert seeds(motion, [7, 3]) == [every[7], every[3]]
+    assert not set(every) & set(seeds(motion, range(25), seed=1))
+
+
+def test_noise_can_be_held_still(moving_ball):
+    assert seeds(open_motion(moving_ball), range(3), seed=5, fixed_noise=True) == [(5, False)] * 3
+
+
+def test_one_picture_has_no_noise_to_hold_still():
+    with pytest.raises(UsageError, match="fixed_noise: this is one picture"):
+        api.render("teapot", spp=1, fixed_noise=True)
+
+
 @pytest.mark.parametrize(
     ("first", "stop", "step", "wanted"),
     [(0, 3, 1, [0, 1, 2]), (0, None, 10, [0, 10, 20]), (24, None, 1, [24]), (1, 8, 3, [1, 4, 7])],

@@ -35,6 +35,9 @@ class SequenceOptions(Options):
     fps: float | None = _frames(help="Frames per second of an animation and of the film; 24.")
     animation: str | None = _frames(help="A glTF file's animation by name; its first by default.")
     camera_path: Path | None = _frames(help="Fly through a Tachyon or NFF scene along this .cam file.")
+    fixed_noise: bool = option(
+        False, "Give all frames the same noise. By default each has its own, so none stands still.", group="Animation"
+    )
     video: Path | None = _frames(
         help="Write a film (.mp4, .png) of what an eye sees of the frames, or with a name such as "
         "film_qs8x6a0.75.mp4 of their quilts.",

@@ -19,7 +19,7 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import options_of_sequence
 from lippmann.sequences.files import SavedFrame
 from lippmann.sequences.forms import INTEGRAL, QuiltForm
-from lippmann.sequences.frames import Stand, find_stand, hold_exposure
+from lippmann.sequences.frames import Stand, find_stand, hold_exposure, of_frame
 from lippmann.sequences.motion import Motion
 from lippmann.viewing.replay import Eye, default_size
 from lippmann.viewing.video_frames import (
@@ -145,7 +145,7 @@ class QuiltCameras:
 
     def __call__(self, frame: int) -> Quilt:
         where = self._begin() if self._where is None else self._where
-        request = replace(self.request, placement=where(frame))
+        request = replace(of_frame(self.request, frame), placement=where(frame))
         return self._form().render(self.motion.scene(frame), self.display, request, silent)
 
     def _begin(self) -> Stand:

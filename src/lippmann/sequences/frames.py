@@ -156,7 +156,8 @@ def render_sequence(
     progress:
         Called with reports of each frame's stages; notes say which frame it is.
     **options:
-        Further options of :func:`lippmann.render`. All frames have the same seed, so that noise does not flicker.
+        Further options of :func:`lippmann.render`. Each frame has a seed of its own, which follows from ``seed`` and
+        its number, so noise does not stand still on the glass; ``fixed_noise=True`` holds it still.
 
     Yields
     ------
@@ -275,8 +276,9 @@ def render_frames(
     """The frames of :func:`render_sequence`, in any form, once it is known where the display stands."""
     request = hold_exposure(request, motion, display, where)
     for position, frame in enumerate(frames):
-        report = _of_frame(progress, position, len(frames))
-        image = form.render(motion.scene(frame), display, replace(request, placement=where(frame)), report)
+        report = _report_of_frame(progress, position, len(frames))
+        asked = replace(of_frame(request, frame), placement=where(frame))
+        image = form.render(motion.scene(frame), display, asked, report)
         made = image.provenance
         yield frame, replace(image, provenance=replace(made, options={**made.options, "frame": frame}))
 
@@ -302,12 +304,12 @@ def render_tiled_frames(
             render_to_file(
                 motion.scene(frame),
                 display,
-                replace(request, placement=where(frame)),
+                replace(of_frame(request, frame), placement=where(frame)),
                 path_of(frame),
                 bits=bits,
                 resume=True,
                 runner=runner,
-                progress=_of_frame(progress, position, len(frames)),
+                progress=_report_of_frame(progress, position, len(frames)),
             ),
         )
 
@@ -319,10 +321,22 @@ def hold_exposure(request: RenderRequest, motion: Motion, display: Display, wher
         return request
     from lippmann.rendering.picture import choose_exposure
 
-    return replace(request, exposure=choose_exposure(scene, display, replace(request, placement=where(0))))
+    still = replace(request, placement=where(0), fixed_noise=False)
+    return replace(request, exposure=choose_exposure(scene, display, still))
 
 
-def _of_frame(progress: ProgressCallback, position: int, frames: int) -> ProgressCallback:
+def of_frame(request: RenderRequest, number: int) -> RenderRequest:
+    """What one frame is asked for: a seed of its own, which its number alone decides, unless noise is to stand still.
+
+    With the same seed in all frames, noise stands on the glass like dirt.
+    """
+    seed = request.seed
+    if not request.fixed_noise:
+        seed = int(np.random.SeedSequence((seed, number)).generate_state(1)[0])
+    return replace(request, seed=seed, fixed_noise=False)
+
+
+def _report_of_frame(progress: ProgressCallback, position: int, frames: int) -> ProgressCallback:
     """Reports of one frame's tracing as reports of the whole sequence, which never run backwards."""
     done = float(position)
 

@@ -61,8 +61,8 @@ class Wanted(SequenceOptions):
             return True
         if self.frames is not None:
             return True
-        for option in ("fps", "animation", "camera_path", "video", "eye", "codec"):
-            if getattr(self, option) is not None:
+        for option in ("fps", "animation", "camera_path", "fixed_noise", "video", "eye", "codec"):
+            if getattr(self, option):
                 name = f"--{option.replace('_', '-')}"
                 raise UsageError(
                     "has no meaning for a single picture", where=name, fix="add --frames 0:48, or --turntable 48"
@@ -129,6 +129,7 @@ def render_frames(
         check_animation_path(wanted.video, wanted.codec)
     elif wanted.codec is not None:
         raise UsageError("there is no film", where="--codec", fix="add --video FILE.mp4, or leave it out")
+    request = replace(request, fixed_noise=wanted.fixed_noise)
     chosen = frame_range(wanted.frames or ":")
     output = files.output
     motion = open_moving(source, wanted, request)

@@ -161,7 +161,9 @@ def _of_form(request: RenderRequest, form: Form) -> list[_Refusal]:
     values = {name: "it" if getattr(request, name) is True else getattr(request, name) for name in given}
     reuses = request.method in REUSING and form in REUSES_NOTHING
     instead = 'use method="full" or method="pooled"' if form == "tiles" else _LEAVE
+    one, moves = "this is one picture", "only noise of several frames can stand still"
     return [
+        (request.fixed_noise, one, "fixed_noise", moves, _LEAVE),
         *((True, f"{value} {needs}", name, _WHY[form], _LEAVE) for name, value in values.items()),
         (reuses, f"{request.method} {needs}", "method", _WHY.get(form, ""), instead),
     ]

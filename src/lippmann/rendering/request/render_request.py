@@ -127,6 +127,8 @@ class RenderRequest(MachineOptions, QualityOptions):
     ----------
     placement:
         Where the display stands in the scene: options, or a placement found before.
+    fixed_noise:
+        Whether all frames of a sequence have the same random numbers; for nothing else.
     plan:
         Why the values are these, once all of them are decided: see :mod:`~lippmann.rendering.request.plan`.
     began:
@@ -144,6 +146,7 @@ class RenderRequest(MachineOptions, QualityOptions):
     """
 
     placement: PlacementOptions | Placement = field(default_factory=PlacementOptions)
+    fixed_noise: bool = False
     plan: RenderPlan | None = field(default=None, compare=False, repr=False)
     began: float | None = field(default=None, compare=False)
 
