@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from lippmann.image import read_picture
+from lippmann.display import load_display
+from lippmann.image import IntegralImage, read_picture
 
 
 def picture_size(path):
@@ -114,6 +115,34 @@ def test_replay_and_refocus_write_plain_pictures(lippmann, picture, tmp_path):
     assert picture_size(tmp_path / "r.png") == (64, 48)
     assert lippmann("refocus", picture, "--plane", "-20", "--size", "32x32", "-o", tmp_path / "f.png").code == 0
     assert picture_size(tmp_path / "f.png") == (32, 32)
+
+
+def test_replay_through_a_real_lens(lippmann, picture, tmp_path):
+    """A display that gives a lens; others, quilts and filters are named."""
+    sheet, out = tmp_path / "sheet.png", tmp_path / "seen.png"
+    display = "print:lpi=40,ppi=360,size=12x8mm,thickness=1mm,index=1.57"
+    image = IntegralImage(np.full((113, 170, 3), 0.5, np.float32), load_display(display))
+    image.save(sheet)
+    done = lippmann("replay", sheet, "--optics", "--eye", "0,0,600", "--size", "60x40", "--json", "-o", out)
+    assert (done.code, done.json["optics"]) == (0, True)
+    from PIL import Image
+
+    with Image.open(out) as seen:
+        assert np.asarray(seen)[10:30, 20:40].mean() == pytest.approx(image.srgb().mean(), abs=2)
+    assert (
+        lippmann(
+            "replay", sheet, "--optics", "--sweep", "--frames", 2, "--size", "32x32", "-o", tmp_path / "s.png"
+        ).code
+        == 0
+    )
+    for words, says in (
+        ((picture, "--optics"), "gives no lens"),
+        ((sheet, "--optics", "--filter", "linear"), "--filter: given beside --optics"),
+    ):
+        done = lippmann("replay", *words, "-o", tmp_path / "none.png")
+        assert done.code == 2
+        assert says in done.err
+    assert not (tmp_path / "none.png").exists()
 
 
 @pytest.mark.parametrize("ending", ["png", "mp4"])

@@ -153,6 +153,14 @@ def replay(
     ] = None,
     anaglyph: Annotated[bool, typer.Option("--anaglyph", help="Two eyes in one picture for red-cyan glasses.")] = False,
     eyes: Annotated[float | None, typer.Option("--eyes", help="Distance between the two eyes in mm; 63.")] = None,
+    optics: Annotated[
+        bool,
+        typer.Option(
+            "--optics",
+            help="As the real lens shows it: crosstalk, blur, strips, moire, the zone's edges. The display must give a "
+            "lens.",
+        ),
+    ] = False,
     size: Size = None,
     filter: Filter = "nearest",
     layout: Layout = None,
@@ -199,7 +207,18 @@ def replay(
     position = default_eye(target) if eye is None else triple(eye, "--eye")
     pixels, framed = _size_of(size, target, console)
 
+    if optics and filter != "nearest":
+        rule = "the lens says which sub-pixels are seen, and how much of each"
+        raise UsageError("given beside --optics", where="--filter", rule=rule, fix="leave it out")
+    if optics and quilt is not None:
+        rule = "a quilt is seen without lenses"
+        raise UsageError("this is a quilt", where="--optics", rule=rule, fix="weave it for its display first")
+
     def seen_by(place: tuple[float, float, float]) -> FloatArray:
+        if optics:
+            from lippmann.viewing.optical_replay import replay_optics
+
+            return framed(replay_optics(image, place, size=pixels))
         if quilt is not None:
             return framed(replay_quilt(quilt, target, place, size=pixels, linear=filter == "linear"))
         return framed(replay_picture(image, place, size=pixels, filter=filter))
@@ -207,7 +226,7 @@ def replay(
     def seen_from(place: tuple[float, float, float]) -> FloatArray:
         return seen_by(place) if stereo is None else stereo_pair(seen_by, place, *stereo)
 
-    result: dict[str, Any] = {"output": str(output), "eye": list(position), "filter": filter}
+    result: dict[str, Any] = {"output": str(output), "eye": list(position), "filter": filter, "optics": optics}
     if stereo is not None:
         result |= {"stereo": stereo[0], "eyes": stereo[1]}
     by = "" if stereo is None else f" by two eyes {stereo[1]:g} mm apart"
