@@ -122,6 +122,17 @@ class Panel:
         return right, down
 
 
+def stripe(order: str, key: str) -> SubpixelOffsets:
+    """Offsets of sub-pixels that stand side by side in this order, such as ``"rgb"``; ``"none"`` if they do not."""
+    if order == "none":
+        return (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)
+    if sorted(order) != sorted("rgb"):
+        rule = 'it must be an order of sub-pixels such as "rgb", "none", or three pairs [right, down] in pixels'
+        raise DisplayError(f"subpixel_offsets is {order!r}", where=key, rule=rule)
+    red, green, blue = ((order.index(color) - 1) / 3 for color in "rgb")
+    return (red, 0.0), (green, 0.0), (blue, 0.0)
+
+
 def _remainder(value: Array, count: int, ops: ArrayOps) -> Array:
     return value - count * ops.floor(value / count)
 

@@ -7,12 +7,9 @@ import math
 import re
 from collections.abc import Collection, Iterable, Mapping
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from lippmann.errors import DisplayError
-
-if TYPE_CHECKING:
-    from lippmann.display.panel import SubpixelOffsets
 
 #: Pixels along one side, far beyond any panel or print; keeps every count exact in all that follows.
 MAXIMUM_COUNT = 1_000_000
@@ -190,14 +187,3 @@ def plain_number(text: str, key: str) -> float:
     if math.isinf(value):  # also of more digits than numbers have
         raise DisplayError(f"{text[:60]!r} is not a number", where=key, rule="it must be a number without a unit")
     return value
-
-
-def stripe(order: str, key: str) -> SubpixelOffsets:
-    """Offsets of sub-pixels that stand side by side in this order, such as ``"rgb"``; ``"none"`` if they do not."""
-    if order == "none":
-        return (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)
-    if sorted(order) != sorted("rgb"):
-        rule = 'it must be an order of sub-pixels such as "rgb", "none", or three pairs [right, down] in pixels'
-        raise DisplayError(f"subpixel_offsets is {order!r}", where=key, rule=rule)
-    red, green, blue = ((order.index(color) - 1) / 3 for color in "rgb")
-    return (red, 0.0), (green, 0.0), (blue, 0.0)

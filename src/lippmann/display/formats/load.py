@@ -48,7 +48,8 @@ from lippmann.display.formats.monitor_toml import TABLE as MONITOR
 from lippmann.display.formats.monitor_toml import monitor_of_texts
 from lippmann.display.formats.print_sheet import print_of_texts
 from lippmann.display.formats.recorded_depth import default_aperture
-from lippmann.display.validation import MILLIMETRES, Arguments, length, positive, stripe
+from lippmann.display.panel import stripe
+from lippmann.display.validation import MILLIMETRES, Arguments, length, positive
 from lippmann.errors import DisplayError
 from lippmann.runtime.plugins import Door, Extension, Target, function_of
 from lippmann.runtime.regular_file import check_kind

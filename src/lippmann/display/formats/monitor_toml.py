@@ -25,7 +25,7 @@ from typing import TypeVar
 
 from lippmann.display.display import INFINITE
 from lippmann.display.formats.monitor import DEFAULT_CONE, DEFAULT_DISTANCE, Monitor
-from lippmann.display.panel import RGB_STRIPE, Panel
+from lippmann.display.panel import RGB_STRIPE, Panel, stripe
 from lippmann.display.validation import (
     INCH,
     MILLIMETRES,
@@ -37,7 +37,6 @@ from lippmann.display.validation import (
     plain_number,
     positive,
     refuse_unknown,
-    stripe,
     whole_count,
 )
 from lippmann.errors import DisplayError

@@ -23,7 +23,7 @@ from lippmann.display.display import INFINITE, Display
 from lippmann.display.formats.recorded_depth import default_aperture
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_profile import DEFAULT_INDEX, LensProfile, check_index
-from lippmann.display.panel import Panel
+from lippmann.display.panel import Panel, stripe
 from lippmann.display.pixel_aperture import PixelAperture
 from lippmann.display.sheet import Sheet
 from lippmann.display.validation import MAXIMUM_COUNT, finite, number, refuse_unknown
@@ -301,7 +301,7 @@ class Print:
         return Display(
             name=f"print-{lpi:g}lpi",
             title=f"{lpi:g}-lpi lenticular print, {size} at {self.ppi:g} ppi, seen from {place}",
-            panel=Panel(width, height, pixel, validation.stripe("none", "subpixels")),
+            panel=Panel(width, height, pixel, stripe("none", "subpixels")),
             lens_array=lenses,
             gap=gap,
             viewing_distance=distance,

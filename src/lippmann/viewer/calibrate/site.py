@@ -22,8 +22,7 @@ from typing import Any
 
 from lippmann.display.formats.monitor import Monitor
 from lippmann.display.formats.monitor_toml import text_of_monitor
-from lippmann.display.panel import Panel, SubpixelOffsets
-from lippmann.display.validation import stripe
+from lippmann.display.panel import Panel, SubpixelOffsets, stripe
 from lippmann.errors import UsageError
 from lippmann.runtime.atomic_write import replacing
 from lippmann.viewer.responses import RefusedError, Request, Response, file_response, json_response
