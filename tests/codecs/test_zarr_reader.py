@@ -191,7 +191,7 @@ def test_codecs_of_format_3_are_those_of_the_list(tmp_path, codecs, named):
         ({"data_type": "string"}, "names the data_type 'string'"),
         ({"data_type": {"name": "fixed_length_utf32"}}, "names the data_type {...}"),
         ({"storage_transformers": [{"name": "x"}]}, "names storage transformers"),
-        ({"chunk_key_encoding": {"name": "v2"}}, "names the chunk key encoding 'v2'"),
+        ({"chunk_key_encoding": {"name": "v3"}}, "names the chunk key encoding 'v3'"),
         ({"chunk_grid": {"name": "rectilinear"}}, "names the chunk grid 'rectilinear'"),
         ({"codecs": "bytes"}, "codecs is 'bytes'"),
         ({"codecs": [{"name": "bytes", "configuration": 5}]}, "codec is {...}"),
@@ -419,6 +419,17 @@ def test_bytes_of_either_order_are_read(tmp_path, dtype):
     np.testing.assert_array_equal(values_of(tmp_path / "x.zarr"), values)
 
 
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_picture_that_lies_on_its_side_is_named(tmp_path, version):
+    """Its shape fits a picture, its axes say that it is not one."""
+    if version == 2:
+        array_2(tmp_path / "x.zarr")
+        (tmp_path / "x.zarr" / ".zattrs").write_text(json.dumps({"_ARRAY_DIMENSIONS": ["X", "Y", "rgb"]}))
+    else:
+        array_3(tmp_path / "x.zarr", dimension_names=["X", "Y", "rgb"])
+    assert "has the axes X, Y, rgb; they must be height, width, 3 colours" in refusal(tmp_path / "x.zarr")
+
+
 @needs_format_3
 @pytest.mark.parametrize(
     "options",
@@ -435,6 +446,9 @@ def test_bytes_of_either_order_are_read(tmp_path, dtype):
             "filters": [{"name": "transpose", "configuration": {"order": [1, 2, 0]}}],
         },
         {"chunk_key_encoding": {"name": "default", "separator": "."}},
+        {"chunk_key_encoding": {"name": "v2"}},
+        {"chunk_key_encoding": {"name": "v2", "separator": "/"}},
+        {"dimension_names": ("y", "x", "c")},
         {"fill_value": 7},
     ],
     ids=lambda options: "-".join(options),

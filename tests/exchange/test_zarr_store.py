@@ -91,6 +91,30 @@ def test_another_program_s_store(tmp_path, display):
     assert found.image(display()).stored == "float32"
 
 
+@pytest.mark.skipif(not hasattr(zarr, "create_array"), reason="this zarr reads format 2 alone")
+@pytest.mark.parametrize(
+    ("version", "options"), [(3, {}), (2, {"chunk_key_encoding": {"name": "v2", "separator": "/"}})]
+)
+def test_another_program_s_store_of_many_chunks(tmp_path, version, options):
+    values = np.random.default_rng(0).random((3, 3, 22, 23, 3)).astype(np.float32)
+    group = zarr.open_group(str(tmp_path / "x.zarr"), mode="w", zarr_format=version)
+    group.create_array("LF", shape=values.shape, chunks=(1, 1, 1, 1, 3), dtype="f4", **options)[...] = values
+    np.testing.assert_array_equal(read_zarr(tmp_path / "x.zarr").values, values)
+
+
+def test_axes_in_another_order_are_named(tmp_path):
+    values = np.zeros((3, 3, 3, 4, 3), np.float32)
+    root = zarr.open_group(str(tmp_path / "x.zarr"), mode="w")
+    array = zarr.open_array(str(tmp_path / "x.zarr"), path="LF", mode="w", shape=values.shape, dtype="f4")
+    array[...] = values
+    array.attrs["_ARRAY_DIMENSIONS"] = list("vustc")
+    assert root is not None
+    with pytest.raises(PictureError, match="has the axes v, u, s, t, c; they must be t, s, v, u, c"):
+        read_zarr(tmp_path / "x.zarr")
+    array.attrs["_ARRAY_DIMENSIONS"] = ["row", "column", "y", "x", "colour"]
+    np.testing.assert_array_equal(read_zarr(tmp_path / "x.zarr").values, values)
+
+
 def test_half_and_wrong_stores_are_refused(display, picture, tmp_path):
     folder = tmp_path / "x.zarr"
 

@@ -80,6 +80,35 @@ def test_jpegs_of_others_are_read(tmp_path):
     assert quilt.pixels[0, 0] == pytest.approx([0.578, 0.127, 0.032], abs=0.02)
 
 
+@pytest.mark.parametrize(
+    ("mode", "color", "code"),
+    [("RGBA", (200, 100, 50, 255), 100), ("L", 100, 100), ("P", 3, 7), ("I;16", 25700, 25700)],
+)
+def test_kinds_of_pixels(tmp_path, mode, color, code):
+    picture = Image.new(mode, (512, 256), color)
+    if mode == "P":
+        picture.putpalette([7] * 768)
+    picture.save(tmp_path / "x_qs4x2a2.png")
+    assert read_quilt(tmp_path / "x_qs4x2a2.png").values[0, 0, 1] == code
+
+
+def test_transparent_quilts_and_other_formats_are_named(tmp_path):
+    Image.new("RGBA", (512, 256), (200, 100, 50, 128)).save(tmp_path / "x_qs4x2a2.png")
+    with pytest.raises(PictureError, match="is partly transparent"):
+        read_quilt(tmp_path / "x_qs4x2a2.png")
+    Image.new("RGB", (512, 256)).save(tmp_path / "x_qs4x2a2.webp")
+    with pytest.raises(PictureError, match=r"unknown ending '\.webp'"):
+        read_quilt(tmp_path / "x_qs4x2a2.webp")
+
+
+def test_a_quilt_that_lies_on_its_side_is_turned_upright(tmp_path):
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    codes = np.random.default_rng(1).integers(0, 256, (256, 512, 3)).astype(np.uint8)
+    Image.fromarray(np.rot90(codes).copy()).save(tmp_path / "x_qs4x2a2.png", exif=exif)
+    np.testing.assert_array_equal(read_quilt(tmp_path / "x_qs4x2a2.png").values, codes)
+
+
 def test_jpegs_are_not_written(folder, tmp_path):
     with pytest.raises(OutputError, match=r"unknown ending '\.jpg'"):
         write_quilt(read_views(folder, LAYOUT), tmp_path / "x_qs8x6a0.75.jpg")

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from lippmann.codecs.types import Attributes, Pixels, StoredType, ZarrArray, ZarrModule
-from lippmann.codecs.zarr_reader import array_names, node_kind, open_array, read_array
+from lippmann.codecs.zarr_reader import array_names, axis_names, node_kind, open_array, read_array
 from lippmann.errors import MemoryLimitError, PictureError
 from lippmann.runtime.machine import check_input
 
@@ -23,6 +23,8 @@ ENDING = ".zarr"
 MARKS = ("zarr.json", ".zarray", ".zgroup")
 
 DIMENSIONS = ["row", "column", "color"]
+#: What other programs call an axis that runs across the picture, and so cannot be the first.
+_ACROSS = ("x", "column", "columns", "width")
 
 #: Compression: higher levels save little of rendered pictures.
 _LEVEL = 1
@@ -115,6 +117,14 @@ class ZarrPicture:
         if len(metadata.shape) != 3 or metadata.shape[2] != 3 or min(metadata.shape) < 1:
             raise PictureError(
                 f"holds an array of shape {metadata.shape}", where=str(folder), rule="it must be (height, width, 3)"
+            )
+        axes = axis_names(metadata, attributes)
+        if axes and axes[0].lower() in _ACROSS:
+            raise PictureError(
+                f"has the axes {', '.join(axes)[:60]}",
+                where=str(folder),
+                rule="they must be height, width, 3 colours",
+                fix="store the picture with its axes in that order",
             )
         self._folder, self._array = folder, open_array(zarr, folder, metadata)
         self.height, self.width = metadata.shape[:2]

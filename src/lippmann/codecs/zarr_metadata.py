@@ -71,6 +71,8 @@ class ArrayMetadata:
         Type of its values.
     separator:
         Stands between the numbers in the name of a chunk's file.
+    prefix:
+        Stands before them.
     packing:
         What unpacks a file first; empty if nothing does, or if it holds chunks of its own.
     chunks_of_a_shard:
@@ -84,6 +86,7 @@ class ArrayMetadata:
     chunks: tuple[int, ...]
     dtype: StoredType
     separator: str
+    prefix: str
     packing: str
     chunks_of_a_shard: int
     document: Document
@@ -97,10 +100,11 @@ class ArrayMetadata:
     def chunk_names(self) -> re.Pattern[str]:
         """The names that files of chunks can have, as paths from the array's folder."""
         number = r"(0|[1-9][0-9]{0,14})"
-        between = re.escape(self.separator)
-        if self.version == 2:
-            return re.compile(between.join([number] * len(self.shape)))
-        return re.compile(between.join(["c", *[number] * len(self.shape)]))
+        return re.compile(re.escape(self.prefix) + re.escape(self.separator).join([number] * len(self.shape)))
+
+    def chunk_name(self, place: Sequence[int]) -> str:
+        """The name of a chunk's file, as a path from the array's folder."""
+        return self.prefix + self.separator.join(map(str, place))
 
     def check_chunks(self, where: str) -> None:
         """Raise :class:`PictureError` where the array is cut into more chunks than any of this size."""
@@ -151,7 +155,7 @@ def _version_2(values: Document, check: _Check) -> ArrayMetadata:
                 raise check.refused(f"the astype {packed.str}", f"at most as many bytes as {unpacked.str} has are read")
     check.chunk_size(shape, chunks, dtype)
     document = {name: values.get(name) for name in _FIELDS_2} | {"dimension_separator": separator}
-    return ArrayMetadata(2, shape, chunks, dtype, separator, packing, 1, document)
+    return ArrayMetadata(2, shape, chunks, dtype, separator, "", packing, 1, document)
 
 
 def _version_3(values: Document, check: _Check) -> ArrayMetadata:
@@ -167,12 +171,13 @@ def _version_3(values: Document, check: _Check) -> ArrayMetadata:
     dtype = np.dtype(check.choice("data_type", values.get("data_type"), _TYPES_3))
     _, grid = check.named("chunk grid", values.get("chunk_grid"), ("regular",))
     chunks = check.lengths("chunk_shape", grid.get("chunk_shape"), least=1, axes=len(shape))
-    _, keys = check.named("chunk key encoding", values.get("chunk_key_encoding"), ("default",))
-    separator = check.choice("separator", keys.get("separator", "/"), ("/", "."))
+    encoding, keys = check.named("chunk key encoding", values.get("chunk_key_encoding"), ("default", "v2"))
+    separator = check.choice("separator", keys.get("separator", "/" if encoding == "default" else "."), ("/", "."))
+    prefix = f"c{separator}" if encoding == "default" else ""
     packing, count = _codecs_3(values.get("codecs"), chunks, check)
     check.chunk_size(shape, chunks, dtype)
     document = {name: values[name] for name in _FIELDS_3 if name in values and name != "attributes"}
-    return ArrayMetadata(3, shape, chunks, dtype, separator, packing, count, document)
+    return ArrayMetadata(3, shape, chunks, dtype, separator, prefix, packing, count, document)
 
 
 def _codecs_3(value: object, chunks: tuple[int, ...], check: _Check, *, inside: bool = False) -> tuple[str, int]:

@@ -120,6 +120,14 @@ def _attributes(folder: Path, node: Attributes | None) -> Attributes:
     return attributes
 
 
+def axis_names(metadata: ArrayMetadata, attributes: Attributes) -> tuple[str, ...]:
+    """Names of an array's axes, by format 3 or as xarray keeps them in format 2; empty where not all have one."""
+    names = metadata.document.get("dimension_names") or attributes.get("_ARRAY_DIMENSIONS")
+    if not isinstance(names, list) or len(names) != len(metadata.shape):
+        return ()
+    return tuple(names) if all(isinstance(name, str) for name in names) else ()
+
+
 def open_array(zarr: ZarrModule, folder: Path, metadata: ArrayMetadata, root: Path | None = None) -> ZarrArray:
     """The library's array of a folder; its values are read as they are asked for.
 

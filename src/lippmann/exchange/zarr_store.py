@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.codecs.zarr_metadata import ArrayMetadata
-from lippmann.codecs.zarr_reader import node_kind, open_array, read_array_metadata, read_attributes
+from lippmann.codecs.zarr_reader import axis_names, node_kind, open_array, read_array_metadata, read_attributes
 from lippmann.display import Display
 from lippmann.errors import PictureError
 from lippmann.exchange.light_field import LightField, check_shape
@@ -201,6 +201,10 @@ def _read_array(
 ) -> NDArray[Any]:
     where = str(folder)
     metadata = read_array_metadata(folder, root)
+    axes = axis_names(metadata, read_attributes(folder))
+    if axes != AXES[: len(axes)] and sorted(axes) == sorted(AXES[: len(axes)]):
+        rule = f"they must be {', '.join(AXES[: len(axes)])}"
+        raise PictureError(f"has the axes {', '.join(axes)}", where=where, rule=rule, fix="store it in that order")
     if views_shape is None:
         check_shape(metadata.shape, where)
     elif metadata.shape[:4] != views_shape[:4]:
@@ -231,8 +235,8 @@ def _check_chunks(folder: Path, metadata: ArrayMetadata, whole: bool) -> None:
     counts = [-(-size // step) for size, step in zip(metadata.shape, metadata.chunks, strict=True)]
     if not whole and math.prod(counts) <= _FEW_CHUNKS:
         return
-    present = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
-    missing = [name for place in np.ndindex(*counts) if (name := ".".join(map(str, place))) not in present]
+    present = {path.relative_to(folder).as_posix() for path in folder.rglob("*")}
+    missing = [name for place in np.ndindex(*counts) if (name := metadata.chunk_name(place)) not in present]
     if len(missing) > (0 if whole else math.prod(counts) // 2):
         what = f"{len(missing)} of its {math.prod(counts)} chunks are missing, the first {missing[0]}"
         raise PictureError(what, where=str(folder))

@@ -72,7 +72,7 @@ def test_up_of_what_says_it_itself_is_refused():
     [
         ("car.fbx", "open it in Blender, then File > Export > glTF"),
         ("part.STEP", "FreeCAD"),
-        ("cup.3mf", "save it as .stl"),
+        ("cup.3mf", r"as \.stl in the slicer, or with trimesh and lxml: trimesh\.load_mesh"),
         ("cup.zae", "unzip it"),
         ("water.sdf", "obabel in.sdf"),
         ("room.splat", "SuperSplat"),

@@ -75,7 +75,7 @@ _ELSEWHERE = {
     ".nrrd": "save it as .nii.gz, in 3D Slicer for instance",
     ".mha": "save it as .nii.gz, in 3D Slicer for instance",
     ".hdr": "save it as .nii or .nii.gz, which hold header and voxels in one file",
-    ".3mf": "save it as .stl or .obj, in the slicer or in Blender",
+    ".3mf": "save it as .stl in the slicer, or with trimesh and lxml: trimesh.load_mesh('a.3mf').export('a.stl')",
     ".zae": "unzip it, open the .dae in Blender, then File > Export > glTF 2.0 (.glb)",
     **dict.fromkeys((".splat", ".ksplat", ".lcc"), "open it in SuperSplat (superspl.at/editor), export it as .ply"),
     **dict.fromkeys((".las", ".laz", ".e57", ".pcd", ".pts"), "save it as .ply, in CloudCompare for instance"),
