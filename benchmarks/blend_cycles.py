@@ -1,5 +1,7 @@
 """Blender files against Cycles: how far a camera's picture of each scene of the tests is from Cycles' own.
 
+Time on two cores: an estimated 5 minutes.
+
 python benchmarks/blend_cycles.py --python PYTHON [SCENE ...]
 
 ``PYTHON`` is an interpreter with the package ``bpy``. For each scene: the ratio of the pictures' means by channel, and

@@ -1,5 +1,7 @@
 """Blender files: how long Blender takes to export a scene of many instances, and Lippmann to read it.
 
+Time on two cores: an estimated 2 minutes.
+
 LIPPMANN_BLENDER=/path/to/blender python benchmarks/blender.py
 python benchmarks/blender.py --counts 60 600 --runs 5
 

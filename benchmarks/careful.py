@@ -1,5 +1,7 @@
 """What respecting gloss is worth where light is sampled: reuse of points with path and direct light of 16 samples.
 
+Time on two cores: an estimated 10 minutes.
+
 Reused points carry their noise along, and whatever of their colour depends on direction is falsified; the careful mode
 (``respect_gloss``) traces such pixels anew. Each way is held against a long full rendering: PSNR of the picture and of
 its worst micro-image, the share of rays traced, and seconds as a ratio to ``full`` in the same turn. Seconds are those

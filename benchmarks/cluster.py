@@ -1,5 +1,7 @@
 """Workers on this machine: two against one, and two against two threads in one process.
 
+Time on two cores: about an hour.
+
 The frame is large_frame.py's: 7680 x 4320 pixels, path light, 4 samples per pixel, TIFF; ``python benchmarks/cluster.py
 1920x1080`` takes another size. Workers are connected and warm before time is taken, and all candidates run in turn. Two
 one-thread workers shall be at least 1.7 times as fast as one, and the same two at most 15 % slower than one process

@@ -1,5 +1,7 @@
 """Ctrl-C in a terminal while a picture is rendered by workers of this machine: what is said, and how long it takes.
 
+Time on two cores: an estimated 15 minutes.
+
 Each command runs in a terminal of its own (a pty), whose Ctrl-C goes to the command and to all processes that it has
 started. It is pressed at delays spread evenly, half of the times from the start, half from when the first worker
 starts; in every third run twice more, while the command puts its files in order. Counted are commands that do not end

@@ -1,5 +1,7 @@
 """Every scene file below folders, rendered small: rendered, refused by which reason, over time, over memory, died.
 
+Time on two cores: about a second a file.
+
 python benchmarks/conformance.py FOLDER --set assimp                 # a set of conformance_sets.py, or any name
 python benchmarks/conformance.py FOLDER --set assimp --limit 50 --seconds 30 --memory 2
 python benchmarks/conformance.py FOLDER --set magnum --validator DIR --details all.jsonl --pictures seen/

@@ -1,9 +1,11 @@
 """Many copies of a USD point instancer: whole commands, their time and peak memory.
 
+Time on two cores: about two minutes.
+
 python benchmarks/copies.py [--spheres 200000] [--trees 2000]
 
 200 000 spheres, and 2 000 copies of a tree of 5 000 triangles, each rendered once with the defaults for a display of
-512 x 512 pixels (``results/copies.json``). It takes two minutes on two cores.
+512 x 512 pixels (``results/copies.json``).
 
 Targets: 60 s each; 1 GB for the spheres, 3 GB for the trees.
 """

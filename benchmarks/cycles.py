@@ -1,5 +1,7 @@
 """A quilt and a native frame against the way it is done today: Blender's Cycles, view by view, with its denoiser.
 
+Time on two cores: about half an hour, most of it for references.
+
 The glTF teapot in the studio light that Lippmann gives to scenes without any, for a nominal Looking Glass Portrait:
 48 views of 420 x 560 pixels by Cycles at 16 samples with Open Image Denoise, against Lippmann's quilt of the same size
 and its native frame of 1536 x 2048 x 3 sub-pixels, two threads each. Every picture is judged by a long rendering of its

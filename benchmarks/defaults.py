@@ -1,5 +1,7 @@
 """Pictures with nothing but a scene and a display named: an earlier checkout and this one side by side.
 
+Time on two cores: an estimated half hour with three runs.
+
 python benchmarks/defaults.py OTHER [--today CHECKOUT] [--scenes NAME...] [--displays NAME...] [--runs N]
 
 ``OTHER`` is the folder of an earlier checkout; its own ``.venv`` runs it if there is one, else this Python does. Each

@@ -1,5 +1,7 @@
 """Long plain renderings of pixels of one picture, made by the checkout that is judged: placements differ between them.
 
+Time on two cores: an estimated minute a picture.
+
 python benchmarks/defaults_reference.py SCENE DISPLAY PIXELS SAMPLES FILE
 
 ``defaults.py`` runs it with the checkout's own source. Light at an exposure of 0, twice with ``SAMPLES`` each.

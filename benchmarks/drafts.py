@@ -1,5 +1,7 @@
 """What asking for less takes: whole cold commands with a draft or a modest quality, by processor time.
 
+Time on two cores: about 10 minutes.
+
 ``python benchmarks/drafts.py``
 """
 

@@ -1,5 +1,7 @@
 """Error against time: full, full denoised, pooled; and the time that each takes to the same error.
 
+Time on two cores: an estimated 3 hours, most of them for references.
+
 Eight scenes with path light of the default depth (the bundled six, and two glTF scenes where they are at hand) on three
 displays: the paper's 64 lenses of 8 pixels, 64 lenses of 48 pixels, and 34 x 34 lenses of 15 x 15. A band of rows is
 rendered, about the middle: references would take hours otherwise.

@@ -1,5 +1,7 @@
 """Draws the curves of ``equal_error.py``: PSNR against seconds for each scene and display, as small multiples.
 
+Time on two cores: a few seconds.
+
 Open Image Denoise counts with whichever of its efforts is better at a time. Written is ``docs/images/equal-error.png``.
 
 pip install "matplotlib>=3.9,<4"

@@ -1,5 +1,7 @@
 """Whether a picture's own estimate of its error is honest: counted over scenes chosen to make it hard.
 
+Time on two cores: an estimated 3 hours, most of them for references.
+
 Each case is a scene, a display, a way of making the picture (plain, denoised, pooled), a number of samples and a seed;
 the truth is a long render. Counted are the cases in which the stated 95 % interval holds the true PSNR, of the picture
 and of its worst micro-image (wanted: 90 %), and in which a quality asked for is kept by the true worst micro-image to

@@ -1,5 +1,7 @@
 """A person's first picture: ten models on seven displays, with nothing but a model and a display named.
 
+Time on two cores: about an hour and a half, references included.
+
 python benchmarks/first_picture.py [--scenes FOLDER] [--only DISPLAY...]
 
 For every picture: the share of the panel that the model fills as the central eye sees it, the model's mean brightness

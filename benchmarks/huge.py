@@ -1,5 +1,7 @@
 """A poster larger than memory: peak resident memory, and time per pixel against that of a picture of 8 megapixels.
 
+Time on two cores: about 12 hours at the full size.
+
 python benchmarks/huge.py [--size 34000x22000] [--small 3520x2272] [--folder FOLDER] [--no-commands]
                           [--method full|pooled] [--denoise none|oidn|oidn-fast|oidn-high] [--formats tif zarr]
                           [--commands-only]

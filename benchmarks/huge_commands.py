@@ -1,5 +1,7 @@
 """Every command that reads a picture, on pictures larger than memory: the second half of ``huge.py``.
 
+Time on two cores: about 40 minutes at the full size.
+
 Commands are processes of their own, whose peak memory and processor time the system tells. A process begins with the
 memory of the one that starts it, so what these commands read is made by processes of their own, too:
 

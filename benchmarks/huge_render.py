@@ -1,5 +1,7 @@
 """One picture of ``huge.py``, in a process of its own.
 
+Time on two cores: as long as its picture takes, hours at the full size.
+
 Arguments: WIDTH HEIGHT SMALL_WIDTH MEMORY OUTPUT FIGURES METHOD DENOISE.
 """
 

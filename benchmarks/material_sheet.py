@@ -1,5 +1,7 @@
 """The picture of material parameters in ``docs/reference/materials.md``: a row of balls for each.
 
+Time on two cores: an estimated minute.
+
 python benchmarks/material_sheet.py
 """
 

@@ -1,5 +1,7 @@
 """The pictures and the table of docs/background/optics.md.
 
+Time on two cores: an estimated minute.
+
 python benchmarks/optics_pictures.py
 
 Draws docs/images/optics-crests.png and docs/images/optics-moire.png, and prints the rows of the eight sheets.

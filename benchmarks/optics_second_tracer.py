@@ -1,5 +1,7 @@
 """Our trace of one lens against Optiland's, another tracer: where rays land, and how far apart the two put them.
 
+Time on two cores: an estimated minute.
+
 python benchmarks/optics_second_tracer.py
 
 Needs Optiland (MIT), which is heavy and no dependency of ours: ``pip install optiland==0.6.3`` into an environment of

@@ -1,5 +1,7 @@
 """Gaussian splats before a large panel: how long it takes to read and to trace them, and in how much memory.
 
+Time on two cores: about 10 minutes.
+
 python benchmarks/splats.py                        # 100 000 and a million splats
 python benchmarks/splats.py --counts 10000 --display seed-lenticular
 

@@ -1,5 +1,7 @@
 """The live renderer at work: how fast frames follow a move, how soon a view at rest is clean, and whether it is right.
 
+Time on two cores: an estimated 10 minutes.
+
 For each display and scene:
 
 - an orbit of single samples in direct light: frames a second by the clock, processor time of a frame, and how much of

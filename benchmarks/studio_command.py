@@ -1,5 +1,7 @@
 """``lippmann studio`` as a page meets it: a process is started, and gets views by its WebSocket as a pointer sends.
 
+Time on two cores: about 10 minutes.
+
 For each display and scene: seconds from starting the command to the first frame; then an orbit of the model and the
 eye, a view every 16 ms, whether or not frames come: frames a second, how old a frame is when it comes (since the page
 sent its view, coding and sockets included), and the size of the pictures that are traced. With ``--minutes`` the orbit

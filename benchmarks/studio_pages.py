@@ -1,5 +1,7 @@
 """Several pages of one studio in a real browser: how often each of them, and the window on the display, is drawn anew.
 
+Time on two cores: an estimated 5 minutes.
+
 - Four pages turn the model at the same time: frames a second of each, and the ratio of the best to the worst.
 - One page turns it while the panel's window shows all native pixels: frames a second of both, and the longest that the
   window stood still.

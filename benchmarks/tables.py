@@ -1,5 +1,7 @@
 """Writes the tables of ``docs/background/measurements.md`` from ``results/``: figures are never copied by hand.
 
+Time on two cores: about a second.
+
 python benchmarks/tables.py
 """
 

@@ -1,5 +1,7 @@
 """A volume before a large panel: how long it takes to read and to trace it, and in how much memory.
 
+Time on two cores: an estimated half hour.
+
 python benchmarks/volumes.py                          # 512 x 512 x 300 voxels, looking-glass-portrait's panel
 python benchmarks/volumes.py --size 128 128 100 --display seed-lenticular
 

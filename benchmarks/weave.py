@@ -1,5 +1,7 @@
 """A direct rendering against a weave of 48 views: what the detour through a quilt costs in quality.
 
+Time on two cores: an estimated 5 minutes.
+
 The middle of a nominal Looking Glass Portrait, a quarter of its width and height, every sub-pixel with rays of its own;
 against it a quilt of 8 x 6 views as fine as the device's (a tile pixel to 3.66 panel pixels, each way), woven with
 linear and with nearest choice of views. Path light.
