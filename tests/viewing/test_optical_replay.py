@@ -73,7 +73,7 @@ def test_light_is_gathered_from_the_places_of_the_light_table(display):
     seen = replay_optics(image, eye, size=size, pupil=0.0)
     for row, column in ((30, 50), (45, 80), (50, 110)):
         expected = brute_force(image, eye, column + 0.5, row + 0.5)
-        assert seen[row, column] == pytest.approx(expected, rel=0.06, abs=0.02)
+        assert seen[row, column] == pytest.approx(expected, rel=0.06, abs=0.03)
 
 
 def brute_force(image, eye, u, v, fine=24):
