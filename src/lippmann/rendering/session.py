@@ -201,8 +201,7 @@ class Session:
     def _in_front(self, integrator: Integrator, frame_from_world: Matrix) -> Integrator:
         """An integrator with the splats or the volume that stand in front of what it shows."""
         from lippmann.device.pbr import BuiltScene
-        from lippmann.rendering.transport.grid_volume import GridVolumeIntegrator
-        from lippmann.rendering.transport.splats import SplatIntegrator
+        from lippmann.rendering.transport.in_front import GridVolumeIntegrator, SplatIntegrator
 
         built = self.built
         if not isinstance(built, BuiltScene):

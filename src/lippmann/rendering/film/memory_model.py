@@ -26,8 +26,8 @@ _RGB = 3 * _FLOAT
 PICTURE = 2 * _RGB
 #: The squared error of each pixel, its outliers' share and its blur.
 ERROR_MAPS = 3 * _FLOAT
-#: Seen light of two halves, and what of it is excess, apart from the batches.
-SEEN = 3 * _RGB
+#: Seen light of two halves, apart from the batches.
+SEEN = 2 * _RGB
 #: Coverage of two halves, of each channel.
 COVERAGE = 2 * _FLOAT
 #: One emission of photons, which lands about once, with what sorting takes, in bytes.

@@ -23,11 +23,10 @@ from lippmann.rendering.transport.casters import Casters
 from lippmann.rendering.transport.photon_map import PhotonMap, Photons
 from lippmann.rendering.transport.photon_shooter import PhotonShooter
 from lippmann.rendering.transport.scene_features import SceneFeatures
+from lippmann.rendering.transport.tuning import TUNING
 
 #: Emissions of the pilot for each emitter and caster, at most and at least.
 MOST_OF_PAIR, FEWEST_OF_PAIR = 4096, 64
-#: Share of the emissions that goes to all pairs alike, whatever the pilot met.
-_UNIFORM_SHARE = 0.1
 #: Samples of a picture to an emission of each half at least, emissions over the two-thirds power of the samples at
 #: most, and emissions at most. An emission may take as long as two paths (``benchmarks/photon_share.py``).
 SAMPLES_OF_EMISSION, OF_POWER, MOST = 8, 6, 1 << 21
@@ -128,7 +127,7 @@ class CausticPhotons:
             return None
         power = photons.power[seen].astype(np.float64)
         roots = np.sqrt(np.bincount(pair[seen], np.square(power).sum(axis=1), minlength=casters.pairs))
-        return np.asarray(_UNIFORM_SHARE * even + (1 - _UNIFORM_SHARE) * roots / roots.sum())
+        return np.asarray(TUNING.uniform_share * even + (1 - TUNING.uniform_share) * roots / roots.sum())
 
 
 def radius_of_pass(number: int) -> float:

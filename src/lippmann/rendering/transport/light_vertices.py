@@ -280,14 +280,14 @@ class LightVertexPasses:
         if senders == 0:
             return None
         even = np.full(senders, 1 / senders)
-        chosen, chances = _dealt(even, min(TUNING.vertex_pilot_of_emitter * senders, TUNING.vertex_pilot))
+        chosen, chances = _dealt(even, min(TUNING.vertex_pilot_of_emitter * senders, TUNING.light_vertices))
         points, met = self._rays.meet(chosen, chances, named_seed("pilot of light vertices", self._seed))
         seen = are_inside(points.position, region)
         if not seen.any():
             return None
         power = points.glow[seen].max(axis=1).astype(np.float64)
         sums = np.bincount(chosen[met][seen], power, minlength=senders)
-        return np.asarray(TUNING.vertex_uniform_share * even + (1 - TUNING.vertex_uniform_share) * sums / sums.sum())
+        return np.asarray(TUNING.uniform_share * even + (1 - TUNING.uniform_share) * sums / sums.sum())
 
 
 def _dealt(chances: NDArray[np.float64], count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -17,10 +17,6 @@ class TransportTuning:
         Emitter samples at the first surface of a path that is not purely specular: ``early_emitter_samples`` in each of
         a pixel's first ``early_samples`` samples, then ``later_emitter_samples``. Powers of two keep all points
         stratified.
-    most_of_one, of_chains, most_power:
-        Linear value of a pixel, white being 1, up to which one of ``of_chains`` chains counts. One of fewer counts for
-        more of it, as fewer highlights are met by one alone: the limit of a chain goes with this power of their number
-        (docs/research/seen-light.md).
     least_cosine_angle:
         Radians between half vector and normal up to which a reflection is sharp: 2.5 times the width of the widest lobe
         that counts as narrow.
@@ -38,10 +34,10 @@ class TransportTuning:
         Radius of a wider look-up over that of the picture's, by which blur is told.
     light_vertices:
         Points of each half of a picture, before those are left out that scatter nothing.
-    vertex_pilot_of_emitter, vertex_pilot:
-        Rays of their pilot for each emitter, and in all.
-    vertex_uniform_share:
-        Share of the rays that goes to all emitters alike, those included of which the pilot met nothing.
+    vertex_pilot_of_emitter:
+        Rays of their pilot for each emitter; no more in all than there are light vertices.
+    uniform_share:
+        Share of emissions and of rays from emitters that goes to all alike, whatever the pilot met.
     most_vertex_emitters:
         Scenes of more emitters are left to paths: each has a start of its own in the kernel of rays.
     """
@@ -50,9 +46,6 @@ class TransportTuning:
     early_emitter_samples: int = 4
     later_emitter_samples: int = 2
     early_samples: int = 4
-    most_of_one: float = 0.3
-    of_chains: float = 256.0
-    most_power: float = 0.75
     least_cosine_angle: float = 0.05
     small_emitter: float = 1e-3
     least_agreement: float = 0.7
@@ -62,8 +55,7 @@ class TransportTuning:
     wider_look_up: float = 2.0
     light_vertices: int = 1 << 16
     vertex_pilot_of_emitter: int = 1 << 12
-    vertex_pilot: int = 1 << 16
-    vertex_uniform_share: float = 0.1
+    uniform_share: float = 0.1
     most_vertex_emitters: int = 1 << 6
 
 

@@ -6,7 +6,7 @@ import pytest
 import lippmann
 from lippmann.display import Display, LensArray, Panel
 from lippmann.options.placement import PlacementOptions
-from lippmann.rendering.transport.grid_volume import toward_light
+from lippmann.rendering.transport.in_front import toward_light
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 from lippmann.scene.values.volume import TransferFunction, Volume
 

@@ -1,0 +1,141 @@
+"""Gaussian splats and volumes in front of surfaces: what stands between a ray's beginning and the first surface there.
+
+They are composited on the CPU (:mod:`lippmann.device.splats`, :mod:`lippmann.device.volumes`); behind them lies the
+radiance of surfaces and background, by any other integrator. They give no light to surfaces, take none from them, and
+are seen in no mirror.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.color.transfer import SRGB_EXPONENT, SRGB_OFFSET, SRGB_SLOPE, SRGB_THRESHOLD
+from lippmann.device.kernel_ops import upload
+from lippmann.device.sobol import SampleStream
+from lippmann.device.types import Bool, Color3f, Float, Point3f, Ray3f, Spectrum
+from lippmann.rendering.transport.first_surface import PhysicalSurfaces
+from lippmann.rendering.transport.integrator import Integrator, RayCounts
+
+if TYPE_CHECKING:
+    from lippmann.device.pbr import BuiltScene
+    from lippmann.device.splats.table import SplatTable
+    from lippmann.device.volumes.table import VolumeTable
+
+Floats = NDArray[np.float32]
+Numbers = NDArray[np.float64]
+
+#: Where the light that shades a volume's surfaces comes from: right, up and toward the viewer.
+LIGHT = (-0.45, 0.6, 1.0)
+
+
+class _InFront:
+    """Light of what is composited, and of what ``behind`` brings from behind it.
+
+    Parameters
+    ----------
+    behind:
+        Radiance of surfaces and background.
+    built:
+        The scene on the device.
+    """
+
+    def __init__(self, behind: Integrator, built: BuiltScene) -> None:
+        self.depth, self.name = behind.depth, behind.name
+        self._behind = behind
+        self._surfaces = PhysicalSurfaces(built) if len(built.mitsuba.shapes()) else None
+
+    def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Spectrum, RayCounts]:
+        """Radiance along ``ray``, and the rays traced for what lies behind.
+
+        All is evaluated at once; lanes that are not active are composited, too.
+        """
+        radiance, counts = self._behind.sample(ray, stream, active)
+        end = mi.Float(dr.inf)
+        if self._surfaces is not None:
+            hit = self._surfaces.first_hit(ray)
+            end = dr.select(hit.hit, dr.dot(hit.p - ray.o, ray.d), dr.inf)
+        # All at once: each evaluated alone would trace the paths anew.
+        dr.eval(radiance, counts.secondary, counts.shadow, end, ray)
+        lanes = max(dr.width(ray), dr.width(radiance), dr.width(end))
+        colors, transmittances = self._composite(_rows(ray.o, lanes), _rows(ray.d, lanes), _rows(end, lanes))
+        color, transmittance = mi.Color3f(np.ascontiguousarray(colors.T)), upload(transmittances)
+        shown = self._over(color, transmittance, radiance)
+        # Where nothing is in front the radiance stays what it was, to the last bit.
+        return mi.Spectrum(dr.select(transmittance < 1, shown, radiance)), counts
+
+    def _composite(self, origins: Floats, directions: Floats, ends: Floats) -> tuple[Floats, Floats]:
+        """Colours ``(n, 3)`` and transmittances ``(n,)`` of rays ``(n, 3)`` up to the distances of their surfaces."""
+        raise NotImplementedError
+
+    def _over(self, color: Color3f, transmittance: Float, radiance: Spectrum) -> Spectrum:
+        return color + transmittance * radiance
+
+
+class SplatIntegrator(_InFront):
+    """Light of splats, composited in their own colours, mostly sRGB codes, as their trainers do."""
+
+    def __init__(self, behind: Integrator, built: BuiltScene, splats: SplatTable, threads: int) -> None:
+        super().__init__(behind, built)
+        self._splats, self._threads = splats, threads
+
+    def _composite(self, origins: Floats, directions: Floats, ends: Floats) -> tuple[Floats, Floats]:
+        from lippmann.device.splats.compositing import composite
+
+        return composite(self._splats, origins, directions, ends, self._threads)
+
+    def _over(self, color: Color3f, transmittance: Float, radiance: Spectrum) -> Spectrum:
+        if self._splats.linear:
+            return super()._over(color, transmittance, radiance)
+        return srgb_to_linear(color + transmittance * linear_to_srgb(radiance))
+
+
+class GridVolumeIntegrator(_InFront):
+    """Light of a volume shown by a transfer function: emission and absorption, without scattering, in linear RGB.
+
+    ``frame_from_world`` ``(4, 4)`` is the display's or camera's frame, in which the light stands.
+    """
+
+    def __init__(
+        self, behind: Integrator, built: BuiltScene, table: VolumeTable, frame_from_world: Numbers, threads: int
+    ) -> None:
+        super().__init__(behind, built)
+        self._table, self._threads = table, threads
+        self._toward_light = toward_light(frame_from_world)
+
+    def _composite(self, origins: Floats, directions: Floats, ends: Floats) -> tuple[Floats, Floats]:
+        from lippmann.device.volumes.ray_march import composite
+
+        return composite(self._table, origins, directions, ends, self._toward_light, self._threads)
+
+
+def _rows(value: Point3f, lanes: int) -> Floats:
+    """``(lanes,)`` or ``(lanes, 3)`` float32 of an evaluated array; one of a single entry counts for every lane."""
+    array = np.asarray(value, dtype=np.float32).T
+    return np.ascontiguousarray(np.broadcast_to(array, (lanes, *array.shape[1:])))
+
+
+def linear_to_srgb(linear: Color3f) -> Color3f:
+    """sRGB codes of linear values, 0 or more: the curve goes on above 1."""
+    curve = (1 + SRGB_OFFSET) * dr.power(dr.maximum(linear, SRGB_THRESHOLD), 1 / SRGB_EXPONENT) - SRGB_OFFSET
+    return dr.select(linear <= SRGB_THRESHOLD, SRGB_SLOPE * dr.maximum(linear, 0), curve)
+
+
+def srgb_to_linear(code: Color3f) -> Color3f:
+    """The inverse of :func:`linear_to_srgb`."""
+    threshold = SRGB_SLOPE * SRGB_THRESHOLD
+    curve = dr.power((dr.maximum(code, threshold) + SRGB_OFFSET) / (1 + SRGB_OFFSET), SRGB_EXPONENT)
+    return dr.select(code <= threshold, dr.maximum(code, 0) / SRGB_SLOPE, curve)
+
+
+def toward_light(frame_from_world: Numbers) -> Numbers:
+    """Unit direction ``(3,)`` toward the light source in the world."""
+    axes = np.linalg.inv(np.asarray(frame_from_world, np.float64)[:3, :3])
+    axes /= np.linalg.norm(axes, axis=0)
+    direction = axes @ np.array(LIGHT)
+    unit: Numbers = direction / np.linalg.norm(direction)
+    return unit
