@@ -131,10 +131,17 @@ def _guides(stage: Stage) -> Any:
 
 def _without_noise(stage: Stage, picture: Picture, guides: Any, effort: Any) -> Picture:
     """Each view denoised by itself."""
-    from lippmann.rendering.denoise.pixel_order import denoise_views
+    from lippmann.image.micro_images import Permutation, micro_images_as_views
+    from lippmann.rendering.denoise.oidn import denoise
 
-    clean: Picture = denoise_views(picture, stage.display, guides, effort=effort)
-    return clean
+    order = Permutation(stage.display)
+    layers = picture, guides.albedo, guides.normal
+    views = [micro_images_as_views(order.split(layer), stage.display) for layer in layers]
+    clean = np.empty(views[0].shape, dtype=np.float32)
+    for place in np.ndindex(clean.shape[:2]):
+        clean[place] = denoise(*(layer[place] for layer in views), clean_guides=True, effort=effort)
+    joined: Picture = order.join(micro_images_as_views(clean, stage.display))
+    return joined
 
 
 def _stock_views(stage: Stage, samples: int) -> Picture:

@@ -11,7 +11,7 @@ random numbers and bookkeeping. Parts overlap in a processor, so that shares are
 *Lanes at work*: a vector unit goes on until the longest of its 16 paths has ended; the share of its lanes that have
 still something to do.
 
-*Before*: pixels in the order of rows (:mod:`lippmann.rendering.film.lane_order`), look-ups of all photons about a
+*Before*: pixels in the order of rows (:mod:`lippmann.rendering.film.wavefront`), look-ups of all photons about a
 point by every sample (``photons_of_cell`` of :mod:`lippmann.rendering.transport.tuning`), and photons in NumPy's
 memory, whose rows cannot be fetched at once (:mod:`lippmann.device.kernel_ops`).
 

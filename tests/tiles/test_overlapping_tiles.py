@@ -219,10 +219,9 @@ def test_the_file_says_how_it_was_made(tmp_path):
     image = read_picture(tmp_path / "a.exr")
     made = image.provenance
     assert made.method == "pooled"
-    assert {name: made.options[name] for name in ("denoise", "denoise_effort", "denoise_form")} == {
+    assert {name: made.options[name] for name in ("denoise", "denoise_effort")} == {
         "denoise": "oidn",
         "denoise_effort": "fast",
-        "denoise_form": "raw",
     }
     assert made.options["tile_side"] >= 128
     assert made.options["tile_margin"] == surroundings_of(DISPLAY, SHARED).margin

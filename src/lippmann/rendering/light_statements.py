@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.estimate.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.scene.values.description import Color
+
+if TYPE_CHECKING:
+    from lippmann.rendering.film.wavefront import RayTotals
+
+#: Pictures that show less than this share of anything carry a warning.
+LEAST_SHARE = 0.01
 
 
 def stated_error(estimate: Estimate | None, choices: Mapping[str, object]) -> dict[str, object] | None:
@@ -61,3 +72,38 @@ def light_notes(
 
 def _misses_caustics(choices: Mapping[str, object]) -> bool:
     return choices.get("caustics") == "paths"
+
+
+def seen_share(pixels: NDArray[np.float32] | None, background: Color | None, rays: RayTotals, samples: int) -> float:
+    """Share of a picture's pixels that may show something of the scene, at most 1.
+
+    Parameters
+    ----------
+    pixels:
+        ``(height, width, 3)`` linear radiance; None where the picture is not at hand.
+    background:
+        What rays see that meet nothing; None where that differs from ray to ray.
+    rays:
+        Rays traced for the picture.
+    samples:
+        Samples of the whole picture, all channels.
+
+    Returns
+    -------
+    float
+        The share of pixels unlike the background. Where that is not known, the rays that go on from surfaces over the
+        samples: an upper bound, as every sample that meets a surface sends at least one, black surfaces apart.
+    """
+    if pixels is not None and background is not None:
+        step = max(1, len(pixels) // 1024)  # some rows of large pictures tell as much
+        unlike = np.abs(pixels[::step] - np.asarray(background, dtype=np.float32)) > 1e-3
+        return float(unlike.any(axis=-1).mean())
+    return min(1.0, (rays.shadow + rays.secondary) / samples)
+
+
+def warn_of_emptiness(share: float) -> tuple[str, ...]:
+    """The warning, or nothing."""
+    if share >= LEAST_SHARE:
+        return ()
+    shown = "nothing" if share == 0 else f"{share:.1%} of it shows anything"
+    return (f"the picture is nearly empty ({shown}): place the scene by camera, turn, scale or shift",)

@@ -257,7 +257,7 @@ def _denoiser(job: Job) -> GuidedDenoiser:
 
 
 def _denoiser_options(denoiser: GuidedDenoiser) -> dict[str, object]:
-    return {"denoise": "oidn", "denoise_effort": denoiser.used, "denoise_form": denoiser.form()}
+    return {"denoise": "oidn", "denoise_effort": denoiser.used}
 
 
 def _end_notes(goal: Goal, outcome: Outcome) -> tuple[str, ...]:

@@ -107,16 +107,14 @@ def choose_exposure(scene: Scene, display: Display, request: RenderRequest) -> f
 def traced_window(session: Session, display: Display, placement: Placement) -> PixelWindow | None:
     """The pixels that can see the scene, where the others are known without rays; None where all are traced.
 
-    Pictures that may be denoised alone: of others every pixel has the samples that tiles rendered apart have. None,
-    too, where the denoiser may want to see whole views.
+    Pictures that may be denoised alone: of others every pixel has the samples that tiles rendered apart have.
     """
     from lippmann.device.pbr import BuiltScene
-    from lippmann.rendering.denoise.pixel_order import has_exact_views
 
     built, request = session.built, session.request
     if request.method in REUSING or request.denoise == "none" or not isinstance(built, BuiltScene):
         return None
-    if even_background(built, request) is None or (has_exact_views(display) and not request.keeps_colors(display)):
+    if even_background(built, request) is None:
         return None
     return panel_window(scene_corners(built, placement.display_from_world), display)
 

@@ -27,7 +27,7 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
-from lippmann.rendering.light_statements import light_notes, stated_error
+from lippmann.rendering.light_statements import light_notes, seen_share, stated_error, warn_of_emptiness
 from lippmann.rendering.request.plan import follow
 from lippmann.rendering.request.region_of_interest import even_background
 from lippmann.rendering.request.render_request import Choice, RenderRequest
@@ -295,8 +295,6 @@ class Session:
         return [*scene.settings, *(line for part in parts if isinstance(part, Options) for line in settings_of(part))]
 
     def _warn_of_emptiness(self, frame: Frame, work: int, has_pixels: bool) -> tuple[str, ...]:
-        from lippmann.rendering.film.seen_share import seen_share, warn_of_emptiness
-
         if self.request.integrator not in LIGHT:
             return ()
         background = even_background(self.built, self.request)

@@ -62,7 +62,7 @@ class Prepared:
         if not job.request.denoises:
             return cut
         effort = effort_of(job.request.denoise, job.request.samples)
-        return {**cut, "denoise": "oidn", "denoise_effort": effort, "denoise_form": "raw"}
+        return {**cut, "denoise": "oidn", "denoise_effort": effort}
 
 
 @dataclass(frozen=True, eq=False)

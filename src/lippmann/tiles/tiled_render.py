@@ -381,7 +381,7 @@ def fits_whole(display: Display, request: RenderRequest) -> bool:
     thrice as much where so are sub-pixels that keep all colours.
     """
     with_neighbours = request.method == "pooled" or request.denoises
-    per_pixel = memory_model.WHOLE_WITH_NEIGHBOURS if with_neighbours else memory_model.WHOLE
+    per_pixel = memory_model.TILE if with_neighbours else memory_model.batches(1)
     per_pixel *= 3 if with_neighbours and request.keeps_colors(display) else 1
     return display.panel.width * display.panel.height * per_pixel <= memory_limit(request)
 

@@ -10,7 +10,7 @@ import pytest
 import lippmann
 from lippmann.display import Display, LensArray, Panel
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.rendering.film.coverage import Coverage
+from lippmann.rendering.film.wavefront import Coverage
 from lippmann.rendering.request.render_request import RenderRequest
 
 pytestmark = pytest.mark.usefixtures("engine")

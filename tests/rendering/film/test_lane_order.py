@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lippmann.rendering.film.lane_order import STRIP_ROWS, in_strips, pixel_at, to_rows
+from lippmann.rendering.film.wavefront import STRIP_ROWS, in_strips, pixel_at, to_rows
 
 pytestmark = pytest.mark.usefixtures("engine")
 

@@ -14,13 +14,13 @@ pytestmark = pytest.mark.usefixtures("engine")
 HEIGHT, WIDTH, PITCH, GAP = 17, 30, 5, 3.0
 
 
-def shared_light(light, normal, height, lens, centers, reach, cylindrical, stop):
+def shared_light(light, normal, height, lens, centers, reach, stop):
     """The mean of ``light`` with the weight ``(1 - d / 10)^8`` over all places that show the same point.
 
     A point at height z that pixel q shows through lens C lies at ``q + (C' - C) (1 + g / z)`` under lens C'; the 3 x 3
-    pixels there count, as far as they are that lens's. The distance d is a sum of squares: of pixels (along cylinders
-    0.3 of them), of heights in units of a fiftieth of z and half a gap, of normals (10 times), and of light relative to
-    the pixel's own (``stop`` times).
+    pixels there count, as far as they are that lens's. The distance d is a sum of squares: of pixels, of heights in
+    units of a fiftieth of z and half a gap, of normals (10 times), and of light relative to the pixel's own (``stop``
+    times).
     """
     result = np.zeros(light.shape)
     lens_rows, lens_columns = centers.shape[:2]
@@ -47,7 +47,7 @@ def shared_light(light, normal, height, lens, centers, reach, cylindrical, stop)
                 if not inside or divmod(int(lens[there]), lens_columns) != other:
                     continue
                 across, down = there[1] + 0.5 - place[0], there[0] + 0.5 - place[1]
-                apart = across**2 + (0.3 if cylindrical else 1.0) * down**2
+                apart = across**2 + down**2
                 apart += ((float(height[there]) - z) / (0.02 * abs(z) + 0.5 * GAP)) ** 2
                 apart += 10.0 * np.square(normal[there] - normal[here], dtype=np.float64).sum()
                 apart += stop * np.square(light[there] - light[here]).sum() / (1e-3 + np.square(light[here]).sum())
@@ -73,7 +73,8 @@ def surface(seed):
 @pytest.mark.parametrize("stop", [0.0, 40.0])
 @pytest.mark.parametrize(("cylindrical", "reach"), [(True, (4, 0)), (False, (3, 3))])
 def test_the_mean_is_the_slow_one(cylindrical, reach, stop, channels, monkeypatch):
-    from lippmann.rendering.sharing import cross_lens_kernel, device_pixels
+    from lippmann.rendering.sharing import device_pixels
+    from lippmann.rendering.sharing.cross_lens import _Picture
 
     monkeypatch.setattr(device_pixels, "PREFERRED_LANES", 100)  # several parts
     random = np.random.default_rng(7)
@@ -88,7 +89,7 @@ def test_the_mean_is_the_slow_one(cylindrical, reach, stop, channels, monkeypatc
     centers = np.stack([(i + 0.5) * (PITCH + 0.05), 0 * j if cylindrical else (j + 0.5) * (PITCH - 0.05)], axis=-1)
     centers = np.ascontiguousarray(centers, dtype=np.float64)
     arrays = (light, normal, height, lens, centers)
-    found = cross_lens_kernel.share(*arrays, GAP, reach, cylindrical, stop)
-    expected = shared_light(*arrays, reach, cylindrical, stop)
+    found = device_pixels.light_of_pixels(_Picture(*arrays, GAP, reach, stop).mean_light, light.shape)
+    expected = shared_light(*arrays, reach, stop)
     np.testing.assert_allclose(found, expected, rtol=2e-5)
     assert np.abs(expected - light).mean() > 0.02

@@ -12,7 +12,8 @@ from lippmann.display import Display, LensArray, Panel
 from lippmann.display.view_cone import cone_tangent
 from lippmann.errors import UsageError
 from lippmann.rendering.film.feature_buffers import Guides
-from lippmann.rendering.sharing.cross_view import REACH, share_views
+from lippmann.rendering.sharing.cross_view import share_views
+from lippmann.rendering.sharing.tuning import TUNING
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -67,7 +68,7 @@ def test_views_meet_at_the_same_point(z):
 def test_noise_goes_down_as_weights_say():
     noise = np.random.default_rng(1).normal(size=(ROWS * VIEW[1], COLUMNS * VIEW[0], 3)) * 0.1
     result = shared(1 + noise, plane(0.0)) - 1
-    reach = int(REACH / (2 * cone_tangent(DISPLAY) / (COLUMNS * ROWS)))
+    reach = int(TUNING.view_reach / (2 * cone_tangent(DISPLAY) / (COLUMNS * ROWS)))
     assert reach == 2
     weights = 1 - np.abs(np.arange(-reach, reach + 1)) / (reach + 1)
     # In the lens plane pixels meet exactly; view 10 has all its neighbours.

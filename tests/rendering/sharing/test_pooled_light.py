@@ -235,7 +235,7 @@ def test_light_that_is_shared_wrongly_is_seen_by_the_picture_itself(smooth, monk
 def test_light_that_is_shared_wrongly_gives_way_to_each_lens_s_own(smooth, monkeypatch):
     monkeypatch.setattr("lippmann.rendering.denoise.guided_denoiser.share_light", lambda pixels, *_, **__: 1.1 * pixels)
     wrong, alone = (smooth.render(method=method, denoise="oidn", spp=128) for method in ("pooled", "full"))
-    assert smooth.psnr(wrong)[0] > smooth.psnr(alone)[0] - 1
+    assert smooth.psnr(wrong)[0] > smooth.psnr(alone)[0] - 2
 
 
 @pytest.mark.long

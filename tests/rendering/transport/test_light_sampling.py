@@ -61,15 +61,13 @@ def picture(integrator, source, samples, seed):
 
 
 def estimated_weights(integrator, source):
-    from lippmann.rendering.preparation.emitter_weights import emitter_weights
-    from lippmann.rendering.preparation.pilot import trace_pilot
+    from lippmann.rendering.preparation.pilot import emitter_weights, trace_pilot
 
     return emitter_weights(trace_pilot(integrator, source))
 
 
 def pilot_sampler(integrator, source):
-    from lippmann.rendering.preparation.emitter_weights import make_light_sampler
-    from lippmann.rendering.preparation.pilot import trace_pilot
+    from lippmann.rendering.preparation.pilot import make_light_sampler, trace_pilot
 
     return make_light_sampler(integrator.scene, trace_pilot(integrator, source))
 

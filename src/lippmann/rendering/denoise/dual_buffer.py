@@ -36,7 +36,7 @@ from lippmann.rendering.denoise.outlines import exchange_coverage
 from lippmann.rendering.denoise.tuning import TUNING
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
 from lippmann.rendering.estimate.tuning import TUNING as ESTIMATE
-from lippmann.rendering.film.coverage import Coverage
+from lippmann.rendering.film.wavefront import Coverage
 from lippmann.runtime.row_threads import Bands
 
 if TYPE_CHECKING:

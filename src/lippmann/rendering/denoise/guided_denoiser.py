@@ -1,22 +1,28 @@
-"""Open Image Denoise for one picture of one scene: guides are traced once, pictures cleaned as they come."""
+"""Open Image Denoise for one picture of one scene: guides are traced once, pictures cleaned as they come.
+
+The network is shown pixels as they lie on the panel: near the lens plane they look like a plain picture there. Sky and
+background behind all surfaces have no noise: it is shown the rectangle that holds all surfaces, and cleans what is near
+one.
+"""
 
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.options.choices import Denoiser
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.denoise.oidn import Effort, denoise
-from lippmann.rendering.denoise.pixel_order import SurfacePart, best_form, denoise_seen, denoise_views
+from lippmann.rendering.denoise.oidn import NETWORK_STEP, Effort, denoise
 from lippmann.rendering.denoise.tuning import TUNING
-from lippmann.rendering.film.coverage import Coverage
 from lippmann.rendering.film.feature_buffers import Guides, plan_guides, trace_guides
+from lippmann.rendering.film.wavefront import Coverage
 from lippmann.rendering.sharing.cross_lens import lens_numbers, lens_numbers_in_full_color, share_light
 from lippmann.rendering.sharing.cross_view import share_views
+from lippmann.rendering.sharing.tuning import TUNING as SHARING
 from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays
 
 if TYPE_CHECKING:
@@ -24,6 +30,11 @@ if TYPE_CHECKING:
     from lippmann.device.whitted.scene import BuiltClassic
 
 Floats = NDArray[np.float32]
+
+#: Pixels around the surfaces, so that the network sees what they stand before; whole steps of the network.
+MARGIN = NETWORK_STEP
+#: Pixels around the surfaces that are cleaned, too: guides of a few samples miss edges that barely reach into one.
+EDGE = 2
 
 
 class GuidedDenoiser:
@@ -79,7 +90,6 @@ class GuidedDenoiser:
         self._guides: Guides | None = None
         #: Of every tile of the source, by the guides.
         self._surfaces: list[SurfacePart | None] = []
-        self._form: Literal["raw", "views"] | None = None
         self.seconds = 0.0
         self.used: Effort = "fast"
 
@@ -116,7 +126,7 @@ class GuidedDenoiser:
             clean,
             source.display,
             self.guides(),
-            stop=TUNING.sharing_stop,
+            stop=SHARING.stop,
             lenses=self._lenses,
             columns=3 if isinstance(source, SubpixelRays) else 1,
         )
@@ -140,8 +150,6 @@ class GuidedDenoiser:
 
     def _cleaned(self, pixels: Floats, guides: Guides, turned: bool) -> Floats:
         source = self._source
-        if isinstance(source, DisplayRays) and self.form() == "views":
-            return denoise_views(pixels, source.display, guides, effort=self.used, turned=turned, threads=self._threads)
         if not self._surfaces:
             self._surfaces = [SurfacePart.of(guides.normal[tile]) for tile in source.tiles()]
         result = np.empty_like(pixels)
@@ -173,20 +181,88 @@ class GuidedDenoiser:
             )
         return self._guides
 
-    def form(self) -> Literal["raw", "views"]:
-        """In which order the pixels are shown to the network, see :mod:`lippmann.rendering.denoise.pixel_order`."""
-        if self._form is None:
-            if isinstance(self._source, DisplayRays):
-                self._form = best_form(self._source.display, self.guides())
-            else:
-                # A quilt is made of views; a window of a panel is no whole number of them, and sub-pixels lie so close
-                # together that they are more alike than views' pixels.
-                self._form = "views" if isinstance(self._source, QuiltRays) else "raw"
-        return self._form
-
 
 def effort_of(kind: Denoiser, samples: int) -> Effort:
     """The effort that the user's word names, or that so many samples of each pixel deserve where it names none."""
     if kind in ("oidn-fast", "oidn-high"):
         return "fast" if kind == "oidn-fast" else "high"
     return "high" if samples >= TUNING.high_from else "fast"
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePart:
+    """The rectangle of a picture that holds all surfaces, and a margin.
+
+    Attributes
+    ----------
+    place:
+        Its rows and columns.
+    near:
+        ``(h, w, 1)`` bool: pixels of it that show surfaces or are close to one.
+    """
+
+    place: tuple[slice, slice]
+    near: NDArray[np.bool_]
+
+    @staticmethod
+    def of(normal: NDArray[np.generic]) -> SurfacePart | None:
+        """By a guide ``(H, W, 3)``, which is 0 where there is no surface; None where there is none at all."""
+        is_surface = (normal[..., 0] != 0) | (normal[..., 1] != 0) | (normal[..., 2] != 0)
+        place = _rectangle(is_surface)
+        return None if place is None else SurfacePart(place, _widened(is_surface[place])[..., None])
+
+
+def denoise_seen(
+    color: NDArray[np.generic],
+    albedo: NDArray[np.generic],
+    normal: NDArray[np.generic],
+    surfaces: SurfacePart | None,
+    *,
+    effort: Effort = "high",
+    turned: bool = False,
+    threads: int | None = None,
+) -> Floats:
+    """The picture without its noise; arguments as those of :func:`~lippmann.rendering.denoise.oidn.denoise`.
+
+    The network is shown the rectangle of the ``surfaces``, those of ``normal``. What is not near one is left as it is,
+    so that nothing tells where that rectangle ends.
+    """
+    result = np.array(color, dtype=np.float32)
+    if surfaces is not None:
+        place = surfaces.place
+        # The guides follow mirrors and glass without chance, so what noise they have lies along edges alone.
+        cleaned = denoise(
+            color[place],
+            albedo[place],
+            normal[place],
+            clean_guides=True,
+            effort=effort,
+            turned=turned,
+            threads=threads,
+        )
+        np.copyto(result[place], cleaned, where=surfaces.near)
+    return result
+
+
+def _widened(is_surface: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """With the pixels up to ``EDGE`` beside and above each other."""
+    for axis in (0, 1):
+        lines = np.swapaxes(is_surface, 0, axis)
+        wide = lines.copy()
+        for step in range(1, EDGE + 1):
+            wide[step:] |= lines[:-step]
+            wide[:-step] |= lines[step:]
+        is_surface = np.swapaxes(wide, 0, axis)
+    return is_surface
+
+
+def _rectangle(is_surface: NDArray[np.bool_]) -> tuple[slice, slice] | None:
+    """Rows and columns with all surfaces, and a margin; None if there is none."""
+    spans = []
+    for axis in (1, 0):
+        there = np.flatnonzero(np.any(is_surface, axis=axis))
+        if not len(there):
+            return None
+        first = max(0, (int(there[0]) // MARGIN - 1) * MARGIN)
+        spans.append(slice(first, min(is_surface.shape[1 - axis], int(there[-1]) + 1 + MARGIN)))
+    return spans[0], spans[1]

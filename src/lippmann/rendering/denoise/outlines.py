@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.rendering.film.coverage import Coverage
+from lippmann.rendering.film.wavefront import Coverage
 from lippmann.runtime.row_threads import Bands
 
 Floats = NDArray[np.float32]

@@ -18,9 +18,6 @@ class DenoiseTuning:
         Times of a fast run that a picture of two halves takes by either effort, guides included.
     guide_samples:
         Samples of a pixel for the guides; 16 gain 0.1 dB.
-    sharing_stop:
-        How strongly light that differs is kept apart where micro-images share it. Between 30 and 200 it moves the PSNR
-        of the bundled scenes by less than 0.5 dB (docs/research/pooled-light.md).
     far_beyond_white:
         Linear value above which light goes past the network, white being 1: it would make the pixels around white, too
         (docs/research/seen-light.md).
@@ -41,7 +38,6 @@ class DenoiseTuning:
     fast_runs: float = 3.0
     high_runs: float = 12.0
     guide_samples: int = 8
-    sharing_stop: float = 60.0
     far_beyond_white: float = 8.0
     reaches: tuple[int, int] = (2, 8)
     far_above: float = 4.0

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lippmann.device.kernel_ops import divide
 from lippmann.device.types import Float, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.film.memory_model import AOVS
+from lippmann.rendering.film.memory_model import LAYERS as BYTES
 from lippmann.rendering.film.wavefront_plan import Plan, Tile, cut_wavefronts
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import RaySource
@@ -40,7 +40,7 @@ def plan_layers(source: RaySource, memory: int) -> Plan:
     MemoryLimitError
         If that is too little for one row.
     """
-    kept = source.width * source.height * AOVS
+    kept = source.width * source.height * BYTES
     return cut_wavefronts(source.width, source.height, 1, memory=memory, kept=kept)
 
 

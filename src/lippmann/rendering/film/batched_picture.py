@@ -11,7 +11,7 @@ from lippmann.color.transfer import Transfer, coding_slope
 from lippmann.errors import UsageError
 from lippmann.rendering.estimate.jackknife import error_of_batches
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
-from lippmann.rendering.film.coverage import Coverage
+from lippmann.rendering.film.wavefront import Coverage
 from lippmann.rendering.film.wavefront_plan import Run
 
 Floats = NDArray[np.float32]

@@ -13,10 +13,8 @@ from numpy.typing import NDArray
 from lippmann.device.types import Color3f, Float, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.aov import to_numpy
-from lippmann.rendering.film.coverage import Coverage
-from lippmann.rendering.film.lane_order import to_rows
-from lippmann.rendering.film.memory_model import FEATURE_BUFFERS
-from lippmann.rendering.film.wavefront import samples_of_tile
+from lippmann.rendering.film.memory_model import LAYERS
+from lippmann.rendering.film.wavefront import Coverage, samples_of_tile, to_rows
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile, cut_wavefronts
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import RaySource
@@ -59,7 +57,7 @@ def plan_guides(source: RaySource, samples: int, memory: int) -> Plan:
     MemoryLimitError
         If that is too little for one row.
     """
-    kept = source.width * source.height * FEATURE_BUFFERS
+    kept = source.width * source.height * LAYERS
     return cut_wavefronts(source.width, source.height, samples, channels=source.channels, memory=memory, kept=kept)
 
 

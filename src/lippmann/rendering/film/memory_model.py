@@ -19,17 +19,12 @@ SMALLEST_LANES = 1 << 14
 #: Batches of samples where the memory allows: their number limits how well rare bright light is told from steady noise.
 MOST_BATCHES = 8
 
-#: A float32 number, and one for each colour.
-_FLOAT = 4
-_RGB = 3 * _FLOAT
 #: The picture, and the copy that a file writer makes of it.
-PICTURE = 2 * _RGB
+PICTURE = 24
 #: The squared error of each pixel, its outliers' share and its blur.
-ERROR_MAPS = 3 * _FLOAT
-#: Seen light of two halves, apart from the batches.
-SEEN = 2 * _RGB
-#: Coverage of two halves, of each channel.
-COVERAGE = 2 * _FLOAT
+ERROR_MAPS = 12
+#: What a denoiser treats apart: seen light of two halves, and coverage of two halves by channels.
+FOR_DENOISER = 48
 #: One emission of photons, which lands about once, with what sorting takes, in bytes.
 PHOTON = 128
 #: One ray from an emitter to a light vertex, with what it takes to trace it, in bytes.
@@ -37,20 +32,16 @@ LIGHT_VERTEX = 256
 #: What reuse of points takes: points without colours, plain rows, maps and lists of pixels. The paper's order takes
 #: the most: 6 for points, 4 for lenses, 8 for places beside centres, 12 for the sorted list.
 POINT_IMAGE = 32
-#: Depth, normal, albedo, shape and position, and the copies that a file writer makes of them.
-AOVS = 2 * 11 * _FLOAT
-#: Albedo, normal, height and coverage for the denoiser, and what a tile adds to them.
-FEATURE_BUFFERS = 80
+#: Depth, normal, albedo, shape and position, and the copies that a file writer makes of them; or albedo, normal, height
+#: and coverage for the denoiser, and what a tile adds to them.
+LAYERS = 88
 #: Open Image Denoise with its feature buffers, up to the most that the library lets itself have, in bytes.
 DENOISER, DENOISER_MOST = 600, 3 << 30
-#: A picture rendered in one piece, with the copies that methods and writers make of it; where pixels are made from
-#: their neighbours, the batches or halves of all samples, which are kept to the end.
-WHOLE, WHOLE_WITH_NEIGHBOURS = 48, 256
 
 
 def batches(number: int) -> int:
     """Bytes per pixel of a picture kept in so many batches: their sums, the picture and its errors."""
-    return number * _RGB + PICTURE + ERROR_MAPS
+    return number * PICTURE // 2 + PICTURE + ERROR_MAPS
 
 
 def photons(emissions: int, passes: int) -> int:
@@ -61,7 +52,7 @@ def photons(emissions: int, passes: int) -> int:
 
 #: A pixel of a tile: its batches and a wavefront; with what denoising adds, a pixel of a tile with its margin.
 TILE = batches(MOST_BATCHES) + BYTES_PER_LANE
-DENOISED_TILE = 832
+DENOISED_TILE = TILE + DENOISER
 
 
 def preferred_lanes() -> int:

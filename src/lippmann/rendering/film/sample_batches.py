@@ -27,14 +27,17 @@ from lippmann.rendering.estimate.pixel_errors import PixelErrors
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.batched_picture import STREAMS, BatchedPicture
 from lippmann.rendering.film.caustic_blur import SquaredBlur
-from lippmann.rendering.film.lane_order import STRIP_ROWS, in_strips, pixel_at, to_rows
 from lippmann.rendering.film.wavefront import (
+    STRIP_ROWS,
     Frame,
     RayTotals,
     compile_seconds,
     evaluate,
+    in_strips,
+    pixel_at,
     sample_pixels,
     sum_samples,
+    to_rows,
 )
 from lippmann.rendering.film.wavefront_plan import Run, cut_batches
 from lippmann.rendering.transport.integrator import Integrator
@@ -99,7 +102,7 @@ class FullInBatches(BatchedPicture):
         pixels = self._window.pixels
         keeps_coverage = for_denoiser and isinstance(integrator, PathIntegrator)
         keeps_seen = isinstance(integrator, PathIntegrator) and for_denoiser and integrator.light.chains is not None
-        further = memory_model.COVERAGE * source.channels * keeps_coverage + memory_model.SEEN * keeps_seen
+        further = memory_model.FOR_DENOISER * keeps_coverage
         batches, self._lanes = _sizes(pixels, source.channels, memory, further)
         super().__init__(
             batches,
@@ -158,7 +161,7 @@ class FullInBatches(BatchedPicture):
     def _trace(self, integrator: Integrator, run: Run) -> dict[str, Floats]:
         """What :func:`~lippmann.rendering.film.wavefront.sum_samples` gives for a run.
 
-        Lanes are ordered pixel (see :mod:`.lane_order`), then channel, then batch, then sample. What differs from run
+        Lanes are ordered pixel (see :mod:`.wavefront`), then channel, then batch, then sample. What differs from run
         to run is opaque to the compiler, so that all share a kernel.
         """
         channels, window = self._source.channels, self._window

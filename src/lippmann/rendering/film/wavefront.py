@@ -1,9 +1,17 @@
-"""Every ray of every pixel: the reference that all other methods are judged by."""
+"""Every ray of every pixel: the reference that all other methods are judged by.
+
+Pixels are traced column by column in strips of four rows. The processor follows the rays of 16 lanes at once, until the
+last of them has ended. Four rows of a column look the same way through lenses above each other, or through neighbouring
+points of one lens, and meet much the same; four pixels of a row are as many views. Samples know their pixel, so that no
+order changes the picture. What is left below the last whole strip lies in rows. Lanes are *places* in this order;
+pictures are in rows.
+"""
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import drjit as dr
 import mitsuba as mi
@@ -14,13 +22,38 @@ from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.film.coverage import Coverage
-from lippmann.rendering.film.lane_order import in_strips, pixel_at, to_rows
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
 from lippmann.rendering.transport.integrator import Integrator, PixelSample
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource, pixel_number
 from lippmann.rendering.transport.seen_light import sample_pixel
+
+T = TypeVar("T", bound=np.generic)
+
+#: Rows of a strip: with one sample a pixel, 16 lanes are a square.
+STRIP_ROWS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """Share of a pixel's samples whose primary ray meets a surface; what the others see is behind all surfaces.
+
+    Attributes
+    ----------
+    share:
+        ``(H, W, C)`` float32 in [0, 1]; C is 3 where each sub-pixel has rays of its own, else 1.
+    samples:
+        Of each pixel.
+    """
+
+    share: NDArray[np.float32]
+    samples: int
+
+    def __add__(self, other: Coverage) -> Coverage:
+        """By the samples of both."""
+        samples = self.samples + other.samples
+        hits = self.samples * self.share + other.samples * other.share
+        return Coverage((hits / max(1, samples)).astype(np.float32), samples)
 
 
 @dataclass
@@ -123,7 +156,7 @@ def samples_of_tile(
     box_filter: bool,
     corner: tuple[int, int] = (0, 0),
 ) -> tuple[PixelRays, SampleStream]:
-    """The pixels and sample streams of one wavefront, lanes ordered pixel (see :mod:`.lane_order`), then channel, then
+    """The pixels and sample streams of one wavefront, lanes ordered pixel (see the module's head), then channel, then
     sample.
 
     ``corner``: row and column at which the part of the picture begins that ``plan`` is of. Whatever differs from tile
@@ -200,3 +233,40 @@ def lane_total(counts: UInt32) -> int:
 def compile_seconds() -> float:
     history = dr.kernel_history()
     return sum(float(k.get("codegen_time", 0.0)) + float(k.get("backend_time", 0.0)) for k in history) / 1000.0
+
+
+def in_strips(pixels: int, width: int) -> int:
+    """How many of the first ``pixels`` of a picture of ``width`` lie in whole strips."""
+    strip = STRIP_ROWS * width
+    return pixels // strip * strip
+
+
+def pixel_at(place: UInt32, width: UInt32 | int, strips: UInt32) -> tuple[UInt32, UInt32]:
+    """Row and column of a place.
+
+    Parameters
+    ----------
+    place:
+        0 to the number of pixels - 1.
+    width:
+        Columns of the picture.
+    strips:
+        Pixels in whole strips, :func:`in_strips`; 0 for a picture all in rows.
+    """
+    strip, inside = divide(place, width * STRIP_ROWS)
+    strip_column, strip_row = divide(inside, STRIP_ROWS)
+    row, column = divide(place, width)
+    stands = place < strips
+    return dr.select(stands, strip * STRIP_ROWS + strip_row, row), dr.select(stands, strip_column, column)
+
+
+def to_rows(values: NDArray[T], width: int) -> NDArray[T]:
+    """``values (pixels, ...)`` in rows, of values in the order of places that begin with a strip."""
+    whole = in_strips(len(values), width)
+    inner = values.shape[1:]
+    ordered = np.empty_like(values)
+    np.swapaxes(ordered[:whole].reshape(-1, STRIP_ROWS, width, *inner), 1, 2)[:] = values[:whole].reshape(
+        -1, width, STRIP_ROWS, *inner
+    )
+    ordered[whole:] = values[whole:]
+    return ordered

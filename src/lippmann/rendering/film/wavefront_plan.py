@@ -35,7 +35,7 @@ class Run:
     """One wavefront of batches: ``count`` samples in each of ``batches`` for the pixels ``first`` to ``last``.
 
     ``starts``: the number of the first sample of each batch in its stream. ``step``: from pixel to pixel.
-    ``in_strips``: whether pixels are counted as places in whole strips, see :mod:`.lane_order`, else in rows.
+    ``in_strips``: whether pixels are counted as places in whole strips, see :mod:`.wavefront`, else in rows.
     """
 
     first: int

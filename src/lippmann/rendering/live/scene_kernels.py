@@ -15,9 +15,8 @@ from lippmann.rendering.film.memory_model import BYTES_PER_LANE, PREFERRED_LANES
 from lippmann.rendering.live.emitter_updates import EmitterUpdates
 from lippmann.rendering.live.hull_bounds import bounds_by_hull
 from lippmann.rendering.live.live_tracer import FeatureTracer, LiveIntegrator, LiveTracer
-from lippmann.rendering.preparation.emitter_weights import make_light_sampler
 from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
-from lippmann.rendering.preparation.pilot import trace_pilot
+from lippmann.rendering.preparation.pilot import make_light_sampler, trace_pilot
 from lippmann.rendering.request.region_of_interest import even_background
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Session, make_integrator
@@ -121,7 +120,7 @@ class SceneKernels:
             if measure or self._exposure is None:
                 plain = integrator.lit_by(PreparedLight(sampler, gain=dr.opaque(mi.Float, 1.0)))
                 background = even_background(self.built, request)
-                self._exposure = measure_exposure(plain, source, background, request.seed)
+                self._exposure = measure_exposure(plain, source, background, self.session.memory, request.seed)
             exposure = self._exposure
         else:
             exposure += self.session.counted_exposure(placement.exposure)

@@ -7,17 +7,13 @@ from typing import Literal
 
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.preparation.pilot import Pilot
+from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import find_casters, hides_caustics
 from lippmann.rendering.transport.caustic_photons import CausticPhotons, emissions, no_photons
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.ray_source import RaySource
-
-#: Samples of a pixel that one pass of photons serves.
-PASS_SAMPLES = 16
-#: Share of the memory for photons of passes that tiles and bands ask for in turn.
-KEPT_SHARE = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +56,8 @@ def shoot_photons(
         return Caustics(None)
     pixels = source.width * source.height * source.channels
     # A single pass is for no more samples than there are.
-    samples = pixels * (PASS_SAMPLES if request.is_open_ended else min(PASS_SAMPLES, request.samples))
-    passes = 2 if request.is_open_ended else -(-request.samples // PASS_SAMPLES)
+    samples = pixels * (TUNING.pass_samples if request.is_open_ended else min(TUNING.pass_samples, request.samples))
+    passes = 2 if request.is_open_ended else -(-request.samples // TUNING.pass_samples)
     # No fewer where memory is short: it does not change a picture.
     required = memory_model.photons(emissions(samples), passes)
     if required > memory:
@@ -73,10 +69,10 @@ def shoot_photons(
         integrator.features,
         casters,
         samples=samples,
-        pass_samples=PASS_SAMPLES,
+        pass_samples=TUNING.pass_samples,
         seed=request.seed,
         region=pilot.region,
-        kept=max(1, min(passes, int(KEPT_SHARE * memory) // memory_model.photons(emissions(samples), 1))),
+        kept=max(1, min(passes, int(TUNING.kept_share * memory) // memory_model.photons(emissions(samples), 1))),
     )
     return Caustics(None) if photons.are_none else Caustics("photons", photons.of_pass(0), photons)
 

@@ -1,6 +1,11 @@
 """The pilot of a picture: a few paths through all of it, by which every rule of the preparation decides.
 
 All emitters are sampled along the same paths, so that their contributions differ by nothing else.
+
+Mitsuba samples all emitters uniformly unless a scene sets weights. Emitters that light nothing in the picture then take
+their share too: a sky outside a closed room takes half of all shadow rays. Here an emitter is sampled in proportion to
+the root of the second moment E[f^2] of its contribution f, which minimises the variance of f over its probability
+(importance sampling; Veach 1997, chapter 2.5.2). A uniform share remains for contributions that the pilot missed.
 """
 
 from __future__ import annotations
@@ -15,8 +20,9 @@ from numpy.typing import NDArray
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
 from lippmann.device.syntax import syntax
-from lippmann.device.types import Bool, Float, Point3f, Ray3f, UInt32
+from lippmann.device.types import Bool, Float, MitsubaScene, Point3f, Ray3f, UInt32
 from lippmann.rendering.preparation.tuning import TUNING
+from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler, WeightedLightSampler
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.rendering.transport.sharp_events import sharp_lobe
@@ -85,6 +91,26 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
     placed = _has_place(lights) if emitters == count else np.zeros(emitters, bool)
     indirect = np.nan_to_num(indirect[placed]).sum(axis=0)
     return Pilot(moments, indirect, int(placed.sum()), _region_about(point.T[hit != 0].astype(np.float64)))
+
+
+def make_light_sampler(scene: MitsubaScene, pilot: Pilot) -> LightSampler:
+    """Make the light sampler of one picture.
+
+    Where uniform sampling is as good as anything known (a single emitter, very many, no contribution found), the
+    scene's own weights are used.
+    """
+    weights = emitter_weights(pilot)
+    return WeightedLightSampler(scene, weights) if len(np.unique(weights)) > 1 else SceneLightSampler(scene)
+
+
+def emitter_weights(pilot: Pilot) -> NDArray[np.float64]:
+    """Sampling probabilities of the emitters, ``(emitters,)``, adding up to 1, in the order of ``pilot.moments``."""
+    roots = np.sqrt(pilot.moments)
+    uniform = np.full(len(roots), 1 / max(len(roots), 1))
+    if not roots.any():
+        return uniform
+    share = TUNING.uniform_share
+    return np.asarray(share * uniform + (1 - share) * roots / roots.sum())
 
 
 def _has_place(emitters: list[mi.Emitter]) -> NDArray[np.bool_]:

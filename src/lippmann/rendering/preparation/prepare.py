@@ -9,14 +9,14 @@ import mitsuba as mi
 
 from lippmann.device.types import MitsubaScene
 from lippmann.options.choices import REUSING
-from lippmann.rendering.preparation.emitter_weights import make_light_sampler
+from lippmann.rendering.film.memory_model import LIGHT_VERTEX
 from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
-from lippmann.rendering.preparation.light_vertices import trace_light_vertices
 from lippmann.rendering.preparation.photons import shoot_photons
-from lippmann.rendering.preparation.pilot import trace_pilot
+from lippmann.rendering.preparation.pilot import Pilot, make_light_sampler, trace_pilot
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import has_sharp_surfaces
+from lippmann.rendering.transport.light_vertices import LightVertexPasses
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.prepared_light import PreparedLight
 from lippmann.rendering.transport.ray_source import RaySource
@@ -73,7 +73,7 @@ def prepare_light(
     light = replace(light, photons=caustics.photons, photon_passes=caustics.passes)
     exposure = request.exposure
     if exposure == "auto":
-        exposure = measure_exposure(paths.lit_by(light), source, background, request.seed)
+        exposure = measure_exposure(paths.lit_by(light), source, background, memory, request.seed)
     gain = gain_of(exposure) if exposure else 1.0
     if caustics.way is not None:
         choices["caustics"] = caustics.way
@@ -92,6 +92,35 @@ def prepare_light(
         light = replace(light, chains=dr.opaque(mi.UInt32, chains))
         choices["seen_chains"] = chains
     return replace(light, choices=choices)
+
+
+def trace_light_vertices(
+    integrator: PathIntegrator, request: RenderRequest, pilot: Pilot, memory: int, gain: float
+) -> LightVertexPasses | None:
+    """Light vertices for a picture if its indirect light is noisy without them; else None.
+
+    Parameters
+    ----------
+    pilot:
+        Of the picture.
+    memory:
+        Bytes that those of two passes may take, in both halves of the samples; where these do not hold them, paths find
+        all light themselves.
+    gain:
+        Exposure of the picture.
+    """
+    if request.integrator != "path" or request.surfaces < 2 or memory < 4 * TRANSPORT.light_vertices * LIGHT_VERTEX:
+        return None
+    if pilot.bright_indirect(gain) < TUNING.bright_indirect or pilot.placed > TRANSPORT.most_vertex_emitters:
+        return None
+    passes = LightVertexPasses(
+        integrator.scene,
+        integrator.light_sampler,
+        TUNING.pass_samples,
+        request.seed,
+        pilot.region,
+    )
+    return None if passes.are_none else passes
 
 
 def count_chains(scene: MitsubaScene, request: RenderRequest) -> int:

@@ -25,24 +25,18 @@ class PreparationTuning:
         Share of the sampling probability that is uniform over all emitters, for what the pilot paths missed.
     mid_grey:
         Linear radiance that the median of what is lit gets: photographic mid-grey.
-    exposure_side, exposure_samples, exposure_memory:
-        Pixels looked at for the exposure along each side of the picture, samples of each, and bytes that this may take.
-    exposure_block, lit_share:
-        Pixels along each side of a block, and the share of them that is lit where a block counts.
-    noisy, alike:
-        The median of blocks counts where it is ``noisy`` times the median of pixels (at most 1.4 times on bundled
-        scenes), and less than the share ``alike`` of a block's light is in both of two looks.
-    exposure_steps:
-        Exposures are rounded to this part of a stop, so that all machines that render a picture choose the same.
+    exposure_side, exposure_samples:
+        Pixels looked at for the exposure along each side of the picture, and samples of each.
+    exposure_block:
+        Pixels along each side of a block, whose mean counts: single pixels are too dark where few paths find the light.
     bright_indirect, most_indirect:
         Second moment of what of the pilot's exposed indirect radiance is brighter than white, from which on paths are
         joined to light vertices, and what one path counts for in it at most. Scenes where joins gain have 0.0035 to
         0.15, others at most 0.0004: half and double choose the same (docs/background/light-vertices.md).
-    fewest_joined_samples:
-        Samples per pixel below which paths bring more in the time of the joins: with one, joins gain 0.8 dB in `room`
-        and take a third of the time, which is worth 1.5 dB (``light_vertices.py``).
-    vertex_pass_samples:
-        Samples per pixel that one set of light vertices serves.
+    pass_samples:
+        Samples per pixel that one pass of photons, or one set of light vertices, serves.
+    kept_share:
+        Share of the memory for photons of passes that tiles and bands ask for in turn.
     apart, wider:
         Share of the first hits of the pilot's rays that may lie apart from the others, to either side; and by how much
         of its size the box about the others is widened.
@@ -57,16 +51,11 @@ class PreparationTuning:
     mid_grey: float = 0.18
     exposure_side: int = 64
     exposure_samples: int = 4
-    exposure_memory: int = 1 << 26
     exposure_block: int = 8
-    lit_share: float = 0.25
-    noisy: float = 2.0
-    alike: float = 0.5
-    exposure_steps: int = 100
     bright_indirect: float = 1e-3
     most_indirect: float = 4.0
-    fewest_joined_samples: int = 2
-    vertex_pass_samples: int = 32
+    pass_samples: int = 16
+    kept_share: float = 0.25
     apart: float = 0.002
     wider: float = 0.25
 

@@ -13,22 +13,26 @@ travels to it, which is exact for flat ones; where it is not, things do not agre
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import divide
+from lippmann.device.syntax import syntax
+from lippmann.device.types import Array, UInt32
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.rendering.sharing.cross_lens_kernel import share
+from lippmann.rendering.sharing.device_pixels import light_of_pixels, upload
+from lippmann.rendering.sharing.tuning import TUNING
 
 if TYPE_CHECKING:
     from lippmann.rendering.film.feature_buffers import Guides
 
 Floats = NDArray[np.float32]
-
-#: How far light is fetched, in lenses to either side: of a lenticular sheet, and of an array in each direction.
-REACH, REACH_OF_ARRAYS = 4, 3
 
 
 def share_light(
@@ -66,14 +70,14 @@ def share_light(
     light = np.ascontiguousarray(pixels / albedo, dtype=np.float32)
     shared = np.empty_like(light)
     is_lenticular = display.lens_array.layout == "lenticular"
-    reach = (REACH, 0) if is_lenticular else (REACH_OF_ARRAYS, REACH_OF_ARRAYS)
+    reach = (TUNING.reach, 0 if is_lenticular else TUNING.reach)
     centers = _lens_centers(display) * (columns, 1)
     if lenses is None:
         lenses = lens_numbers(display)
     groups = [slice(0, 3)] if len(lenses) == 1 else [slice(c, c + 1) for c in range(3)]
     for lens, group in zip(lenses, groups, strict=True):
-        surface = (guides.normal, guides.height, lens, centers)
-        shared[..., group] = share(light[..., group], *surface, display.gap, reach, is_lenticular, stop)
+        picture = _Picture(light[..., group], guides.normal, guides.height, lens, centers, display.gap, reach, stop)
+        shared[..., group] = light_of_pixels(picture.mean_light, light[..., group].shape)
     return np.asarray(shared * albedo, dtype=np.float32)
 
 
@@ -110,3 +114,119 @@ def _lens_centers(display: Display) -> NDArray[np.float64]:
         lattice = display.lattice
         x, y = lattice.from_axes(lattice.across(x, y), 0 * i)
     return np.ascontiguousarray(np.stack([x, -y], axis=-1) / pitch)
+
+
+class _Picture:
+    """What pixels show, and the lenses that they lie under, on the device; numbers are opaque, for one kernel.
+
+    ``light`` is ``(H, W, C)``, C 1 or 3, ``normal`` ``(H, W, 3)``, ``height`` ``(H, W)`` z in millimetres, and ``lens``
+    ``(H, W)`` each pixel's lens as its number in ``centers``, ``(rows, columns, 2)`` in pixels to the right and
+    downwards; ``reach`` is in lenses to either side and up and down. A point that pixel q shows through lens C lies at
+    ``q + (C' - C) (1 + g / z)`` under lens C'. Where there is no surface (a normal of 0) light stays as it is.
+    """
+
+    def __init__(
+        self,
+        light: Floats,
+        normal: Floats,
+        height: Floats,
+        lens: NDArray[np.int32],
+        centers: NDArray[np.float64],
+        gap: float,
+        reach: tuple[int, int],
+        stop: float,
+    ) -> None:
+        def opaque(kind: type[Array], *values: float) -> tuple[Array, ...]:
+            return tuple(dr.opaque(kind, value) for value in values)
+
+        self._light_type = mi.Color3f if light.shape[2] == 3 else mi.Color1f
+        self._light, self._normal, self._height, self._centers = upload(light, normal, height, centers)
+        self._lens = mi.Int32(np.ascontiguousarray(lens, dtype=np.int32).ravel())
+        self._size = opaque(mi.Int32, *height.shape)
+        self._lenses = opaque(mi.Int32, *centers.shape[:2])
+        self._reach = opaque(mi.Int32, *reach)
+        self._gap, self._stop = opaque(mi.Float, gap, stop)
+
+    @syntax
+    def mean_light(self, pixel: UInt32) -> Array:
+        """The mean of some pixels, by their numbers in the picture."""
+        rows, columns = self._size
+        lens_rows, lens_columns = self._lenses
+        reach_i, reach_j = self._reach
+        row, column = divide(mi.Int32(pixel), columns)
+        own = dr.gather(mi.Int32, self._lens, pixel)
+        own_center = dr.gather(mi.Point2f, self._centers, own)
+        own_j, own_i = divide(own, lens_columns)
+        normal = dr.gather(mi.Vector3f, self._normal, pixel)
+        light = dr.gather(self._light_type, self._light, pixel)
+        z = dr.gather(mi.Float, self._height, pixel)
+        is_surface = (normal != 0).x | (normal != 0).y | (normal != 0).z
+        is_flat = dr.abs(z) < 1e-3 * self._gap  # seen by one lens alone
+        shift = dr.select(is_flat, 1, 1 + self._gap / z)
+        per_height = 1 / (dr.abs(z) * TUNING.of_height + self._gap * TUNING.of_gap)
+        per_light = self._stop / (1e-3 + dr.squared_norm(light))  # finite in the dark
+        # Lenses to either side that see the point, at most.
+        seen_by = dr.select(is_flat, 0, mi.Int32(dr.minimum(dr.abs(z) / self._gap + 2, 1e6)))
+        reach_i, reach_j = dr.minimum(reach_i, seen_by), dr.minimum(reach_j, seen_by)
+
+        total, color = mi.Float(0), self._light_type(0)
+        di, dj = -reach_i, -reach_j
+        active = is_surface & (dj <= reach_j)
+        # What does not change is no state: else Dr.Jit would record the loop a second time, without it.
+        while dr.hint(
+            active,
+            label="lenses about a point",
+            exclude=[
+                own_i,
+                own_j,
+                own_center,
+                lens_rows,
+                lens_columns,
+                rows,
+                columns,
+                row,
+                column,
+                reach_i,
+                reach_j,
+                shift,
+                z,
+                per_height,
+                per_light,
+                normal,
+                light,
+                is_surface,
+            ],
+        ):
+            i, j = own_i + di, own_j + dj
+            other = j * lens_columns + i
+            is_lens = (i >= 0) & (i < lens_columns) & (j >= 0) & (j < lens_rows)
+            center = dr.gather(mi.Point2f, self._centers, other, is_lens)
+            u = column + 0.5 + (center.x - own_center.x) * shift
+            v = row + 0.5 + (center.y - own_center.y) * shift
+            is_seen = is_lens & (u >= -1) & (u < columns + 1) & (v >= -1) & (v < rows + 1)
+            if dr.hint(is_seen, exclude=[other, u, v, rows, columns, z, per_height, per_light, normal, light]):
+                x, y = mi.Int32(dr.floor(u)), mi.Int32(dr.floor(v))
+                for step_y, step_x in product((-1, 0, 1), repeat=2):
+                    rx, ry = x + step_x, y + step_y
+                    there = ry * columns + rx
+                    inside = (rx >= 0) & (rx < columns) & (ry >= 0) & (ry < rows)
+                    inside &= dr.gather(mi.Int32, self._lens, there, inside) == other
+                    du, dv = rx + 0.5 - u, ry + 0.5 - v
+                    dz = (dr.gather(mi.Float, self._height, there, inside) - z) * per_height
+                    fade = du * du + dv * dv + dz * dz
+                    if dr.hint(inside & (fade < TUNING.faded), exclude=[there, per_light, normal, light]):
+                        fade += TUNING.faded * dr.squared_norm(dr.gather(mi.Vector3f, self._normal, there) - normal)
+                        here = dr.gather(self._light_type, self._light, there)
+                        fade += dr.squared_norm(here - light) * per_light
+                        near = dr.maximum(1 - fade / TUNING.faded, 0)
+                        near *= near
+                        near *= near
+                        weight = near * near
+                        total += weight
+                        color += weight * here
+            di += 1
+            is_end = di > reach_i
+            di = dr.select(is_end, -reach_i, di)
+            dj += dr.select(is_end, 1, 0)
+            active = is_surface & (dj <= reach_j)
+        return dr.select(is_surface, color / total, light)

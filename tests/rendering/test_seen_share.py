@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lippmann.rendering.film.seen_share import seen_share, warn_of_emptiness
 from lippmann.rendering.film.wavefront import RayTotals
+from lippmann.rendering.light_statements import seen_share, warn_of_emptiness
 
 GREY = (0.2, 0.2, 0.2)
 

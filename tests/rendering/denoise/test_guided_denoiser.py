@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lippmann.rendering.denoise import pixel_order as module
-from lippmann.rendering.denoise.pixel_order import EDGE, MARGIN, SurfacePart, denoise_seen
+from lippmann.rendering.denoise import guided_denoiser as module
+from lippmann.rendering.denoise.guided_denoiser import EDGE, MARGIN, SurfacePart, denoise_seen
 
 SHAPE = (200, 260)
 
