@@ -151,6 +151,25 @@ def test_a_draft_is_one_in_every_form(form):
 def test_a_draft_of_a_photograph_needs_no_network():
     found = resolve(RenderRequest(effort="draft"), unlit(fills_panel=True), load_display("seed-lenticular"))
     assert (found.method, found.denoise, found.spp) == ("full", "none", 1)
+    one_ray = "one ray through each pixel's middle shows it"
+    assert found.plan.samples.reason == f"a draft takes as many samples as the default: {one_ray}"
+
+
+@pytest.mark.parametrize(
+    ("values", "reason"),
+    [
+        ({}, "a draft"),
+        ({"integrator": "direct", "denoise": "none"}, "a draft"),
+        ({"integrator": "classic"}, "a draft takes as many samples as the default: as the scene's file says"),
+        ({"integrator": "normal"}, "a draft"),
+    ],
+)
+def test_a_draft_that_is_the_same_picture_as_the_default_says_so(values, reason):
+    display = load_display("seed-lenticular")
+    draft, usual = (resolve(RenderRequest(effort=effort, **values), SCENE, display) for effort in ("draft", "normal"))
+    assert draft.plan.samples.reason == reason
+    is_same = all(getattr(draft, name) == getattr(usual, name) for name in ("spp", "method", "denoise", "pixel_filter"))
+    assert is_same == (reason != "a draft")
 
 
 def test_tones_are_mapped_unless_a_colour_of_the_background_was_asked_for():

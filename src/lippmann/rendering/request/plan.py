@@ -325,8 +325,7 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
     of_budget = 1 << max(round(math.log2(BUDGET.values / (values or BUDGET.values))), 0)
     pooled = f"about a million for the picture, but {fewest} to {BUDGET.most} of each pixel"
     is_final = request.effort == "final"
-    return _first(
-        (facts.is_draft, 1, "a draft"),
+    usual = _first(
         (request.spp is not None, request.spp, ASKED),
         (request.is_open_ended, None, "as many as the goal takes"),
         (facts.is_one_ray, 1, "one ray through each pixel's middle shows it"),
@@ -336,6 +335,9 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
         (method != "pooled" or values is None, DEFAULT_SPP, "the usual number where light is not pooled"),
         (True, min(max(of_budget, fewest), BUDGET.most), pooled),
     )
+    is_same = usual.value == 1 and not facts.is_denoised_draft
+    of_draft = f"a draft takes as many samples as the default: {usual.reason}" if is_same else "a draft"
+    return _first((facts.is_draft, 1, of_draft), (True, usual.value, usual.reason))
 
 
 def _quality(facts: _Facts, method: Method) -> Choice[float | None]:
