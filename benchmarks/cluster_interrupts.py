@@ -38,7 +38,7 @@ PICTURE = "x.tif"
 #: What a terminal shows of the keys and moves the cursor with; and the lines of a progress bar.
 _CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|(\^C)+")
 _BAR = re.compile(r"\d %|[━╸╺]")
-WORDS = ("render", "primitives", "--cluster", "local:2", "--integrator", "direct", "--spp", "4", "-o")
+WORDS = ("render", "primitives", "--cluster", "local:2", "--integrator", "direct", "--spp", "128", "-o")
 
 
 def main(count: int, longest: float) -> None:
