@@ -7,6 +7,8 @@ Requests and answers are bytes, each after its length.
 from __future__ import annotations
 
 import atexit
+import io
+import json
 import os
 import select
 import struct
@@ -14,11 +16,18 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from lippmann.errors import LippmannError
 from lippmann.runtime.child_python import python_command
-from lippmann.runtime.machine import check_input
+from lippmann.runtime.machine import check_input, input_memory_left
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 _LENGTH = struct.Struct("<Q")
 #: Seconds without a request after which the process ends, and its memory is free.
@@ -77,6 +86,15 @@ class HelperProcess:
             except BaseException:  # an answer that is half read would be taken for the next one
                 self._end()
                 raise
+
+    def ask_arrays(self, path: Path, **request: object) -> dict[str, NDArray[np.generic]]:
+        """What a process of :func:`serve_arrays` finds in a file, by name; errors as of :meth:`ask`."""
+        import numpy as np
+
+        message = {"path": str(path.resolve()), "memory": input_memory_left(), **request}
+        answer = self.ask(json.dumps(message).encode(), where=path.name)
+        with np.load(io.BytesIO(answer), allow_pickle=False) as found:
+            return dict(found)
 
     def _answer(self, process: subprocess.Popen[bytes], request: bytes, where: str) -> bytes | None:
         """The answer; None from a process that ended."""
@@ -147,6 +165,45 @@ def serve(answer: Callable[[bytes], bytes]) -> None:
         answers.write(_LENGTH.pack(len(data)))
         answers.write(data)
         answers.flush()
+
+
+class RefusedFileError(Exception):
+    """A file that a reader of :func:`serve_arrays` does not take: the name of the text that it answers with, and it."""
+
+
+def serve_arrays(read: Callable[[dict[str, Any]], Mapping[str, NDArray[np.generic]]]) -> None:
+    """Answer requests of :meth:`HelperProcess.ask_arrays` by the arrays that ``read`` makes of them.
+
+    What it raises becomes a text, ``error``; but of a :class:`RefusedFileError` that of its name.
+    """
+    import numpy as np
+
+    def answer(data: bytes) -> bytes:
+        request = json.loads(data)
+        limit_memory(request["memory"])
+        try:
+            found = dict(read(request))
+        except RefusedFileError as error:
+            name, text = error.args
+            found = {name: np.array(text)}
+        except Exception as error:  # noqa: BLE001  # libraries raise errors of many kinds
+            found = {"error": np.array(_words(error, request["path"]))}
+        written = io.BytesIO()
+        np.savez(written, **found)  # type: ignore[arg-type]  # names are free
+        return written.getvalue()
+
+    serve(answer)
+
+
+def _words(error: Exception, path: str) -> str:
+    """What an error says in one line, without the folder of the file."""
+    if isinstance(error, MemoryError):
+        return "it takes more memory than is left"
+    try:
+        said = " ".join((error.what if isinstance(error, LippmannError) else str(error)).split())
+    except UnicodeDecodeError:  # it quotes the file
+        return "it holds text that is not UTF-8"
+    return said.replace(os.path.join(os.path.dirname(path), ""), "")[:300] or type(error).__name__
 
 
 def limit_memory(most: int) -> None:

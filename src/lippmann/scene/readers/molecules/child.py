@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import io
 import itertools
-import json
-import os
+from typing import Any
 
 import gemmi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.runtime.helper_process import limit_memory, serve
+from lippmann.runtime.helper_process import serve_arrays
 
 #: Atoms of a molecule.
 MOST_ATOMS = 1 << 20
@@ -20,36 +18,14 @@ _PLACE_TAGS = ("_atom_site.Cartn_x", "_atom_site_fract_x", "_atom_site_Cartn_x")
 
 
 def main() -> None:
-    """Answer requests, JSON with ``path`` and ``memory``: ``.npz`` of positions, elements and notes, or an error."""
-    serve(_answer)
+    """Answer requests by positions, elements and notes."""
+    serve_arrays(_read)
 
 
-def _answer(data: bytes) -> bytes:
-    request = json.loads(data)
-    limit_memory(request["memory"])
-    try:
-        notes: list[str] = []
-        elements, positions = _atoms(request["path"], notes)
-        found: dict[str, NDArray[np.generic]] = {
-            "elements": elements,
-            "positions": positions,
-            "notes": np.array(notes, np.str_),
-        }
-    except Exception as error:  # noqa: BLE001  # it raises errors of many kinds
-        found = {"error": np.array(_words(error, request["path"]))}
-    written = io.BytesIO()
-    np.savez(written, **found)  # type: ignore[arg-type]  # names are free
-    return written.getvalue()
-
-
-def _words(error: Exception, path: str) -> str:
-    if isinstance(error, MemoryError):
-        return "it takes more memory than is left"
-    try:
-        said = " ".join(str(error).split())
-    except UnicodeDecodeError:  # it quotes the file
-        return "it holds text that is not UTF-8"
-    return said.replace(os.path.join(os.path.dirname(path), ""), "")[:300] or type(error).__name__
+def _read(request: dict[str, Any]) -> dict[str, NDArray[np.generic]]:
+    notes: list[str] = []
+    elements, positions = _atoms(request["path"], notes)
+    return {"elements": elements, "positions": positions, "notes": np.array(notes, np.str_)}
 
 
 def _atoms(path: str, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

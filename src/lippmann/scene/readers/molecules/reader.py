@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import io
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +13,7 @@ from scipy.spatial import cKDTree
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
-from lippmann.runtime.machine import check_input, input_memory_left
+from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.values.description import Instance, Material, Matrix, Mesh, SceneDescription
 
@@ -76,15 +74,14 @@ def read_molecule(path: Path) -> SceneDescription:
     if importlib.util.find_spec("gemmi") is None:
         fix = "install it: pip install 'lippmann[molecules]'"
         raise SceneError("molecules need the library gemmi", where=path.name, fix=fix)
-    request = json.dumps({"path": str(path.resolve()), "memory": input_memory_left()}).encode()
     try:
-        answer = _process.ask(request, where=path.name)
+        found = _process.ask_arrays(path)
     except HelperEndedError as error:
         raise SceneError(f"gemmi breaks down at the file ({error})", where=path.name, fix="is it whole?") from None
-    with np.load(io.BytesIO(answer), allow_pickle=False) as found:
-        if "error" in found:
-            raise SceneError(f"is no molecule that is understood ({found['error']})", where=path.name)
-        elements, positions, notes = found["elements"], found["positions"], found["notes"].tolist()
+    if "error" in found:
+        raise SceneError(f"is no molecule that is understood ({found['error']})", where=path.name)
+    elements, positions = found["elements"].astype(np.int64), found["positions"].astype(np.float64)
+    notes = found["notes"].tolist()
     fit = np.isfinite(positions).all(axis=1) & (np.abs(positions) < 1e6).all(axis=1)
     elements, positions = elements[fit], positions[fit]
     if not 0 < len(elements) <= _MOST_ATOMS:

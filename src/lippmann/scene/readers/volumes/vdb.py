@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import io
-import json
 from pathlib import Path
 
 import numpy as np
 
 from lippmann.errors import SceneError, UsageError
 from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
-from lippmann.runtime.machine import check_input, input_memory_left
+from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.volumes.vdb_module import find_module
 from lippmann.scene.values.description import SceneDescription
@@ -53,20 +51,18 @@ def read_vdb(path: Path, *, series: str | None = None) -> SceneDescription:
             rule="Blender's wheel (pip install bpy), conda-forge's openvdb and Debian's python3-openvdb have it",
             fix="install one, or save an array by its copyToArray as .npy",
         )
-    request = json.dumps({"path": str(path.resolve()), "series": series, "memory": input_memory_left()}).encode()
     try:
-        answer = _process.ask(request, where=where)
+        found = _process.ask_arrays(path, series=series)
     except HelperEndedError as error:
         fix = "is it whole, and was the module built for this NumPy?"
         raise SceneError(f"OpenVDB breaks down at the file ({error})", where=where, fix=fix) from None
-    with np.load(io.BytesIO(answer), allow_pickle=False) as found:
-        if "usage" in found:
-            raise UsageError(f"'{series}'", where=where, parameter="series", rule=str(found["usage"]))
-        if "refused" in found:
-            raise SceneError(str(found["refused"]), where=where)
-        if "error" in found:
-            raise SceneError(f"cannot be read ({found['error']})", where=where, rule="an OpenVDB file")
-        grid, matrix, notes = found["grid"], found["matrix"], found["notes"].tolist()
+    if "usage" in found:
+        raise UsageError(f"'{series}'", where=where, parameter="series", rule=str(found["usage"]))
+    if "refused" in found:
+        raise SceneError(str(found["refused"]), where=where)
+    if "error" in found:
+        raise SceneError(f"cannot be read ({found['error']})", where=where, rule="an OpenVDB file")
+    grid, matrix, notes = found["grid"], found["matrix"].astype(np.float64), found["notes"].tolist()
     check_input(2 * grid.nbytes, "the grid", where=where)
     if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) == 0.0:
         raise SceneError("its voxels have no extent", where=where)

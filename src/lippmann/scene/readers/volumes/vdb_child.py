@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import importlib.util
-import io
-import json
-import os
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.runtime.helper_process import limit_memory, serve
+from lippmann.runtime.helper_process import RefusedFileError, serve_arrays
 from lippmann.scene.readers.volumes.vdb_module import find_module
 
 #: Kinds of grids that hold one number a voxel.
@@ -22,32 +19,9 @@ _LEVEL_SET = "level set"
 _BYTES_PER_VOXEL = 4
 
 
-class RefusedError(Exception):
-    """The file is sound, and is not shown."""
-
-
 def main() -> None:
-    """Answer requests, JSON with ``path``, ``series`` and ``memory``, by ``.npz``: a grid, or an ``error``."""
-    serve(_answer)
-
-
-def _answer(data: bytes) -> bytes:
-    request = json.loads(data)
-    limit_memory(request["memory"])
-    try:
-        found = _read(request["path"], request["series"], request["memory"])
-    except MemoryError:
-        found = {"error": np.array("it takes more memory than is left")}
-    except KeyError as error:
-        found = {"usage": np.array(f"the file has {error.args[0]}")}
-    except RefusedError as error:
-        found = {"refused": np.array(str(error))}
-    except Exception as error:  # noqa: BLE001  # it raises errors of many kinds
-        said = " ".join(str(error).split()).replace(os.path.join(os.path.dirname(request["path"]), ""), "")
-        found = {"error": np.array(said[:200] or type(error).__name__)}
-    written = io.BytesIO()
-    np.savez(written, **found)  # type: ignore[arg-type]  # names are free
-    return written.getvalue()
+    """Answer requests, with a ``series``, by a grid; ``refused`` says why it is not shown, ``usage`` what there is."""
+    serve_arrays(lambda request: _read(request["path"], request["series"], request["memory"]))
 
 
 def _load() -> Any:
@@ -65,16 +39,19 @@ def _read(path: str, series: str | None, memory: int) -> dict[str, NDArray[np.ge
     names = [str(each.name) for each in told]
     scalar = [number for number, each in enumerate(told) if str(each.valueTypeName) in _SCALAR]
     if series is not None and series not in (names[number] for number in scalar):
-        raise KeyError(", ".join(names[number] for number in scalar[:20]) or "no grid of one number a voxel")
+        known = ", ".join(names[number] for number in scalar[:20]) or "no grid of one number a voxel"
+        raise RefusedFileError("usage", f"the file has {known}")
     if not scalar:
-        raise RefusedError(f"its grids ({', '.join(names[:20]) or 'none'}) hold no single numbers")
+        raise RefusedFileError("refused", f"its grids ({', '.join(names[:20]) or 'none'}) hold no single numbers")
     wanted = series if series is not None else _USUAL
     name = names[next((number for number in scalar if names[number] == wanted), scalar[0])]
     grid = openvdb.read(path, name)
     if str(grid.gridClass) == _LEVEL_SET:
-        raise RefusedError(f"the grid '{name}' is a level set, a surface: make it a mesh or a fog volume")
+        raise RefusedFileError(
+            "refused", f"the grid '{name}' is a level set, a surface: make it a mesh or a fog volume"
+        )
     if grid.activeVoxelCount() == 0:
-        raise RefusedError(f"the grid '{name}' is empty")
+        raise RefusedFileError("refused", f"the grid '{name}' is empty")
     low, high = (np.array(corner, np.int64) for corner in grid.evalActiveVoxelBoundingBox())
     shape = high - low + 1
     if _BYTES_PER_VOXEL * int(np.prod(shape, dtype=object)) > memory:
@@ -92,7 +69,7 @@ def _read(path: str, series: str | None, memory: int) -> dict[str, NDArray[np.ge
 def _matrix(transform: Any, low: NDArray[np.int64]) -> NDArray[np.float64]:
     """From numbers of voxels, the first at ``low``, to the world."""
     if not transform.isLinear:
-        raise RefusedError("its voxels lie in a frustum: resample it to a box")
+        raise RefusedFileError("refused", "its voxels lie in a frustum: resample it to a box")
     origin, *ends = (
         np.array(transform.indexToWorld(tuple((low + step).tolist())), np.float64)
         for step in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +9,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import SceneError, UsageError
 from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
-from lippmann.runtime.machine import check_input, input_memory_left
+from lippmann.runtime.machine import check_input
 from lippmann.runtime.optional_import import check_installed
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.vtk.data_set import Surface, describe_surface
@@ -43,21 +41,18 @@ def read_vtk(path: Path, *, series: str | None = None) -> SceneDescription:
     where = path.name
     read_bytes(path, 64)
     check_installed("pyvista", "vtk", "VTK's files need it", where)
-    request = json.dumps({"path": str(path.resolve()), "series": series, "memory": input_memory_left()}).encode()
     try:
-        answer = _process.ask(request, where=where)
+        arrays = _process.ask_arrays(path, series=series)
     except HelperEndedError as error:
         raise SceneError(f"VTK breaks down at the file ({error})", where=where, fix="is it whole?") from None
-    with np.load(io.BytesIO(answer), allow_pickle=False) as found:
-        if "usage" in found:
-            raise UsageError(f"'{series}'", where=where, parameter="series", rule=f"the file has {found['usage']}")
-        if "error" in found:
-            raise SceneError(f"is no data set that is understood ({found['error']})", where=where)
-        arrays = {name: found[name] for name in found.files}
+    if "usage" in arrays:
+        raise UsageError(f"'{series}'", where=where, parameter="series", rule=f"the file has {arrays['usage']}")
+    if "error" in arrays:
+        raise SceneError(f"is no data set that is understood ({arrays['error']})", where=where)
     check_input(2 * sum(array.nbytes for array in arrays.values()), "the data set", where=where)
     notes = arrays["notes"].tolist()
     if "grid" in arrays:
-        return describe_volume(path.stem, arrays["grid"], arrays["matrix"], notes=notes)
+        return describe_volume(path.stem, arrays["grid"], arrays["matrix"].astype(np.float64), notes=notes)
     return _surface(path.stem, arrays, notes, where)
 
 
