@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import shutil
 import subprocess
@@ -61,3 +62,37 @@ def test_installed_plugins_render_their_own_files(engine, tmp_path):
         assert (strip.size[1], film.n_frames) == (768, 3)
     for name in ("off", "acme", "strip", "gif", "sky-seen"):
         assert f'"name": "{name}"' in done.stdout
+
+
+#: What makes each picture of the gallery small, and so its test quick.
+SMALLER = {
+    "anaglyph": {"spp": 1},
+    "focal_stack": {"spp": 1},
+    "molecule": {"spp": 1},
+    "photograph": {"width": 320},
+    "print_seen": {"size": "30x20mm"},
+    "three_eyes": {"spp": 1},
+    "volume": {"side": 24},
+    "woven_quilt": {"width": 240},
+}
+
+
+def test_the_gallery_shows_each_script_that_makes_a_picture():
+    page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    for name in SMALLER:
+        assert f"`{name}.py`" in page
+        assert 15 <= len((EXAMPLES / f"{name}.py").read_text(encoding="utf-8").splitlines()) <= 45
+        assert (ROOT / "docs" / "images" / "gallery" / f"{name}.jpg").stat().st_size < 60_000
+
+
+@pytest.mark.long_cases(but=["print_seen"])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SMALLER)
+def test_a_script_of_the_gallery_makes_its_picture(name, engine, tmp_path):
+    spec = importlib.util.spec_from_file_location(f"example_{name}", EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    module.main(tmp_path / "a.png", **SMALLER[name])
+    with Image.open(tmp_path / "a.png") as picture:
+        assert min(picture.size) >= 200
+        assert picture.convert("L").entropy() > 1  # more than a flat colour
