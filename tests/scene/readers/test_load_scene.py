@@ -61,9 +61,7 @@ def test_up_is_taken_as_it_mostly_is_or_as_it_is_said(save, name, usual):
 
 
 def test_up_of_what_says_it_itself_is_refused():
-    with pytest.raises(
-        UsageError, match=r"up: teapot says itself which way is up; y, z or -y, for \.npy, \.npz, \.obj, \.ply,"
-    ):
+    with pytest.raises(UsageError, match=r"up: teapot says itself which way is up; y, z or -y, for \.obj, \.ply,"):
         load_scene("teapot", up="z")
 
 

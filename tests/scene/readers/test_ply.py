@@ -217,7 +217,7 @@ def test_a_cloud_of_points_is_drawn_as_balls(read, colored):
     diagonal = 5**0.5
     for ball, vertex in zip(balls, VERTICES, strict=True):
         assert np.linalg.norm(ball - vertex, axis=1) == pytest.approx(np.full(len(ball), 0.01 * diagonal), rel=1e-4)
-    assert scene.notes[1] == "points are drawn as balls of a radius of 1.00% of the scene's diagonal"
+    assert scene.notes[0] == "points are drawn as balls of a radius of 1.00% of the scene's diagonal"
     assert scene.materials[0].unlit == colored
     assert (mesh.colors is not None) == colored
 
@@ -225,7 +225,7 @@ def test_a_cloud_of_points_is_drawn_as_balls(read, colored):
 def test_of_too_many_points_some_are_drawn(read, monkeypatch):
     monkeypatch.setattr("lippmann.scene.point_clouds.MOST", 2)
     scene = read((header("ascii", faces=0) + "".join(f"{x} {y} {z}\n" for x, y, z in VERTICES)).encode())
-    assert scene.notes[1] == "of 5 points one in 3 is drawn"
+    assert scene.notes[0] == "of 5 points one in 3 is drawn"
     balls = np.split(scene.meshes[0].positions, 2)
     middles = np.array([ball.mean(axis=0) for ball in balls])
     assert middles == pytest.approx(np.array([VERTICES[0], VERTICES[3]], float), abs=1e-6)
