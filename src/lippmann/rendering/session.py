@@ -107,9 +107,7 @@ class Session:
     depths: dict[bytes, VisibleDepth | None] = field(default_factory=dict)
 
     def place(self, display: Display) -> Placement:
-        """Where ``display`` stands in the scene; light that follows the viewer is turned toward it.
-
-        What the panel's edge cuts in front of the lens plane is said.
+        """Where ``display`` stands in the scene, and what its edge cuts; light that follows the viewer is turned to it.
 
         Raises
         ------

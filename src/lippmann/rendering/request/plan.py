@@ -336,7 +336,7 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
         (True, min(max(of_budget, fewest), BUDGET.most), pooled),
     )
     is_same = usual.value == 1 and not facts.is_denoised_draft
-    of_draft = f"a draft takes as many samples as the default: {usual.reason}" if is_same else "a draft"
+    of_draft = "a draft" + is_same * f" takes as many samples as the default: {usual.reason}"
     return _first((facts.is_draft, 1, of_draft), (True, usual.value, usual.reason))
 
 
