@@ -10,7 +10,7 @@ import pytest
 
 import lippmann.quilts.weave as weave_module
 from lippmann.display import NUMPY, Display, LensArray, Panel, load_display
-from lippmann.errors import PictureError, UsageError
+from lippmann.errors import DisplayError, PictureError, UsageError
 from lippmann.quilts.quilt import Quilt, QuiltLayout
 from lippmann.quilts.weave import weave, weave_to_file
 from lippmann.viewing.replay import replay
@@ -196,3 +196,20 @@ def test_a_file_woven_in_bands_holds_the_same(calibrated, tmp_path, monkeypatch)
     assert (written.provenance, written.display) == (whole.provenance, whole.display)
     with pytest.raises(UsageError, match="unknown choice of views 'best'"):
         weave_to_file(quilt, display, tmp_path / "b.tif", choice="best")
+
+
+def test_views_are_woven_for_the_lens_that_is_there():
+    sheet = load_display("print:lpi=60,ppi=720,size=20x4mm,thickness=26mil,radius=0.2877mm")
+    rng = np.random.default_rng(3)
+    pixels = np.repeat(rng.random((16, 1, 24)), 4, axis=1)[..., None].repeat(3, axis=3).astype(np.float32)
+    quilt = Quilt(np.concatenate([np.concatenate(pixels[k : k + 8], axis=1) for k in (8, 0)]), QuiltLayout(8, 2, 5.0))
+    plain, corrected = (weave(quilt, sheet, correct=correct) for correct in ("none", "lens"))
+    assert plain.provenance.notes == ()
+    assert "correct" not in plain.provenance.options
+    options = corrected.provenance.options
+    assert options["correct"] == "lens"
+    assert options["correction_gain_exact"] > 0.3
+    assert "dB to an eye" in corrected.provenance.notes[0]
+    assert 0.005 < np.abs(plain.pixels - corrected.pixels).mean() < 0.1
+    with pytest.raises(DisplayError, match="gives no lens"):
+        weave(solid([0, 1], 2, 1), SHEETS[0], correct="lens")

@@ -9,6 +9,7 @@ Method = Literal["auto", "full", "lens-view", "interpolated", "pooled"]
 Order = Literal["default", "paper"]
 Integrator = Literal["auto", "classic", "path", "direct", "normal", "depth", "position", "albedo"]
 PixelFilter = Literal["auto", "box", "point"]
+Correction = Literal["none", "lens"]
 #: How much a picture may take: ``draft`` is one sample and the fast network, ``final`` a quality for a print.
 Effort = Literal["draft", "normal", "final"]
 Device = Literal["auto", "cpu", "gpu"]

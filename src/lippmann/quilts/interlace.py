@@ -25,9 +25,10 @@ from lippmann.errors import OutputError, PictureError, UsageError
 from lippmann.image.encoding import FORMATS, TEXT_KEY, converted_values, mirrored_in_file, profile_in_file
 from lippmann.image.metadata import Metadata, to_text
 from lippmann.image.stored_values import FloatArray
+from lippmann.options.choices import Correction
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.photos import Photos
-from lippmann.quilts.weave import ViewChoice, check_weave, weave_provenance, weave_window
+from lippmann.quilts.weave import ViewChoice, Weaving, check_weave, weave_provenance, weave_window
 from lippmann.runtime.atomic_write import check_writable, replacing
 
 Lenses = Literal["along", "across"]
@@ -58,10 +59,11 @@ def write_interlaced(
     *,
     lenses: Lenses = "along",
     choice: ViewChoice = "linear",
+    correct: Correction = "none",
     scene: str = "",
     finish: Finish = NO_FINISH,
     progress: ProgressCallback = silent,
-) -> tuple[int, int]:
+) -> tuple[tuple[int, int], tuple[str, ...]]:
     """Weave photographs for a display and write the picture with its resolution and ICC profile.
 
     A TIFF is made some rows at a time, so that it may be larger than memory; a PNG is held in memory.
@@ -79,6 +81,8 @@ def write_interlaced(
         ``along``: lens axes upright; ``across``: lying.
     choice:
         ``nearest``: one view per sub-pixel; ``linear``: a mixture of two.
+    correct:
+        As for :func:`~lippmann.quilts.weave.weave`, with lenses along.
     scene:
         Name for the provenance.
     finish:
@@ -88,7 +92,7 @@ def write_interlaced(
 
     Returns
     -------
-    Width and height in pixels.
+    Width and height in pixels, and what is to be said of the picture.
 
     Raises
     ------
@@ -106,19 +110,23 @@ def write_interlaced(
         raise PictureError(f"the lenses of {display.name} are slanted", rule="lenses across are those of a print")
     if across and finish.margin is not None:
         raise UsageError("marks are for upright lenses", parameter="marks", fix='use lenses="along"')
+    if across and correct != "none":
+        raise UsageError("is for upright lenses", parameter="correct", fix='use lenses="along"')
     whole = replace(display, sheet=None)  # no part of which is cut off: the photographs cover it
+    weaving = Weaving(photos.quilt, whole, choice, correct)
+    options, notes = weaving.told()
     finished = replace(finish, profile=Profile(name_of(photos.icc), photos.icc) if photos.icc else None).display(
         display
     )
     panel = finished.panel
     size = (panel.height, panel.width) if across else (panel.width, panel.height)
-    metadata = Metadata(finished, np.eye(4), weave_provenance(photos.quilt, choice, scene))
+    metadata = Metadata(finished, np.eye(4), weave_provenance(photos.quilt, choice, scene, options, notes))
     text = "" if across else to_text(metadata)  # a display with lying lenses cannot be described
 
     def woven(first: int, last: int) -> FloatArray:
         if across:
             return np.rot90(weave_window(photos.quilt, whole, choice, (0, panel.height), (first, last)), -1)
-        return weave_window(photos.quilt, whole, choice, (first, last))
+        return weaving.rows(first, last)
 
     printed = replace(finish, profile=None).rows(woven, display)
 
@@ -147,4 +155,4 @@ def write_interlaced(
             texts = {TEXT_KEY: text} if text else {}
             encoded = encode_png(codes, text=texts, pixel_pitch=panel.pixel_pitch, icc=icc)
             temporary.write_bytes(encoded)
-    return size
+    return size, notes

@@ -9,6 +9,8 @@ shows the trim; the bleed repeats the views' edges.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple, get_args
 
@@ -24,8 +26,11 @@ from lippmann.image import IntegralImage, Provenance
 from lippmann.image.metadata import Metadata
 from lippmann.image.stored_values import FloatArray
 from lippmann.image.write import write_rows
+from lippmann.optics.correction import LensCorrection, parts_beside
+from lippmann.options.choices import Correction
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import Quilt
+from lippmann.runtime.engine_lock import cached_property
 
 Real = NDArray[np.float64]
 ViewChoice = Literal["nearest", "linear"]
@@ -42,6 +47,7 @@ def weave(
     display: Display,
     *,
     choice: ViewChoice = "linear",
+    correct: Correction = "none",
     scene: str = "",
     progress: ProgressCallback = silent,
 ) -> IntegralImage:
@@ -56,6 +62,8 @@ def weave(
     choice:
         ``nearest`` takes the view nearest to a sub-pixel's direction; ``linear`` interpolates between the two nearest
         views. Within a view, colours are interpolated between pixels in either case.
+    correct:
+        ``lens``: the pixels whose light through the display's real lenses comes nearest to the views.
     scene:
         Name of the scene, for the provenance.
     progress:
@@ -69,14 +77,16 @@ def weave(
         If the display is not lenticular, or the quilt has another aspect ratio than its panel.
     """
     check_weave(quilt, display, choice)
+    weaving = Weaving(quilt, display, choice, correct)
+    options, notes = weaving.told()
     width, height = display.panel.width, display.panel.height
     pixels = np.empty((height, width, 3), dtype=np.float32)
     step = _rows_at_a_time(quilt, display)
     for first in range(0, height, step):
         last = min(first + step, height)
-        pixels[first:last] = weave_window(quilt, display, choice, (first, last))
+        pixels[first:last] = weaving.rows(first, last)
         progress(Progress("weave", last, height))
-    return IntegralImage(pixels, display, provenance=weave_provenance(quilt, choice, scene))
+    return IntegralImage(pixels, display, provenance=weave_provenance(quilt, choice, scene, options, notes))
 
 
 def weave_to_file(
@@ -85,11 +95,12 @@ def weave_to_file(
     path: Path,
     *,
     choice: ViewChoice = "linear",
+    correct: Correction = "none",
     scene: str = "",
     bits: int | None = None,
     finish: Finish = NO_FINISH,
     progress: ProgressCallback = silent,
-) -> None:
+) -> tuple[str, ...]:
     """Write the native picture that shows the views of a quilt, in memory that does not grow with the panel.
 
     Parameters
@@ -103,6 +114,8 @@ def weave_to_file(
     choice:
         ``nearest`` takes the view nearest to a sub-pixel's direction; ``linear`` interpolates between the two nearest
         views.
+    correct:
+        As for :func:`weave`.
     scene:
         Name of the scene, for the provenance.
     bits:
@@ -111,6 +124,10 @@ def weave_to_file(
         What is done to the picture for its print.
     progress:
         Called after every block of rows.
+
+    Returns
+    -------
+    What is to be said of the picture, in lines.
 
     Raises
     ------
@@ -122,24 +139,80 @@ def weave_to_file(
         If the format is not TIFF or Zarr or has no such bits, or the file cannot be written.
     """
     check_weave(quilt, display, choice)
+    weaving = Weaving(quilt, display, choice, correct)
+    options, notes = weaving.told()
     step = _rows_at_a_time(quilt, display)
 
     def rows(first: int, last: int) -> FloatArray:
         band = np.empty((last - first, display.panel.width, 3), dtype=np.float32)
         for start in range(first, last, step):
             stop = min(start + step, last)
-            band[start - first : stop - first] = weave_window(quilt, display, choice, (start, stop))
+            band[start - first : stop - first] = weaving.rows(start, stop)
             progress(Progress("weave", stop, display.panel.height))
         return band
 
-    metadata = Metadata(finish.display(display), np.eye(4), weave_provenance(quilt, choice, scene))
+    metadata = Metadata(finish.display(display), np.eye(4), weave_provenance(quilt, choice, scene, options, notes))
     write_rows(finish.rows(rows, display), metadata, path, bits=bits, icc=finish.icc)
+    return notes
 
 
-def weave_provenance(quilt: Quilt, choice: ViewChoice, scene: str) -> Provenance:
+@dataclass(frozen=True)
+class Weaving:
+    """How a picture is woven: rows of it, corrected for the display's lenses or not.
+
+    Parameters are those of :func:`weave`.
+    """
+
+    quilt: Quilt
+    display: Display
+    choice: ViewChoice
+    correct: Correction = "none"
+
+    def rows(self, first: int, last: int) -> FloatArray:
+        """Rows ``first`` to before ``last``, ``(rows, width, 3)`` float32 linear RGB."""
+        if self._correction is None:
+            return weave_window(self.quilt, self.display, self.choice, (first, last))
+        return self._correction.rows(self._parts(first, last))
+
+    def told(self) -> tuple[dict[str, object], tuple[str, ...]]:
+        """What a file says of the correction, and lines for people: of the rows about the middle."""
+        if self._correction is None:
+            return {}, ()
+        middle = self.display.panel.height // 2
+        parts = self._parts(max(0, middle - 32), min(self.display.panel.height, middle + 32))
+        options, note = self._correction.told(self._correction.rows(parts), parts)
+        return options, (note,)
+
+    def _parts(self, first: int, last: int) -> list[FloatArray]:
+        return [
+            weave_window(self.quilt, self.display, self.choice, (first, last), None, beside)
+            for beside in parts_beside(subpixels=self._has_subpixels)
+        ]
+
+    @property
+    def _has_subpixels(self) -> bool:
+        return len(set(self.display.panel.subpixel_offsets)) > 1
+
+    @cached_property
+    def _correction(self) -> LensCorrection | None:
+        return None if self.correct == "none" else LensCorrection(self.display, self._has_subpixels)
+
+
+def weave_provenance(
+    quilt: Quilt,
+    choice: ViewChoice,
+    scene: str,
+    correction: Mapping[str, object] | None = None,
+    notes: tuple[str, ...] = (),
+) -> Provenance:
     """Provenance of a woven picture."""
-    options = {"views": quilt.layout.views, "view_choice": choice, "direction": "even in the tangent"}
-    return Provenance(method="weave", subpixels=True, scene=scene, version=VERSION, options=options)
+    options = {
+        "views": quilt.layout.views,
+        "view_choice": choice,
+        "direction": "even in the tangent",
+        **(correction or {}),
+    }
+    return Provenance(method="weave", subpixels=True, scene=scene, version=VERSION, options=options, notes=notes)
 
 
 def _rows_at_a_time(quilt: Quilt, display: Display) -> int:
@@ -148,7 +221,12 @@ def _rows_at_a_time(quilt: Quilt, display: Display) -> int:
 
 
 def weave_window(
-    quilt: Quilt, display: Display, choice: ViewChoice, rows: tuple[int, int], columns: tuple[int, int] | None = None
+    quilt: Quilt,
+    display: Display,
+    choice: ViewChoice,
+    rows: tuple[int, int],
+    columns: tuple[int, int] | None = None,
+    beside: float = 0.0,
 ) -> FloatArray:
     """A window of the woven picture.
 
@@ -158,6 +236,8 @@ def weave_window(
         As for :func:`weave`, by which they are checked.
     rows, columns:
         First and past-the-last row and column of the window, within the panel. None: all columns.
+    beside:
+        Pixels to the right of each (sub-)pixel's middle at which the views are sampled.
 
     Returns
     -------
@@ -168,7 +248,7 @@ def weave_window(
     columns = columns or (0, display.panel.width)
     shape = rows[1] - rows[0], columns[1] - columns[0]
     result = np.empty((*shape, 3), dtype=np.float32)
-    channels = _samples_of_window(quilt, display, choice, rows, columns)
+    channels = _samples_of_window(quilt, display, choice, rows, columns, beside)
     # Only this part of the views is sampled.
     top, left = (min(int(samples[axis].min()) for samples in channels) for axis in (3, 2))
     bottom, right = (max(int(samples[axis].max()) for samples in channels) + 2 for axis in (3, 2))
@@ -201,11 +281,16 @@ class _Samples(NamedTuple):
 
 
 def _samples_of_window(
-    quilt: Quilt, display: Display, choice: ViewChoice, rows: tuple[int, int], columns: tuple[int, int]
+    quilt: Quilt,
+    display: Display,
+    choice: ViewChoice,
+    rows: tuple[int, int],
+    columns: tuple[int, int],
+    beside: float = 0.0,
 ) -> list[_Samples]:
     """Samples of the sub-pixels of a window, by channel."""
     panel = display.panel
-    u: Real = np.arange(*columns, dtype=np.float64)[None] + 0.5
+    u: Real = np.arange(*columns, dtype=np.float64)[None] + (0.5 + beside)
     v: Real = np.arange(*rows, dtype=np.float64)[:, None] + 0.5
     channels: list[_Samples] = []
     for channel in range(3):

@@ -69,6 +69,7 @@ def interlace(
             show_default=False,
         ),
     ] = None,
+    correct: options.Correct = "none",
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     *,
@@ -101,16 +102,19 @@ def interlace(
         for note in (*read.notes, *fit_note(read.cropped[::-1] if across else read.cropped, fit)):
             console.remark(note)
         choice = views or ("nearest" if across else "linear")
-        pixels = write_interlaced(
+        pixels, notes = write_interlaced(
             read,
             target,
             output,
             lenses=lenses,
             choice=choice,
+            correct=correct,
             scene=paths[0].stem,
             finish=finish,
             progress=progress,
         )
+    for note in notes:
+        console.remark(note)
     result: dict[str, Any] = {
         "output": str(output),
         "size": list(pixels),
@@ -119,6 +123,7 @@ def interlace(
         "fit": fit or "cover",
         "lenses": lenses,
         "view_choice": choice,
+        "correct": correct,
         "pixels_per_lens": target.pixels_per_lens[0],
     }
     line = f"{output}: {len(paths)} photographs, {paths[0].name} to {paths[-1].name}, on {pixels[0]}x{pixels[1]} pixels"

@@ -246,6 +246,7 @@ def weave(
         str, typer.Option("--views", help="nearest: one view per sub-pixel; linear: a mixture of two.")
     ] = "linear",
     fit: FitOption = None,
+    correct: options.Correct = "none",
     layout: Layout = None,
     aspect: Aspect = None,
     bits: options.Bits = None,
@@ -279,17 +280,22 @@ def weave(
             views, cropped = fit_views(views, trim.width / trim.height, fit or "cover")
             for note in fit_note(cropped, fit):
                 console.remark(note)
-        asked: dict[str, Any] = {"choice": choice, "scene": source.stem, "progress": progress}
+        asked: dict[str, Any] = {"choice": choice, "correct": correct, "scene": source.stem, "progress": progress}
         if width * height > LARGE and can_be_banded(name):
-            weave_to_file(views, target, output, bits=bits, finish=finish, **asked)
+            notes = weave_to_file(views, target, output, bits=bits, finish=finish, **asked)
         else:
-            write_finished(weave_views(views, target, **asked), output, finish, bits=bits)
+            woven = weave_views(views, target, **asked)
+            write_finished(woven, output, finish, bits=bits)
+            notes = woven.provenance.notes
+    for note in notes:
+        console.remark(note)
     result = {
         "output": str(output),
         "size": [width, height],
         "display": target.name,
         "views": views.layout.views,
         "view_choice": choice,
+        "correct": correct,
     }
     console.result(result, f"{output}: {views.layout.views} views on {width}x{height} pixels of {target.name}")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -18,6 +18,15 @@ Bits = Annotated[
     int | None,
     typer.Option(
         "--bits", help="Bits per value: PNG 8, 16; EXR 16, 32; TIFF and Zarr 8, 16, 32.", rich_help_panel="Output"
+    ),
+]
+Correct = Annotated[
+    Literal["none", "lens"],
+    typer.Option(
+        "--correct",
+        help="lens: choose the pixels whose light through the display's real lenses comes nearest to what is meant, "
+        "for upright lenses of a known thickness.",
+        rich_help_panel="Display",
     ),
 ]
 Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write; its ending names the format.")]

@@ -87,10 +87,9 @@ class EyeMap:
         """The pixels seen by an eye at ``eye`` (mm in the display's frame, z > 0)."""
         panel = self.display.panel
         scale = self.display.gap / float(eye[2])
-        x, y = self._center_x, self._center_y
-        dx, dy = self.display.panel_offset((x - eye[0]) * scale, (y - eye[1]) * scale)
-        u = (x + dx) / panel.pixel_pitch + 0.5 * panel.width
-        v = 0.5 * panel.height - (y + dy) / panel.pixel_pitch
+        dx, dy = self.display.panel_offset((self._center_x - eye[0]) * scale, (self._center_y - eye[1]) * scale)
+        u = (self._center_x + dx) / panel.pixel_pitch + 0.5 * panel.width
+        v = 0.5 * panel.height - (self._center_y + dy) / panel.pixel_pitch
         u, v = (np.clip(part, -_FAR, _FAR)[..., None] for part in (u, v))
         if len(self._cells) * len(self._cells[0]) > 1:
             column, row = self._nearest(u, v)

@@ -1,0 +1,161 @@
+"""Pictures made for the lens that is there: the pixels whose light through it comes nearest to the light that is meant.
+
+Box-constrained least squares: with W the shares of pixels in the light of each direction, and T the light that is
+meant, the pixels P between black and white that make ``|W P - T|`` least, by FISTA from the picture along true
+directions. All rows under upright cylinders have the same ``W``; of it only ``W'W``, a band, is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display.display import Display
+from lippmann.display.lens_profile import INDICES, LensProfile
+from lippmann.errors import DisplayError
+from lippmann.optics.lens import Lens
+from lippmann.optics.seen import PixelShares, pixel_shares
+from lippmann.runtime.engine_lock import cached_property
+from lippmann.runtime.machine import usable_cores
+from lippmann.runtime.row_threads import Bands
+
+Floats = NDArray[np.float32]
+
+#: Directions of light that is meant, for each pixel: with one, directions between them are lost; three gain no more.
+PARTS = 2
+
+#: Steps of FISTA: 15 are within 0.1 dB of 200.
+_STEPS = 15
+
+#: Rows by which a correction is judged.
+_ROWS_TOLD = 64
+
+#: Relative errors of radius, thickness and index whose cost is told.
+TOLERANCE = 0.03
+
+
+def parts_beside(subpixels: bool = False) -> tuple[float, ...]:
+    """Middles of the parts of a (sub-)pixel, in pixels to the right of its own."""
+    width = 1.0 / 3.0 if subpixels else 1.0
+    return tuple(((part + 0.5) / PARTS - 0.5) * width for part in range(PARTS))
+
+
+_NO_LIMITS = (0.0, np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class LensCorrection:
+    """The correction of pictures for a display with upright cylinders.
+
+    Raises
+    ------
+    DisplayError
+        If the display gives no lens, has other lenses, or several kinds of pixels.
+    """
+
+    display: Display
+    subpixels: bool = False
+
+    def __post_init__(self) -> None:
+        Lens.of(self.display)
+        if not self.display.lattice.rows_are_alike or self.display.panel.subpixel_cells is not None:
+            rule = "pictures are corrected for upright cylinders before pixels that are all alike"
+            fix = "leave --correct out: its rays follow the true directions of the lens all the same"
+            raise DisplayError("cannot be corrected for its lens", where=self.display.name, rule=rule, fix=fix)
+
+    def rows(self, parts: Sequence[Floats]) -> Floats:
+        """Corrected pixels ``(rows, width, 3)``, of the light that is meant: one such array for each part of a pixel.
+
+        Light is linear, with white at 1.
+        """
+        from lippmann.optics.correction_kernel import solve
+
+        corrected = np.empty_like(parts[0])
+        meant = np.stack([np.clip(part, 0.0, 1.0) for part in parts])
+        for channel in range(3):
+            shares, band = self._systems[channel]
+            rows = np.ascontiguousarray(meant[..., channel])
+            solved = np.empty(rows.shape[1:], dtype=np.float32)
+            Bands(usable_cores()).lines(
+                solve, len(solved), rows, shares.first, shares.shares.astype(np.float32), band, _STEPS, solved
+            )
+            corrected[..., channel] = solved
+        return corrected
+
+    def seen_error(self, pixels: Floats, parts: Sequence[Floats], profile: LensProfile | None = None) -> float:
+        """Mean squared error of the light that an eye sees of ``pixels``, over all lenses and directions meant.
+
+        ``profile`` is the lens that is there; by default the display's own.
+        """
+        display = self.display if profile is None else replace(self.display, lens=profile)
+        squares = []
+        for channel in range(3):
+            shares = self._systems[channel][0] if profile is None else self._shares(display, channel)
+            meant = np.stack([np.clip(part[..., channel], 0.0, 1.0) for part in parts], axis=-1)
+            seen = shares.seen(pixels[..., channel].astype(np.float64))
+            squares.append(np.mean((seen - meant.reshape(len(seen), -1)) ** 2))
+        return float(np.mean(squares))
+
+    def told(self, pixels: Floats, parts: Sequence[Floats]) -> tuple[dict[str, object], str]:
+        """What a file says of corrected ``pixels``, and a line for people, by the rows about the middle."""
+        top = max(0, (len(pixels) - _ROWS_TOLD) // 2)
+        rows = slice(top, top + _ROWS_TOLD)
+        gains = self.gains(pixels[rows], [part[rows] for part in parts])
+        limited = float(np.mean((pixels[rows] <= 0.0) | (pixels[rows] >= 1.0)))
+        options: dict[str, object] = {"correct": "lens", "correction_limited": limited}
+        options |= {f"correction_gain_{name}": gain for name, gain in gains.items()}
+        worst = min(("radius", "thickness", "index"), key=lambda name: gains[name])
+        return options, (
+            f"corrected for its lens: {gains['exact']:+.1f} dB to an eye, {gains[worst]:+.1f} dB where the lens's "
+            f"{worst} is {TOLERANCE:.0%} off; {limited:.0%} of the values at black or white"
+        )
+
+    def gains(self, pixels: Floats, parts: Sequence[Floats]) -> dict[str, float]:
+        """Decibels by which an eye sees corrected ``pixels`` nearer to what is meant, by the lens that is there.
+
+        Keys: ``exact``, and ``radius``, ``thickness`` and ``index``, each the worse of 3 % more and less.
+        """
+        before = np.mean(np.stack([np.clip(part, 0.0, 1.0) for part in parts]), axis=0)
+
+        def gain(profile: LensProfile | None) -> float:
+            worse, better = (self.seen_error(picture, parts, profile) for picture in (before, pixels))
+            return 10.0 * float(np.log10(max(worse, 1e-12) / max(better, 1e-12)))
+
+        lens = Lens.of(self.display).profile
+        told = {"exact": gain(None)}
+        for name, limits in (("radius", _NO_LIMITS), ("thickness", _NO_LIMITS), ("index", INDICES)):
+            changed = np.clip([getattr(lens, name) * (1.0 + e) for e in (-TOLERANCE, TOLERANCE)], *limits)
+            told[name] = min(gain(replace(lens, **{name: float(value)})) for value in changed)
+        return told
+
+    @cached_property
+    def _systems(self) -> list[tuple[PixelShares, Floats]]:
+        """By channel: the shares of all directions meant, those of a pixel one after the other, and the band of W'W."""
+        from lippmann.optics.correction_kernel import add_normal_band
+
+        systems: list[tuple[PixelShares, Floats]] = []
+        offsets = [self._offset(channel) for channel in range(3)]
+        for channel, offset in enumerate(offsets):
+            if offset in offsets[:channel]:
+                systems.append(systems[offsets.index(offset)])
+                continue
+            shares = self._shares(self.display, channel)
+            band = np.zeros((self.display.panel.width, 2 * shares.shares.shape[1] - 1))
+            add_normal_band(shares.first, shares.shares, band)
+            systems.append((shares, band.astype(np.float32)))
+        return systems
+
+    def _offset(self, channel: int) -> float:
+        return self.display.panel.subpixel_offsets[channel][0] if self.subpixels else 0.0
+
+    def _shares(self, display: Display, channel: int) -> PixelShares:
+        own, offset, panel = self.display, self._offset(channel), self.display.panel
+        beside = np.array(parts_beside(self.subpixels)) + offset
+        u = (np.arange(panel.width)[:, None] + 0.5 + beside).ravel()
+        x, y = own.panel_point(u, np.full_like(u, 0.5 * panel.height))
+        lens, _ = own.lens_of(x, y)
+        place = x - own.lens_center(lens, 0.0 * lens, x, y)[0]
+        return pixel_shares(display, lens, -own.pinhole_place(place) / own.gap, offset)

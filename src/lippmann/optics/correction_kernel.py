@@ -1,0 +1,116 @@
+"""Compiled least squares of corrected pictures. It is imported late: Numba takes time to load."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.runtime.numba_jit import compiled, uncounted
+
+Real = NDArray[np.float64]
+Floats = NDArray[np.float32]
+
+#: Rows that are solved at a time, side by side in the processor's registers.
+_LANES = 32
+
+
+@uncounted
+def add_normal_band(first: NDArray[np.int64], shares: Real, band: Real) -> None:
+    """Add ``W'W`` to ``band`` ``(width, 2 m - 1)``, whose middle column is the diagonal."""
+    reach = shares.shape[1]
+    for n in range(shares.shape[0]):
+        for i in range(reach):
+            if shares[n, i] > 0.0:
+                for j in range(reach):
+                    if shares[n, j] > 0.0:
+                        band[first[n] + i, j - i + reach - 1] += shares[n, i] * shares[n, j]
+
+
+@compiled
+def solve(
+    first_row: int,
+    last_row: int,
+    meant: Floats,
+    first: NDArray[np.int64],
+    shares: Floats,
+    band: Floats,
+    steps: int,
+    solved: Floats,
+) -> None:
+    """Solve rows ``first_row`` to before ``last_row``.
+
+    ``meant`` is ``(parts, rows, width)``, ``solved`` ``(rows, width)``; ``first`` and ``shares`` are those of the parts
+    of a pixel one after the other, and ``band`` is that of :func:`add_normal_band`.
+    """
+    width = meant.shape[2]
+    limits = np.zeros((width, 2), dtype=np.int64)
+    state = np.empty((4, width, _LANES), dtype=np.float32)
+    slope = np.empty(_LANES, dtype=np.float32)
+    _solve(first_row, last_row, meant, first, shares, band, steps, solved, limits, state, slope)
+
+
+@uncounted
+def _solve(
+    first_row: int,
+    last_row: int,
+    meant: Floats,
+    first: NDArray[np.int64],
+    shares: Floats,
+    band: Floats,
+    steps: int,
+    solved: Floats,
+    limits: NDArray[np.int64],
+    state: Floats,
+    slope: Floats,
+) -> None:
+    """:func:`solve`. ``state`` is, by lane: the goal ``W'T``, the pixels x, and two buffers of FISTA's y."""
+    parts, width, reach = meant.shape[0], meant.shape[2], shares.shape[1]
+    largest = np.float32(0.0)
+    for c in range(width):
+        total = np.float32(0.0)
+        limits[c, 0] = band.shape[1]
+        for k in range(band.shape[1]):
+            if band[c, k] > 0.0:
+                total += band[c, k]
+                limits[c, 0] = min(limits[c, 0], k)
+                limits[c, 1] = k + 1
+        largest = max(largest, total)
+    step = np.float32(1.0) / largest
+    for top in range(first_row, last_row, _LANES):
+        lanes = min(_LANES, last_row - top)
+        for c in range(width):
+            for lane in range(_LANES):
+                state[0, c, lane], state[1, c, lane] = np.float32(0.0), np.float32(0.0)
+        for c in range(width):
+            for part in range(parts):
+                n = c * parts + part
+                for lane in range(lanes):
+                    state[1, c, lane] += meant[part, top + lane, c] / np.float32(parts)
+                for i in range(reach):
+                    if shares[n, i] > 0.0:
+                        weight, at = shares[n, i], first[n] + i
+                        for lane in range(lanes):
+                            state[0, at, lane] += weight * meant[part, top + lane, c]
+            for lane in range(_LANES):
+                state[2, c, lane] = state[1, c, lane]
+        t = 1.0
+        for number in range(steps):
+            now, ahead = 2 + number % 2, 3 - number % 2
+            following = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * t * t))
+            speed = np.float32((t - 1.0) / following)
+            t = following
+            for c in range(width):
+                for lane in range(_LANES):
+                    slope[lane] = -state[0, c, lane]
+                for k in range(limits[c, 0], limits[c, 1]):
+                    weight, at = band[c, k], c + k - reach + 1
+                    for lane in range(_LANES):
+                        slope[lane] += weight * state[now, at, lane]
+                for lane in range(_LANES):
+                    value = state[now, c, lane] - step * slope[lane]
+                    value = min(max(value, np.float32(0.0)), np.float32(1.0))
+                    state[ahead, c, lane] = value + speed * (value - state[1, c, lane])
+                    state[1, c, lane] = value
+        for lane in range(lanes):
+            for c in range(width):
+                solved[top + lane, c] = state[1, c, lane]

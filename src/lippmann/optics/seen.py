@@ -1,0 +1,99 @@
+"""What an eye sees through real lenses: the pixels under each lens, weighted by the light that they send to it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display.display import Display
+from lippmann.errors import DisplayError
+from lippmann.optics.lens import Lens, Real
+from lippmann.optics.light_table import PLACES_PER_LENS, light_table
+from lippmann.optics.pixel_profile import kernel, pixel_trapezoid
+
+#: Lenses to either side whose pixels shine through one.
+_NEIGHBOURS = 2
+
+#: Share of a lens's light below which a pixel counts as dark.
+_LEAST = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class PixelShares:
+    """Shares of pixels in the light of n lenses, each in one direction; they sum up to 1.
+
+    Attributes
+    ----------
+    first:
+        ``(n,)`` column of the first pixel.
+    shares:
+        ``(n, m)`` of that pixel and those to its right; 0 beside the panel.
+    """
+
+    first: NDArray[np.int64]
+    shares: Real
+
+    def seen(self, rows: Real) -> Real:
+        """Light ``(rows, n)`` of the lenses, of pixels ``(rows, width)``."""
+        columns = np.clip(self.first[:, None] + np.arange(self.shares.shape[1]), 0, rows.shape[1] - 1)
+        light = np.zeros((len(rows), len(self.first)))
+        for k in range(self.shares.shape[1]):
+            light += rows[:, columns[:, k]] * self.shares[:, k]
+        return light
+
+
+def pixel_shares(display: Display, lens: Real, slopes: Real, offset: float = 0.0) -> PixelShares:
+    """Shares of the pixels of a row in the light that upright cylinders send in these directions.
+
+    Parameters
+    ----------
+    display:
+        A display with the profile of its lenses.
+    lens:
+        ``(n,)`` numbers of lenses.
+    slopes:
+        ``(n,)`` slopes across the lenses, toward the eye.
+    offset:
+        Place of the sub-pixel, in pixels to the right of its pixel's middle.
+
+    Raises
+    ------
+    DisplayError
+        If the display gives no lens, or its lenses are not upright cylinders.
+    """
+    shape = Lens.of(display)
+    if not display.lattice.rows_are_alike:
+        rule = "light through upright cylinders is followed row by row"
+        raise DisplayError("has other lenses", where=display.name, rule=rule)
+    pixel, width = display.panel.pixel_pitch, display.panel.width
+    step = shape.pitch / PLACES_PER_LENS
+    table = light_table(shape, slopes, neighbours=_NEIGHBOURS)
+    blur = display.pixel.blur if display.pixel else 0.0
+    lit = kernel(pixel_trapezoid(display), blur, step)
+    profile = np.array([np.convolve(row, lit) for row in table.shares])
+    half = 0.5 * (profile.shape[1] - 1)
+    # Pixels from the middle of the panel; the lens's axis as seen straight ahead.
+    axis = (display.lattice.origin_x + lens * display.lattice.pitch) / pixel + 0.5 * width - 0.5 - offset
+    reach = math.floor(half * step / pixel)
+    first = np.round(axis).astype(np.int64) - reach
+    columns = first[:, None] + np.arange(2 * reach + 1)
+    place = np.clip((columns - axis[:, None]) * (pixel / step) + half, 0.0, 2.0 * half)
+    left = np.minimum(place.astype(np.int64), profile.shape[1] - 2)
+    rows = np.arange(len(lens))[:, None]
+    shares = profile[rows, left] + (profile[rows, left + 1] - profile[rows, left]) * (place - left)
+    shares[(columns < 0) | (columns >= width) | (shares < _LEAST)] = 0.0
+    total = shares.sum(axis=1, keepdims=True)
+    shares = np.divide(shares, total, out=np.zeros_like(shares), where=total > 0.0)
+    lit_places = np.flatnonzero(shares.any(axis=0))
+    if len(lit_places):
+        shares, first = shares[:, lit_places[0] : lit_places[-1] + 1], first + lit_places[0]
+    return PixelShares(first, np.ascontiguousarray(shares))
+
+
+def lenses_seen_by(display: Display, eye: tuple[float, float, float], lens: Real, offset: float = 0.0) -> PixelShares:
+    """:func:`pixel_shares` of lenses in the directions of an eye at ``(x, y, z)`` mm in the display's frame."""
+    axis = display.lattice.origin_x + lens * display.lattice.pitch
+    return pixel_shares(display, lens, (eye[0] - axis) / eye[2], offset)

@@ -1,0 +1,117 @@
+"""Corrected pictures: least squares against a plain solver, and judged from directions that were not solved for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lippmann.display import load_display
+from lippmann.errors import DisplayError
+from lippmann.optics.correction import LensCorrection, parts_beside
+from lippmann.optics.seen import lenses_seen_by
+
+WIDE = "print:lpi=60,ppi=720,size=36x10mm,thickness=26mil,radius=0.2877mm"
+ROWS = 40
+
+
+def textured(display, x, z=-3.0, period=7.0):
+    """Rows of light of a plane behind the display at places ``x`` of it, mm: smooth stripes, and edges."""
+    row = np.arange(ROWS)[:, None]
+    wave = 0.5 + 0.3 * np.sin(2 * np.pi * (x / (period / (1 + row % 7)) + row * 0.17))
+    edge = 0.2 * np.sign(np.sin(2 * np.pi * (x / 2.3 + row * 0.31)))
+    return np.clip(wave + np.where(row % 2, edge, 0.0), 0.0, 1.0)
+
+
+def meant(display, beside, z=-3.0):
+    """Part of a pixel's picture: rays from its middle, and to both sides within the part."""
+    total = 0.0
+    for step in (-0.125, 0.125):
+        u = np.arange(display.panel.width) + 0.5 + beside + step
+        x, y = display.panel_point(u, 0.0 * u)
+        lens, _ = display.lens_of(x, y)
+        axis = display.lens_center(lens, 0.0 * lens, x, y)[0]
+        total = total + 0.5 * textured(display, axis - display.pinhole_place(x - axis) / display.gap * z)
+    return np.repeat(total[..., None], 3, axis=2).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def solved():
+    display = load_display(WIDE)
+    parts = [meant(display, beside) for beside in parts_beside()]
+    correction = LensCorrection(display)
+    return display, correction, parts, correction.rows(parts)
+
+
+def error_to_eyes(display, pixels, z=-3.0):
+    """Mean squared error over eyes between those that were solved for, of the lenses away from the edge."""
+    lenses = np.arange(8.0, display.lens_grid.columns - 8)
+    axis = display.lattice.origin_x + lenses * display.lattice.pitch
+    errors = []
+    for x in (-167.3, -91.1, -33.7, 2.9, 58.3, 121.7, 188.9):
+        seen = lenses_seen_by(display, (x, 0.0, 500.0), lenses).seen(pixels[..., 1])
+        errors.append(np.mean((seen - textured(display, axis + (x - axis) / 500.0 * z)) ** 2))
+    return np.mean(errors)
+
+
+def test_it_is_the_least_squares_picture(solved):
+    display, correction, parts, pixels = solved
+    shares, _ = correction._systems[0]
+    matrix = np.zeros((len(shares.first), display.panel.width))
+    for n, first in enumerate(shares.first):
+        for k, share in enumerate(shares.shares[n]):
+            if share:
+                matrix[n, first + k] = share
+    goal = np.stack([part[..., 0] for part in parts], axis=-1).reshape(ROWS, -1)
+    x = np.mean([part[..., 0] for part in parts], axis=0).astype(float)
+    start = x.copy()
+    step = 1.0 / np.linalg.norm(matrix, 2) ** 2
+    for _ in range(400):
+        x = np.clip(x - step * (x @ matrix.T - goal) @ matrix, 0.0, 1.0)
+
+    def error(picture):
+        return np.mean((picture @ matrix.T - goal) ** 2)
+
+    assert error(pixels[..., 0]) < error(start) - 0.9 * (error(start) - error(x))
+    assert pixels.min() >= 0.0
+    assert pixels.max() <= 1.0
+
+
+def test_eyes_that_were_not_solved_for_see_what_is_meant_better(solved):
+    display, _, parts, pixels = solved
+    before = error_to_eyes(display, np.mean(parts, axis=0))
+    assert 10 * np.log10(before / error_to_eyes(display, pixels)) > 0.7
+
+
+@pytest.mark.parametrize("changed", ["radius", "thickness", "index"])
+def test_a_lens_that_is_three_percent_off_loses_little(solved, changed):
+    display, _, parts, pixels = solved
+    for factor in (0.97, 1.03):
+        other = replace(display, lens=replace(display.lens, **{changed: factor * getattr(display.lens, changed)}))
+        gain = error_to_eyes(other, np.mean(parts, axis=0)) / error_to_eyes(other, pixels)
+        assert 10 * np.log10(gain) > -0.3
+
+
+def test_it_tells_what_it_gains(solved):
+    _, correction, parts, pixels = solved
+    options, note = correction.told(pixels, parts)
+    assert options["correction_gain_exact"] > max(
+        options[f"correction_gain_{k}"] for k in ("radius", "thickness", "index")
+    )
+    assert f"{options['correction_gain_exact']:+.1f} dB to an eye" in note
+
+
+def test_light_beyond_white_is_white(solved):
+    _, correction, parts, _ = solved
+    bright = correction.rows([np.full_like(part, 3.0) for part in parts])
+    np.testing.assert_allclose(bright[:, 20:-20], 1.0, atol=1e-3)
+
+
+@pytest.mark.parametrize(("name", "what"), [("seed-lenticular", "gives no lens"), ("print", "cannot be corrected")])
+def test_other_displays_are_refused(name, what):
+    display = load_display(WIDE if name == "print" else name)
+    if name == "print":
+        display = replace(display, sheet=None, lens_array=replace(display.lens_array, slant=9.0))
+    with pytest.raises(DisplayError, match=what):
+        LensCorrection(display)
