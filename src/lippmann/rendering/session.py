@@ -396,7 +396,6 @@ def make_integrator(built: BuiltScene | BuiltClassic, request: RenderRequest, fr
 
 
 def make_whitted(built: BuiltClassic, request: RenderRequest, frame_from_world: Matrix) -> Integrator:
-    """Whitted ray tracing."""
     from lippmann.rendering.transport.whitted import WhittedIntegrator
 
     return WhittedIntegrator(built, request.surfaces)
@@ -409,13 +408,13 @@ def make_path(built: BuiltScene, request: RenderRequest, frame_from_world: Matri
     from lippmann.rendering.transport.volume_path import VolumePathIntegrator
 
     if built.has_media:
-        media, leave = "this scene has participating media", "leave it out"
-        if request.clamp_indirect is not None:
-            rule = f"{media}, whose light is not clamped"
-            raise UsageError("does not apply", parameter="clamp_indirect", rule=rule, fix=leave)
-        if request.caustics not in ("auto", "paths"):
-            rule = f"{media}, through which photons are not traced"
-            raise UsageError(f"'{request.caustics}' does not apply", parameter="caustics", rule=rule, fix=leave)
+        clamps, photons = request.clamp_indirect is not None, request.caustics not in ("auto", "paths")
+        if clamps or photons:
+            name = ("caustics", "clamp_indirect")[clamps]
+            rule = "this scene has participating media, whose light is not clamped, and through which no photons go"
+            raise UsageError(
+                f"'{getattr(request, name)}' does not apply", parameter=name, rule=rule, fix="leave it out"
+            )
         return VolumePathIntegrator(built.mitsuba, request.surfaces, request.integrator, built.background)
     features = make_scene_features(
         built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
@@ -424,7 +423,6 @@ def make_path(built: BuiltScene, request: RenderRequest, frame_from_world: Matri
 
 
 def make_surface(built: BuiltScene, request: RenderRequest, frame_from_world: Matrix) -> Integrator:
-    """A property of the first surface."""
     from lippmann.rendering.transport.surface_property import SurfaceIntegrator
 
     return SurfaceIntegrator(built.mitsuba, request.integrator, frame_from_world)
