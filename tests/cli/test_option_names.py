@@ -10,7 +10,7 @@ import pytest
 
 import lippmann as package
 from lippmann.cli.app import make_app
-from lippmann.cli.shared.option_names import in_options, option_of, translated
+from lippmann.cli.shared.command_options import in_options, option_of, translated
 from lippmann.errors import UsageError
 
 assert make_app  # whose module says which commands there are

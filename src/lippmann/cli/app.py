@@ -11,8 +11,8 @@ from typing import Annotated
 import typer
 
 from lippmann._version import VERSION
+from lippmann.cli.shared.command_options import commands_are
 from lippmann.cli.shared.grouped_help import HelpfulCommand, HelpfulGroup
-from lippmann.cli.shared.option_names import commands_are
 
 #: Set where a shell asks for what a line may go on with.
 _COMPLETION = "_LIPPMANN_COMPLETE"

@@ -12,7 +12,7 @@ from contextlib import suppress
 
 from typer import BadParameter
 
-from lippmann.cli.shared import command_clock
+from lippmann.cli.shared import standard_streams
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.errors import LippmannError, UsageError
 from lippmann.printable import one_line
@@ -25,7 +25,7 @@ _ComplaintError = BadParameter.__mro__[2]
 
 def run(words: list[str], *, debug: bool = False) -> int:
     """Run one command; errors become one line on standard error unless ``debug`` asks for the traceback."""
-    command_clock.start()
+    standard_streams.begin_command()
     atomic_write.remark("")
     from lippmann.cli.app import app_of
 
@@ -48,7 +48,7 @@ def run(words: list[str], *, debug: bool = False) -> int:
 
 def _told(error: Exception) -> int:
     """The exit code of an error, which is told in one line."""
-    from lippmann.cli.shared.option_names import in_options
+    from lippmann.cli.shared.command_options import in_options
 
     if isinstance(error, LippmannError):
         line = in_options(error)
@@ -92,7 +92,7 @@ def _left() -> str:
     text = atomic_write.last_remark()
     if not text:
         return ""
-    from lippmann.cli.shared.option_names import translated
+    from lippmann.cli.shared.command_options import translated
 
     return translated(text)
 

@@ -9,12 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.scene.matrices import transform_points
-from lippmann.scene.parsing.points_lines import MOST, Width, as_mesh, thinned, width_of
+from lippmann.scene.parsing.points_lines import MOST, POINTS_NOTE, Width, as_mesh, thinned, width_of
 from lippmann.scene.splat_clouds import bulk_of
 from lippmann.scene.values.description import Instance, Material, Matrix, Mesh, SceneDescription
-
-#: How the note of a cloud's width begins.
-_WIDTH_NOTE = width_of(1.0, 1, lines=False).note.split(" of a radius")[0]
 
 
 def draw_cloud(clouds: Sequence[Mesh]) -> tuple[list[Mesh], Width]:
@@ -68,7 +65,7 @@ def crop_cloud(description: SceneDescription, box: NDArray[np.float64]) -> Scene
     if not kept:
         return None
     meshes, width = draw_cloud(kept)
-    notes = [width.note if note.startswith(_WIDTH_NOTE) else note for note in description.notes]
+    notes = [width.note if note.startswith(POINTS_NOTE) else note for note in description.notes]
     instances = [Instance(number, np.eye(4)) for number in range(len(meshes))]
     return replace(description, meshes=meshes, instances=instances, notes=notes)
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from lippmann.cli.commands import print as printing
 from lippmann.cli.shared import options
 from lippmann.cli.shared.command_options import with_options, without
 from lippmann.cli.shared.console import Console
+from lippmann.cli.shared.scene_source import print_of, sheet_of
 from lippmann.errors import UsageError
 from lippmann.options.prints import FinishOptions, PrintOptions
 
@@ -83,7 +83,7 @@ def interlace(
     console = Console(quiet, as_json)
     check_interlaced_path(output)
     across = lenses == "across"
-    target, finish = printing.sheet_of(_display(display, printed, turned=across), replace(finishing, icc=icc))
+    target, finish = sheet_of(_display(display, printed, turned=across), replace(finishing, icc=icc))
     paths = natural_order(_pictures(photos))
     if reverse:
         paths.reverse()
@@ -133,7 +133,7 @@ def interlace(
 def _display(name: str | None, printed: PrintOptions, *, turned: bool) -> Display:
     """The display, or the print; lying on its side if ``turned``."""
     if name is None:
-        sheet = printing.print_of(printed)
+        sheet = print_of(printed)
         return (replace(sheet, size=sheet.size[::-1]) if turned else sheet).display()
     for option, value in {**vars(printed), "lenses": "across" if turned else None}.items():
         if value is not None:

@@ -13,7 +13,7 @@ from lippmann.cli.commands.quilt import Aspect, Layout, layout_of
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import only, with_options
 from lippmann.cli.shared.console import Console, estimate_in_words
-from lippmann.cli.shared.default_output import output_of
+from lippmann.cli.shared.outputs import output_of
 from lippmann.errors import UsageError
 from lippmann.options.outputs import SequenceOptions
 from lippmann.options.texts import triple

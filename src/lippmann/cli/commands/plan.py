@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated
 
-from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence
 from lippmann.cli.shared import options
 from lippmann.cli.shared.command_options import for_form, only, with_options
 from lippmann.cli.shared.console import Console
-from lippmann.cli.shared.scene_source import SceneSource
+from lippmann.cli.shared.scene_source import SceneSource, display_of
 from lippmann.options.light import LightOptions
 from lippmann.options.outputs import AccessOptions, SequenceOptions
 from lippmann.options.placement import PlacementOptions
@@ -41,7 +40,7 @@ def plan(
     from lippmann.rendering.request.render_request import RenderRequest
 
     console = Console(quiet, as_json)
-    target = printing.display_of(display, printed)
+    target = display_of(display, printed)
     request = RenderRequest.from_options(how, machine, placement=placement)
     source = SceneSource(scene, asked, light, access)
     wanted = sequence.Wanted.part_of(turning)

@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lippmann.cli.commands import print as printing
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import with_options, without
-from lippmann.cli.shared.console import Console
-from lippmann.cli.shared.default_output import output_of
-from lippmann.cli.shared.picture_report import add_seconds, depth_line, report
-from lippmann.cli.shared.scene_source import SceneSource
+from lippmann.cli.shared.console import Console, add_seconds, depth_line, report
+from lippmann.cli.shared.outputs import output_of
+from lippmann.cli.shared.scene_source import SceneSource, display_of
 from lippmann.errors import UsageError
 from lippmann.options.choices import tone_map_of
 from lippmann.options.forms import LEFT_OUT
@@ -77,7 +75,7 @@ def preview(
     console = Console(quiet, as_json)
     output = output_of(output, scene, "-preview.png")
     check_output(output, format_for(output, bits)[0])
-    target = printing.display_of(display, printed)
+    target = display_of(display, printed)
     request = RenderRequest.from_options(how, machine, placement=placement, tone_map=tone_map_of(how.tone_map, output))
     source = SceneSource(scene, asked, light, access)
     with console.progress() as progress:

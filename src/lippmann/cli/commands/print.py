@@ -1,4 +1,4 @@
-"""``lippmann pitch-test`` and ``lippmann marks``, and the print that options describe."""
+"""``lippmann pitch-test`` and ``lippmann marks``."""
 
 from __future__ import annotations
 
@@ -10,87 +10,12 @@ import typer
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import only, with_options
 from lippmann.cli.shared.console import Console
-from lippmann.errors import DisplayError, OutputError, UsageError
+from lippmann.cli.shared.scene_source import print_of
+from lippmann.errors import OutputError, UsageError
 from lippmann.options.prints import FinishOptions, PrintOptions
 
 if TYPE_CHECKING:
-    from lippmann.calibration.finish import Finish
     from lippmann.display import Display
-    from lippmann.display.formats.print_sheet import Print
-
-_PRINT = "print"
-
-
-def print_of(printed: PrintOptions) -> Print:
-    """The print that the options describe.
-
-    Raises
-    ------
-    DisplayError
-        If a value is missing or invalid; names the option.
-    """
-    from lippmann.display.formats.print_sheet import print_of_texts
-
-    try:
-        return print_of_texts({_option(key): text for key, text in _given(printed).items()})
-    except DisplayError as error:
-        raise DisplayError(error.what, where=f"--{error.where}", rule=error.rule, fix=error.fix) from None
-
-
-def display_of(name: str, printed: PrintOptions) -> Display:
-    """The display ``name``; ``print`` is described by its options.
-
-    Raises
-    ------
-    DisplayError
-        If the display is unknown, or a print option is missing or invalid.
-    UsageError
-        If print options are given for another display.
-    """
-    from lippmann.display import load_display
-
-    if name == _PRINT:
-        return print_of(printed).display()
-    for key in _given(printed):
-        rule = f"it applies to --display {_PRINT} only"
-        raise UsageError(f"does not apply to the display {name}", where=f"--{_option(key)}", rule=rule)
-    return load_display(name)
-
-
-def _given(printed: PrintOptions) -> dict[str, str]:
-    return {key: text for key, text in vars(printed).items() if text is not None}
-
-
-def sheet_of(display: Display, finishing: FinishOptions, *, in_frames: bool = False) -> tuple[Display, Finish]:
-    """The display with its bleed, and what is done to its picture afterwards.
-
-    Raises
-    ------
-    UsageError
-        If an option is given for a display that is no print or for frames of a moving scene, or a length is out of
-        range.
-    PictureError
-        If the profile cannot be used.
-    """
-    from lippmann.calibration.finish import NO_FINISH, Finish
-    from lippmann.codecs.icc import read_profile
-    from lippmann.display.sheet_layout import with_bleed
-    from lippmann.display.validation import length
-
-    bleed, marks, icc = finishing.bleed, finishing.marks, finishing.icc
-    asked = [f"--{name}" for name, value in vars(finishing).items() if value not in (None, False)]
-    if not asked:
-        return display, NO_FINISH
-    if display.sheet is None:
-        rule = f"it applies to prints only: --display {_PRINT}"
-        raise UsageError(f"does not apply to the display {display.name}", where=asked[0], rule=rule)
-    if in_frames:
-        raise UsageError("does not apply to frames of a moving scene", where=asked[0], fix="leave it out")
-    display = with_bleed(display, 0.0 if bleed is None else length(bleed, "--bleed"))
-    margin = None if marks is None else length(marks, "--marks")
-    finish = Finish(margin, finishing.mirror, None if icc is None else read_profile(icc))
-    finish.display(display)  # which checks the margin
-    return display, finish
 
 
 @with_options
@@ -219,10 +144,6 @@ def pitch_test(
     line = f"{output}: {strips} strips from {texts[0]} to {texts[-1]} lpi, {sheet.pitch_on_print:.6g} expected"
     line += f": strip {test.expected + 1} from the top, labelled {texts[test.expected]}"
     console.result(result, f"{line}, {width}x{height} pixels at {sheet.ppi:g} ppi")
-
-
-def _option(parameter: str) -> str:
-    return parameter.replace("_", "-")
 
 
 def _size(size_mm: tuple[float, float]) -> str:

@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence
 from lippmann.cli.commands.interlace import FitOption, fit_note
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import for_form, with_options
-from lippmann.cli.shared.console import Console, estimate_in_words
+from lippmann.cli.shared.console import Console, add_seconds, depth_line, estimate_in_words, report
 from lippmann.cli.shared.grouped_help import HelpfulCommand
-from lippmann.cli.shared.picture_report import add_seconds, depth_line, report
-from lippmann.cli.shared.scene_source import SceneSource
+from lippmann.cli.shared.scene_source import SceneSource, sheet_of
 from lippmann.errors import UsageError
 from lippmann.options.choices import tone_map_of
 from lippmann.options.light import LightOptions
@@ -268,7 +266,7 @@ def weave(
     console = Console(quiet, as_json)
     name, stored = format_for(output, bits)
     check_output(output, name)
-    target, finish = printing.sheet_of(load_display(display), finishing)
+    target, finish = sheet_of(load_display(display), finishing)
     finish.check_stored(stored, output)
     panel, trim = finish.display(target).panel, trim_of(target)
     width, height = panel.width, panel.height

@@ -10,14 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lippmann.cli.commands import cluster as clusters
-from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence, view
-from lippmann.cli.shared import command_clock, options
+from lippmann.cli.shared import options, standard_streams
 from lippmann.cli.shared.command_options import with_options
-from lippmann.cli.shared.console import Console
-from lippmann.cli.shared.default_output import output_of
-from lippmann.cli.shared.picture_report import add_seconds, remarks, report
-from lippmann.cli.shared.scene_source import SceneSource
+from lippmann.cli.shared.console import Console, add_seconds, remarks, report
+from lippmann.cli.shared.outputs import output_of
+from lippmann.cli.shared.scene_source import SceneSource, display_of, sheet_of
 from lippmann.errors import UsageError
 from lippmann.options.choices import tone_map_of
 from lippmann.options.light import LightOptions
@@ -87,9 +85,9 @@ def render(
     from lippmann.runtime.atomic_write import check_folder_writable
 
     console = Console(quiet, as_json)
-    target = printing.display_of(display, printed)
+    target = display_of(display, printed)
     wanted = sequence.Wanted.part_of(moving)
-    target, finish = printing.sheet_of(target, finishing, in_frames=bool(wanted))
+    target, finish = sheet_of(target, finishing, in_frames=bool(wanted))
     wanted, output = sequence.with_film(wanted, output_of(output, scene, "-frames" if wanted else ".png"))
     if opens and wanted and wanted.video is None:
         raise UsageError("shows a picture or a film", where="--open", fix="add --video film.mp4")
@@ -97,7 +95,7 @@ def render(
         *(how, machine),
         placement=placement,
         tone_map=tone_map_of(how.tone_map, output),
-        began=None if wanted else command_clock.began(),
+        began=None if wanted else standard_streams.command_began(),
     )
     source = SceneSource(scene, asked, light, access)
     on_cluster = clusters.Cluster(on)

@@ -13,9 +13,9 @@ import typer
 
 from lippmann.cli.commands.quilt import Aspect, Layout, layout_of
 from lippmann.cli.shared import options, parse
+from lippmann.cli.shared.command_options import in_options
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.exit_codes import INTERRUPTED
-from lippmann.cli.shared.option_names import in_options
 from lippmann.errors import LippmannError, UsageError
 from lippmann.runtime.atomic_write import scratch_folder
 

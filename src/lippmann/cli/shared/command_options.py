@@ -1,4 +1,4 @@
-"""Options of commands, made from the dataclasses of :mod:`lippmann.options`.
+"""Options of commands, made from the dataclasses of :mod:`lippmann.options`; messages and studio files in their words.
 
 A command takes such a dataclass as a parameter; :func:`with_options` puts an option for each of its fields in its
 place, reads their words, and hands the command the whole::
@@ -10,18 +10,26 @@ place, reads their words, and hands the command the whole::
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import Field, dataclass, field
-from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 import typer
 
 from lippmann.cli.shared.grouped_help import ALL, MANY
+from lippmann.errors import LippmannError
 from lippmann.options.choices import REUSING
 from lippmann.options.forms import LEFT_OUT, REUSES_NOTHING, Form
 from lippmann.options.option import Option, Options, default_of, kinds_of, options_of
 from lippmann.options.quality import MachineOptions
+
+if TYPE_CHECKING:
+    import typer
+
 
 T = TypeVar("T", bound=Options)
 
@@ -156,3 +164,97 @@ _HELP_ALL = inspect.Parameter(
         bool, typer.Option("--help-all", help="Show all options and exit.", is_eager=True, callback=_show_all)
     ],
 )
+
+
+#: Parameters whose options have other names than they have.
+_OTHERWISE = {
+    "layout": "--as",
+    "grid": "--views",
+}
+#: ``name="value"``, ``name=True``, ``name=3.5`` or, for any value, ``name=...``.
+_SETTING = re.compile(r"\b([a-z_]+)=(?:\"([^\"]*)\"|(\.\.\.|[\w+-]+(?:\.\w+)*))")
+
+
+def in_options(error: LippmannError) -> str:
+    """The line that says ``error`` on the command line."""
+    where = ": ".join(part for part in (error.where, option_of(error.parameter)) if part)
+    words = {name: translated(getattr(error, name)) for name in ("what", "rule", "fix")}
+    return str(LippmannError(words["what"], where=where, rule=words["rule"], fix=words["fix"]))
+
+
+def option_of(parameter: str) -> str:
+    """The option of a parameter; its own name where it has none."""
+    return _options().get(parameter, parameter) if parameter else ""
+
+
+def translated(text: str) -> str:
+    """``text`` with settings of parameters as options."""
+    return _SETTING.sub(_as_option, text)
+
+
+def _as_option(match: re.Match[str]) -> str:
+    name, quoted, plain = match.groups()
+    option = _options().get(name)
+    if option is None:
+        return match[0]
+    if plain in ("True", "..."):
+        return option
+    if plain == "False":
+        return f"--no-{option[2:]}"
+    return f"{option} {plain if quoted is None else quoted}"
+
+
+def commands_are(make_app: Callable[[], typer.Typer]) -> None:
+    """Say which commands there are, once one has to know: their options are the words of what follows."""
+    _makers[:] = [make_app]
+    _options.cache_clear()
+
+
+_makers: list[Callable[[], typer.Typer]] = []
+
+
+@cache
+def _options() -> Mapping[str, str]:
+    """Options by the names of their parameters, of all commands; arguments by theirs, in capitals."""
+    import typer
+
+    names: dict[str, str] = {}
+    for command in (each for make in _makers for each in _commands(typer.main.get_command(make()))):
+        for parameter in command.params:
+            if parameter.name is not None:
+                long = [option for option in parameter.opts if option.startswith("--")]
+                names.setdefault(parameter.name, long[0] if long else parameter.name.upper())
+    return names | _OTHERWISE
+
+
+def _commands(command: Any) -> Iterator[Any]:
+    """A command of click's, whose home moved between releases of typer, and those below it."""
+    yield command
+    for each in getattr(command, "commands", {}).values():
+        yield from _commands(each)
+
+
+#: Options of renders in frames have another eye than previews.
+_OF_PREVIEWS = ("preview",)
+
+
+def read_defaults(context: typer.Context, state: Path | None) -> Path | None:
+    """Let what the file ``state`` says stand for options that are not given.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be read, or a setting is out of its range.
+    """
+    if state is None or context.resilient_parsing:
+        return state
+    from lippmann.studio_app.command_line import option_values
+    from lippmann.studio_app.state_toml import read_state
+
+    read = read_state(state)
+    known = {parameter.name for parameter in context.command.params}
+    texts: dict[str, object] = {"scene": read.scene, **option_values(read)}
+    if read.eye is not None and context.command.name in _OF_PREVIEWS:
+        texts["eye"] = ",".join(repr(part) for part in read.eye)
+    context.default_map = {name: text for name, text in texts.items() if name in known}
+    return state

@@ -12,7 +12,7 @@ from typing import Any
 from typer.core import TyperCommand, TyperGroup
 
 from lippmann.cli.shared.examples import EXAMPLES
-from lippmann.cli.shared.kept_inputs import check_outputs
+from lippmann.cli.shared.outputs import check_outputs
 
 #: Headings of options, in their order; what has none stands under the last.
 OPTION_GROUPS = (

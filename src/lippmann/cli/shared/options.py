@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from lippmann.cli.shared.command_options import read_defaults
 from lippmann.cli.shared.completion import complete_displays, complete_scenes
-from lippmann.cli.shared.state_defaults import read_defaults
 
 Json = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on standard output.", rich_help_panel="Output")

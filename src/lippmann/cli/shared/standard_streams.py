@@ -1,4 +1,7 @@
-"""Standard input, output and error that are closed, full, or read by nobody any more."""
+"""The process of a command: standard streams that are closed, full or read by nobody any more, and when it began.
+
+Limits of time count from the beginning of the command, not from when all is loaded.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import errno
 import io
 import os
 import sys
+import time
 from contextlib import suppress
 from typing import TextIO, cast
 
@@ -76,3 +80,16 @@ def _standing(stream: TextIO | None, descriptor: int, *, is_told: bool) -> TextI
         encoding, errors, is_terminal = stream.encoding, stream.errors or "strict", stream.isatty()
     buffer = io.BufferedWriter(_Stream(raw, is_told=is_told))
     return io.TextIOWrapper(buffer, encoding, errors, line_buffering=is_terminal or not is_told)
+
+
+_began: list[float] = []
+
+
+def begin_command() -> None:
+    """Say that a command begins now."""
+    _began[:] = [time.perf_counter()]
+
+
+def command_began() -> float | None:
+    """Seconds of :func:`time.perf_counter` at which the command began; None outside of one."""
+    return _began[0] if _began else None

@@ -40,6 +40,10 @@ class Width:
     note: str
 
 
+#: How the note of a width of points begins.
+POINTS_NOTE = "points are drawn as balls"
+
+
 def width_of(diagonal: float, count: int, *, lines: bool) -> Width:
     """Width of points or lines in a box of a ``diagonal``: less where there are so many that they would touch.
 
@@ -47,7 +51,7 @@ def width_of(diagonal: float, count: int, *, lines: bool) -> Width:
     """
     most = LINE_RADIUS if lines else POINT_RADIUS
     share = min(most, 50.0 * most / max(count, 1) ** 0.5)
-    what = "lines are drawn as rods" if lines else "points are drawn as balls"
+    what = "lines are drawn as rods" if lines else POINTS_NOTE
     return Width(share * (diagonal or 1.0), f"{what} of a radius of {share:.2%} of the scene's diagonal")
 
 

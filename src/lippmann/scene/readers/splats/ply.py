@@ -9,7 +9,7 @@ with bounds of their own (PlayCanvas, "Compressed PLY format").
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,9 +41,9 @@ _UNUSED = ("nx", "ny", "nz")
 _PACKED = {"packed_position", "packed_rotation", "packed_scale", "packed_color"}
 
 _CHUNK = 256
-_CORNERS = [f"{end}_{axis}" for end in ("min", "max") for axis in "xyz"]
-_SCALES = [f"{end}_scale_{axis}" for end in ("min", "max") for axis in "xyz"]
-_COLORS = [f"{end}_{color}" for end in ("min", "max") for color in "rgb"]
+_CORNERS = ("min_x", "min_y", "min_z", "max_x", "max_y", "max_z")
+_SCALES = ("min_scale_x", "min_scale_y", "min_scale_z", "max_scale_x", "max_scale_y", "max_scale_z")
+_COLORS = ("min_r", "min_g", "min_b", "max_r", "max_g", "max_b")
 
 Rows = NDArray[np.void]
 Words = NDArray[np.uint32]
@@ -144,7 +144,7 @@ def _text_rows(words: list[bytes], count: int, kind: np.dtype[np.void], where: s
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def _floats(rows: Rows, names: list[str]) -> FloatArray:
+def _floats(rows: Rows, names: Sequence[str]) -> FloatArray:
     """``(n, len(names))`` float32."""
     values = np.empty((len(rows), len(names)), np.float32)
     for number, name in enumerate(names):
@@ -217,7 +217,7 @@ def _packed(rows: Mapping[str, Rows], where: str) -> tuple[Splats, tuple[str, ..
     ask_memory(len(vertex), count, where=where)
     own = np.arange(len(vertex)) // _CHUNK
 
-    def within(names: list[str], shares: FloatArray) -> FloatArray:
+    def within(names: Sequence[str], shares: FloatArray) -> FloatArray:
         """What lies at ``shares`` between the bounds of each splat's chunk."""
         bounds = _floats(chunk, names)
         low, high = bounds[:, :3][own], bounds[:, 3:][own]

@@ -1,4 +1,4 @@
-"""No command writes over a file that it reads: one check for all of them, before any work."""
+"""Files that commands write: none is one that the command reads, and what nobody named is named after its source."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from lippmann.errors import OutputError
+from lippmann.errors import LippmannError, OutputError
 
 #: Options that name what is written.
 _WRITTEN = frozenset({"--output", "--csv", "--map", "--maps", "--export", "--video"})
@@ -44,3 +44,29 @@ def _files(value: object) -> Iterator[Path]:
                     yield Path(each)
             except (OSError, ValueError):  # no file can have such a name
                 continue
+
+
+def output_of(given: Path | None, source: str | Path, ending: str) -> Path:
+    """The file to write: ``given``, or in the working folder the source's name with ``ending``, such as ``-seen.png``.
+
+    Raises
+    ------
+    OutputError
+        There is such a file already, and it is no picture of this program's.
+    """
+    if given is not None:
+        return given
+    path = Path(f"{Path(source).stem or 'picture'}{ending}")
+    # With a word in its name the file is this program's; a model's plain name may be that of its texture.
+    if ending.startswith(".") and path.exists() and not _is_ours(path):
+        raise OutputError("is there, and no picture of Lippmann's", where=str(path), fix="say -o FILE")
+    return path
+
+
+def _is_ours(path: Path) -> bool:
+    from lippmann.image import open_file
+
+    try:
+        return open_file(path).metadata is not None
+    except LippmannError:
+        return False
