@@ -230,13 +230,9 @@ def test_the_memory_that_is_left_bounds_a_picture_of_16384_pixels_a_side():
     head = struct.pack(">2I5B", 16384, 16384, 8, 2, 0, 0, 0)
     png = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", b"") + chunk(b"IEND", b"")
     limit = Pillow.MAX_IMAGE_PIXELS
-    try:
-        limit_inputs(1 << 30)
-        with pytest.raises(MemoryLimitError, match="16384 x 16384 pixels takes 2"), open_picture(io.BytesIO(png)):
-            pass
-        limit_inputs(4 << 30)
-        with open_picture(io.BytesIO(png)) as picture:
-            assert picture.size == (16384, 16384)
-    finally:
-        limit_inputs(None)
+    says = "16384 x 16384 pixels takes 2"
+    with limit_inputs(1 << 30), pytest.raises(MemoryLimitError, match=says), open_picture(io.BytesIO(png)):
+        pass
+    with limit_inputs(4 << 30), open_picture(io.BytesIO(png)) as picture:
+        assert picture.size == (16384, 16384)
     assert limit == Pillow.MAX_IMAGE_PIXELS

@@ -91,7 +91,7 @@ GROUPS: Mapping[str, Mapping[str, tuple[str, str, str]]] = {
         "doctor": (
             "system",
             "doctor",
-            "Check the rendering engine of this machine and say how to fix what is missing.",
+            "Check the rendering engine of this machine, say how to fix what is missing, and list plugins.",
         ),
         "worker": ("cluster", "worker", "Run a Dask worker for renders on a cluster, until its scheduler ends."),
         "reproduce": ("compare", "reproduce", "Reproduce the paper's tables and figures and write a report."),

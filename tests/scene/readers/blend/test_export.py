@@ -153,12 +153,9 @@ def test_a_world_that_is_missing_or_no_picture(give, blend):
 
 def test_a_huge_scene_is_refused_before_it_is_read(give, blend):
     give(triangle(), f"{TELL}\nwith (out / 'scene.glb').open('ab') as file:\n    file.truncate(1 << 38)")
-    limit_inputs(1 << 28)
-    try:
-        with pytest.raises(MemoryLimitError, match=r"^model\.blend: the file takes 256\.0 GiB of memory"):
-            read_blend(blend)
-    finally:
-        limit_inputs(None)
+    says = r"^model\.blend: the file takes 256\.0 GiB of memory"
+    with limit_inputs(1 << 28), pytest.raises(MemoryLimitError, match=says):
+        read_blend(blend)
 
 
 VALUES = st.recursive(

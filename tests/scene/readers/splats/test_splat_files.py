@@ -371,10 +371,7 @@ def test_what_unpacks_to_gigabytes_is_refused_before(tmp_path):
         archive.writestr("a", bytes(100 << 20))
     (tmp_path / "bomb.sog").write_bytes(stream.getvalue())
     (tmp_path / "bomb.ply").write_bytes(header(FLOATS, 10**12) + ROW.tobytes())
-    try:
-        machine.limit_inputs(64 << 20)
+    with machine.limit_inputs(64 << 20):
         for name in ("bomb.spz", "bomb.sog", "bomb.ply"):
             with pytest.raises(LippmannError, match=name):
                 load_scene(tmp_path / name)
-    finally:
-        machine.limit_inputs(None)
