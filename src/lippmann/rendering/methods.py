@@ -14,7 +14,7 @@ from lippmann.options.choices import Method
 from lippmann.rendering.adaptive.goal import Goal, goal_of
 from lippmann.rendering.adaptive.stopping import Outcome, reach
 from lippmann.rendering.adaptive.tuning import TUNING
-from lippmann.rendering.denoise.dual_buffer import Denoised, clean_light
+from lippmann.rendering.denoise.dual_buffer import Denoised, clean_light, remove_excess
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 from lippmann.rendering.denoise.outlines import exchange_coverage
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
@@ -236,7 +236,7 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     noisy = frame.pixels
     if frame.coverage is not None and (further := denoiser.coverage()) is not None:
         noisy = exchange_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)
-    cleaned = clean_light(noisy, frame.seen, denoiser, traced.samples)
+    cleaned = remove_excess(clean_light(noisy, frame.seen, denoiser, traced.samples), frame.excess)
     frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
     return replace(traced, options=_denoiser_options(denoiser), seconds={"denoise": denoiser.seconds})
 

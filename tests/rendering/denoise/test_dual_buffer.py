@@ -31,6 +31,7 @@ class Noise:
     blurred = None
     #: Of each half.
     of_seen = None
+    of_excess = None
     covered = None
 
     def shown(self, values):
@@ -41,6 +42,9 @@ class Noise:
 
     def seen_halves(self):
         return self.of_seen
+
+    def excess(self):
+        return self.of_excess
 
     def picture(self):
         return self._halves[0]
@@ -133,6 +137,33 @@ def test_seen_light_goes_past_the_denoiser(as_denoised):
     renderer.samples = 1
     alone = Denoised(renderer, denoise, "srgb").picture()
     assert alone[100, 100] == pytest.approx(renderer.truth[100, 100] + 5.0, rel=0.05)
+
+
+def test_what_rests_on_single_chains_is_left_out_and_still_counts_as_an_error():
+    renderer = Noise()
+    hits = [np.zeros_like(half) for half in renderer.traced_halves()]
+    for hit, half in zip(hits, renderer.traced_halves(), strict=True):
+        hit[50, 50] = 0.25
+        half += hit
+    hits[0][100, 100] = 3.0
+    renderer.traced_halves()[0][100, 100] += 3.0
+    renderer.of_seen = tuple(hits)
+    before = Denoised(renderer, blur, "srgb")
+    whole = before.picture()
+    renderer.of_excess = np.zeros_like(hits[0])
+    renderer.of_excess[100, 100] = 1.25
+    after = Denoised(renderer, blur, "srgb")
+    assert after.squared_error().values == pytest.approx(before.squared_error().values)
+    less = whole - after.picture()
+    assert less[100, 100] == pytest.approx(1.25, rel=1e-5)
+    assert after.picture()[100, 100] == pytest.approx(renderer.truth[100, 100] + 0.25, rel=0.1)
+    less[100, 100] = 0
+    assert np.abs(less).max() < 1e-6
+    renderer.samples = 1
+    alone = Denoised(renderer, blur, "srgb").picture()
+    assert alone[100, 100] == pytest.approx(renderer.truth[100, 100] + 1.75, rel=0.1)
+    renderer.of_excess[100, 100] = 9.0
+    assert Denoised(renderer, blur, "srgb").picture().min() == 0
 
 
 def test_an_emitter_in_a_narrow_lobe_does_not_light_the_pixels_beside_it():

@@ -295,6 +295,75 @@ def test_seen_light_is_told_apart_and_is_all_that_is_seen(all_events):
     assert 0.05 < share < 0.95
 
 
+@pytest.mark.long
+def test_what_one_chain_brings_beyond_a_limit_is_excess(all_events):
+    """Chain by chain, and of several chains together; colours keep their hue."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.device.kernel_ops import divide
+    from lippmann.device.sobol import SampleStream
+    from lippmann.rendering.transport.ray_source import PixelRays
+    from lippmann.rendering.transport.seen_light import seen_light
+
+    integrator, source = all_events
+    most, of_pixel, chains = 4.0, 64, 3
+
+    def told(number, per_lane):
+        pixel, sample = divide(dr.arange(mi.UInt32, SIDE * SIDE * number), number)
+        row, column = divide(pixel, SIDE)
+        stream = SampleStream.of_pixels(pixel, sample, dr.opaque(mi.UInt32, 1))
+        pixels = PixelRays(source, column, row, mi.UInt32(0))
+        light, excess, _ = seen_light(
+            integrator, pixels, stream, dr.opaque(mi.UInt32, per_lane), mi.Bool(True), dr.opaque(mi.Float, most)
+        )
+        return np.array(mi.Color3f(light)).T, np.array(mi.Color3f(excess)).T
+
+    light, excess = told(of_pixel * chains, 1)
+    brightest = light.max(axis=1, keepdims=True)
+    beyond = np.where(brightest > most, light * (1 - most / np.maximum(brightest, most)), 0)
+    assert (beyond.max(axis=1) > 0).sum() > 100
+    assert excess == pytest.approx(beyond, rel=1e-5, abs=1e-5)
+    # The chains of a lane are those of as many lanes.
+    together = [part.reshape(SIDE * SIDE, -1, 3).sum(axis=1) for part in told(of_pixel, chains)]
+    alone = [part.reshape(SIDE * SIDE, -1, 3).sum(axis=1) for part in (light, excess)]
+    assert together[0] == pytest.approx(alone[0], rel=1e-4, abs=1e-3)
+    assert together[1] == pytest.approx(alone[1], rel=1e-4, abs=1e-3)
+
+
+@pytest.mark.long
+def test_of_many_chains_each_counts_as_a_whole(all_events):
+    """The emitter is 15 times white: one of 8 chains counts up to 5.7 of that, one of 64 as a whole."""
+    import mitsuba as mi
+
+    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.film.wavefront import trace_frame
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
+    from lippmann.rendering.transport.seen_light import most_of_chain
+
+    assert 5 < most_of_chain(8.0) < 6
+    assert 20 < most_of_chain(64.0) < 30
+    integrator, source = all_events
+    four = chained(integrator, 4)
+    dim = four.lit_by(replace(four.light, gain=mi.Float(0.25)))
+    few = [FullInBatches(four, source, seed=seed, memory=1 << 30, for_denoiser=True) for seed in range(16)]
+    many, limited = (FullInBatches(each, source, seed=5, memory=1 << 30, for_denoiser=True) for each in (four, dim))
+    for each in few:
+        each.add(2)
+    many.add(16)
+    limited.add(2)
+    frame = trace_frame(dim, source, cut_wavefronts(SIDE, SIDE, 2, memory=2**30), seed=5, for_denoiser=True)
+    assert FullInBatches(integrator, source, memory=1 << 30).excess() is None
+    assert many.excess().max() == 0
+    assert limited.excess().max() == frame.excess.max() == 0  # the gain leaves less than 5.7
+    excess, seen = (np.stack([part(each) for each in few]) for part in (FullInBatches.excess, FullInBatches.seen))
+    bright = excess.max(axis=-1) > 0
+    assert 5 < bright.sum() < 0.01 * bright.size
+    assert np.all(excess <= seen * (1 + 1e-5))
+    # Of single hits, by one of a pixel's chains, is left what counts of them.
+    assert (seen - excess).max(axis=-1)[bright].min() == pytest.approx(most_of_chain(8.0) / 8, rel=0.1)
+
+
 def test_sky_at_outlines_stays_with_paths(engine):
     """Samples of both sides belong together: of a ball as bright as its sky nothing would be seen."""
     import mitsuba as mi

@@ -84,12 +84,7 @@ class Denoised:
 
     def picture(self) -> Floats:
         """``(H, W, 3)`` float32 linear RGB."""
-        if self._renderer.samples < 2:
-            # There are no halves, and nothing is known of the error.
-            return self._clean_picture()
-        _, (first, second) = self._clean_halves()
-        mean: Floats = np.float32(0.5) * (first + second)
-        return mean
+        return remove_excess(self._mean(), self._renderer.excess())
 
     def squared_error(self) -> PixelErrors:
         """Squared error of every pixel's code, as the halves judge each other."""
@@ -108,6 +103,14 @@ class Denoised:
             # Any hit may be.
             samples = replace(samples, outliers=np.float32(TUNING.untold_outliers) * np.maximum(samples.values, 0))
         return PixelErrors(common + apart, None, samples, apart, samples.blur)
+
+    def _mean(self) -> Floats:
+        if self._renderer.samples < 2:
+            # There are no halves, and nothing is known of the error.
+            return self._clean_picture()
+        _, (first, second) = self._clean_halves()
+        mean: Floats = np.float32(0.5) * (first + second)
+        return mean
 
     def _clean_picture(self) -> Floats:
         noisy, coverage = self._renderer.traced_picture(), self._coverages()
@@ -150,7 +153,7 @@ class Denoised:
 
     def _slope(self, noisy: tuple[Floats, Floats]) -> Floats:
         """By how much a pixel's code differs from that of the truth, per linear difference between the two."""
-        picture, transfer = self.picture(), self._transfer
+        picture, transfer = self._mean(), self._transfer
         slope = coding_slope(picture, transfer)
         shown = np.float32(0.5) * (noisy[0] + noisy[1])
         scatter = np.abs(noisy[0] - noisy[1]).mean(axis=2)
@@ -189,3 +192,11 @@ def clean_light(noisy: Floats, seen: Floats | None, denoise: Denoise, samples: i
     if (rest > limit).any():
         clean += np.where(clean - past >= np.float32(0.75) * limit, np.maximum(rest - limit, 0), np.float32(0))
     return clean
+
+
+def remove_excess(picture: Floats, excess: Floats | None) -> Floats:
+    """``picture`` without what of it rests on single chains of seen light, not below 0.
+
+    The error stays that of the mean of the halves, which is larger as a rule.
+    """
+    return picture if excess is None else np.maximum(picture - excess, np.float32(0))

@@ -55,6 +55,7 @@ class BatchedPicture:
         self._shape, self._transfer = shape, transfer
         self._sums = np.zeros((batches, pixels, 3), dtype=np.float32)
         self._seen = np.zeros((STREAMS, pixels, 3), dtype=np.float32) if keeps_seen else None
+        self._excess = np.zeros((1, pixels, 3), dtype=np.float32) if keeps_seen else None
         self._covered = np.zeros((STREAMS, pixels, channels), dtype=np.float32) if keeps_coverage else None
         #: Samples that each batch has of every pixel.
         self._taken = [0] * batches
@@ -108,6 +109,11 @@ class BatchedPicture:
             return None
         first, second = map(Coverage, self._means(list(self._covered)), self._per_stream())
         return first, second
+
+    def excess(self) -> Floats | None:
+        """What of :meth:`picture` rests on single chains of seen light, see
+        :mod:`lippmann.rendering.transport.seen_light`; None where that is not told, or not kept."""
+        return None if self._excess is None else self.shown(self._mean(self._excess))
 
     def _mean(self, sums: Floats) -> Floats:
         """Of all samples, whose sums lie in several parts."""
@@ -173,6 +179,7 @@ class BatchedPicture:
             kept = {
                 "radiance": (self._sums, batch),
                 "seen": (self._seen, batch // per_stream),
+                "excess": (self._excess, 0),
                 "covered": (self._covered, batch // per_stream),
             }
             for name, part in sums.items():

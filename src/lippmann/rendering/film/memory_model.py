@@ -23,8 +23,8 @@ MOST_BATCHES = 8
 PICTURE = 24
 #: The squared error of each pixel, its outliers' share and its blur.
 ERROR_MAPS = 12
-#: What a denoiser treats apart: seen light of two halves, and coverage of two halves by channels.
-FOR_DENOISER = 48
+#: What a denoiser treats apart: seen light of two halves, its excess, and coverage of two halves by channels.
+FOR_DENOISER = 60
 #: One emission of photons, which lands about once, with what sorting takes, in bytes.
 PHOTON = 128
 #: One ray from an emitter to a light vertex, with what it takes to trace it, in bytes.

@@ -117,13 +117,14 @@ class FullInBatches(BatchedPicture):
     def add(self, samples: int, progress: ProgressCallback = silent) -> None:
         """Take ``samples`` more of every pixel."""
         channels, pixels = self._source.channels, self._sums.shape[1]
+        together = self.samples + samples
         started, done, compiled = time.perf_counter(), 0, 0.0
         self._errors = None
         for integrator, stretch in _stretches(self._integrator, self.samples, samples):
             taken = list(self._taken)
             for run in self._runs(stretch):
                 with dr.scoped_set_flag(dr.JitFlag.KernelHistory, done == 0):
-                    sums = self._trace(integrator, run)
+                    sums = self._trace(integrator, run, together)
                     if done == 0:
                         compiled = compile_seconds()
                 self._keep(run, sums)
@@ -158,8 +159,9 @@ class FullInBatches(BatchedPicture):
                 strip = STRIP_ROWS * self._window.width
                 yield from cut_batches(pixels, batches, tuple(starts), count, lanes, strip)
 
-    def _trace(self, integrator: Integrator, run: Run) -> dict[str, Floats]:
-        """What :func:`~lippmann.rendering.film.wavefront.sum_samples` gives for a run.
+    def _trace(self, integrator: Integrator, run: Run, together: int) -> dict[str, Floats]:
+        """What :func:`~lippmann.rendering.film.wavefront.sum_samples` gives for a run; excess by the samples that every
+        pixel then has ``together``.
 
         Lanes are ordered pixel (see :mod:`.wavefront`), then channel, then batch, then sample. What differs from run
         to run is opaque to the compiler, so that all share a kernel.
@@ -183,7 +185,8 @@ class FullInBatches(BatchedPicture):
         stream = SampleStream.of_pixels(pixel * channels + channel, sample, seed)
         stream.half = stream_of
         pixels = PixelRays(self._source, column, row, channel, self._box_filter)
-        traced = sample_pixels(integrator, pixels, stream, self._covered is not None)
+        samples = None if self._covered is None else dr.opaque(mi.Float, together)
+        traced = sample_pixels(integrator, pixels, stream, samples)
         evaluate(traced, lanes, self.rays)
         sums = sum_samples(traced, channels, number, run.count)
         return {name: to_rows(part, window.width) for name, part in sums.items()} if run.in_strips else sums

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
-from lippmann.device.types import UInt32
+from lippmann.device.types import Float, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
 from lippmann.rendering.transport.integrator import Integrator, PixelSample
@@ -86,8 +86,8 @@ class Frame:
         Further layers ``(height, width)`` of the methods that have any.
     shares:
         How the pixels came about, as shares of all; empty where all were traced.
-    seen:
-        What of ``pixels`` is seen light; None where that is not told.
+    seen, excess:
+        What of ``pixels`` is seen light, and what of that rests on single chains; None where that is not told.
     coverage:
         How much of the pixels surfaces cover; None where that is not told.
     """
@@ -100,6 +100,7 @@ class Frame:
     maps: dict[str, NDArray[np.generic]] = field(default_factory=dict)
     shares: dict[str, float] = field(default_factory=dict)
     seen: NDArray[np.float32] | None = None
+    excess: NDArray[np.float32] | None = None
     coverage: Coverage | None = None
 
 
@@ -128,7 +129,8 @@ def trace_frame(
         lanes = tile.rows * plan.width * plan.channels * run.count
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, done == 0):
             pixels, stream = samples_of_tile(source, plan, tile, run, seed, box_filter, corner)
-            sample = sample_pixels(integrator, pixels, stream, for_denoiser)
+            samples = dr.opaque(mi.Float, plan.samples) if for_denoiser else None
+            sample = sample_pixels(integrator, pixels, stream, samples)
             evaluate(sample, lanes, frame.rays)
             sums = sum_samples(sample, plan.channels, 1, run.count)
             if done == 0:
@@ -141,7 +143,7 @@ def trace_frame(
             parts[name][tile.first_row : tile.first_row + tile.rows] += in_rows
         done += lanes
         progress(Progress("trace", done, plan.work))
-    frame.seen = parts.get("seen")
+    frame.seen, frame.excess = parts.get("seen"), parts.get("excess")
     frame.coverage = Coverage(parts["covered"], plan.samples) if "covered" in parts else None
     frame.seconds_trace = time.perf_counter() - started - frame.seconds_compile
     return frame
@@ -175,10 +177,13 @@ def samples_of_tile(
     return PixelRays(source, column, row, channel, box_filter), stream
 
 
-def sample_pixels(integrator: Integrator, pixels: PixelRays, stream: SampleStream, for_denoiser: bool) -> PixelSample:
-    """One sample of each lane's pixel; ``for_denoiser`` seen light and coverage are told apart, where that can be."""
+def sample_pixels(
+    integrator: Integrator, pixels: PixelRays, stream: SampleStream, samples: Float | None
+) -> PixelSample:
+    """One sample of each lane's pixel; seen light and coverage apart where the integrator tells them and ``samples``
+    are given, those of the pixel so far, these included."""
     if isinstance(integrator, PathIntegrator):
-        return sample_pixel(integrator, pixels, stream, mi.Bool(True), for_denoiser)
+        return sample_pixel(integrator, pixels, stream, mi.Bool(True), samples)
     return PixelSample(*integrator.sample(pixels.ray(stream), stream, mi.Bool(True)))
 
 
@@ -189,8 +194,9 @@ def evaluate(sample: PixelSample, lanes: int, totals: RayTotals) -> None:
     sample.radiance = dr.select(finite, radiance, mi.Color3f(0))
     if sample.seen is not None:
         sample.seen = dr.select(finite, sample.seen, mi.Color3f(0))
+        sample.excess = dr.select(finite, sample.excess, mi.Color3f(0))
     # All at once: a sum of an unevaluated radiance would run the path loop anew.
-    dr.eval(sample.radiance, sample.seen, sample.covered, counts.secondary, counts.shadow, finite)
+    dr.eval(sample.radiance, sample.seen, sample.excess, sample.covered, counts.secondary, counts.shadow, finite)
     totals.primary += lanes
     totals.secondary += lane_total(counts.secondary)
     totals.shadow += lane_total(counts.shadow)
@@ -203,7 +209,7 @@ def sum_samples(sample: PixelSample, channels: int, batches: int, count: int) ->
     Lanes are ordered pixel, channel, batch, sample.
     """
     sums: dict[str, NDArray[np.float32]] = {}
-    for name in ("radiance", "seen"):
+    for name in ("radiance", "seen", "excess"):
         light = getattr(sample, name)
         if light is not None:
             parts = [dr.block_sum(component, count) if count > 1 else component for component in light]

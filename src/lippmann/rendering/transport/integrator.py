@@ -34,13 +34,15 @@ class FirstHit:
 class PixelSample:
     """One sample of each lane's pixel.
 
-    ``seen`` is what of ``radiance`` is seen light: emitters and sky that are met by sharp events alone. ``covered`` is
-    1 where the primary ray meets a surface, else 0. Each is None where it is not told.
+    ``seen`` is what of ``radiance`` is seen light: emitters and sky that are met by sharp events alone. ``excess`` is
+    what of that rests on single chains. ``covered`` is 1 where the primary ray meets a surface, else 0. Each is None
+    where it is not told.
     """
 
     radiance: Spectrum
     counts: RayCounts
     seen: Spectrum | None = None
+    excess: Spectrum | None = None
     covered: Float | None = None
 
 

@@ -8,6 +8,11 @@ pixel meet them. They have no noise of transport, and a chain of sharp events is
 sampled along it, no photons are looked up, and it ends at the first rough surface. So chains through other points of
 the pixel stand for what a path would have met of such light: all meet the same by the same chances, so their mean has
 its expectation. Sky behind nothing stays with the path.
+
+Where one chain alone makes a pixel bright, it more likely had luck than that the pixel is that bright: what it brings
+beyond :func:`most_of_chain` is told apart as *excess*. A picture that leaves it out is darker where images of emitters
+were not found, and its error smaller (docs/research/seen-light.md). The limit grows with the chains of a pixel, so that
+with ever more of them nothing is left out.
 """
 
 from __future__ import annotations
@@ -18,7 +23,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.pbr.gltf_bsdf import SHARP_FIRST, SHARP_LOBE
-from lippmann.device.sobol import SampleStream, hash32, named_seed
+from lippmann.device.sobol import SampleStream, hash32
 from lippmann.device.syntax import syntax
 from lippmann.device.types import (
     Bool,
@@ -38,9 +43,10 @@ from lippmann.rendering.transport.path_vertex import LastVertex, Scattering, Ver
 from lippmann.rendering.transport.ray_source import PixelRays
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import follows_sharply, is_sharp
+from lippmann.rendering.transport.tuning import TUNING
 
 #: Tells the streams of chains from those of paths.
-_CHAINS = named_seed("chains of seen light")
+_CHAINS = 0x5EE21147
 #: Sample dimensions used at one vertex.
 _DIMENSIONS_PER_VERTEX = 2
 #: Sample dimension, from a vertex's first, of the emitter without size that is sampled there.
@@ -48,36 +54,53 @@ _EMITTER_DIMENSION = 1 << 24
 
 
 def sample_pixel(
-    integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, active: Bool, for_denoiser: bool = False
+    integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, active: Bool, samples: Float | None = None
 ) -> PixelSample:
     """One sample of ``pixel`` per lane; seen light by chains, where the integrator has them.
 
-    ``for_denoiser`` it is told apart, and so is coverage.
+    Where ``samples`` are given, those of the pixel so far, these included, it is told apart, and so is coverage.
     """
     ray = pixel.ray(stream)
     light = integrator.light
     if light.chains is None:
         radiance, counts, hit = integrator.sample_with_hit(ray, stream, active)
-        return PixelSample(radiance, counts, covered=_covered(hit) if for_denoiser else None)
+        return PixelSample(radiance, counts, covered=None if samples is None else _covered(hit))
     rest, counts, hit = integrator.sample_with_hit(ray, stream, active, without_seen=True)
-    seen, traced = seen_light(integrator, pixel, stream, light.chains, active)
-    seen *= dr.rcp(mi.Float(light.chains)) if light.gain is None else light.gain / mi.Float(light.chains)
+    chains = mi.Float(light.chains)
+    scale = dr.rcp(chains) if light.gain is None else light.gain / chains
+    most = None if samples is None else most_of_chain(samples * chains) / (scale * chains)
+    seen, excess, traced = seen_light(integrator, pixel, stream, light.chains, active, most)
+    seen *= scale
     counts = RayCounts(counts.secondary + traced.secondary, counts.shadow + traced.shadow)
-    if not for_denoiser:
+    if samples is None:
         return PixelSample(rest + seen, counts)
-    return PixelSample(rest + seen, counts, seen, _covered(hit))
+    return PixelSample(rest + seen, counts, seen, excess * scale, _covered(hit))
 
 
 def _covered(hit: FirstHit) -> Float:
     return dr.select(dr.isfinite(hit.distance), mi.Float(1), mi.Float(0))
 
 
+def most_of_chain(chains: Float) -> Float:
+    """Linear value, white being 1, up to which one of so many ``chains`` of a pixel counts."""
+    return TUNING.most_of_chain * chains**TUNING.most_power
+
+
 @syntax
 def seen_light(
-    integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, chains: UInt32, active: Bool
-) -> tuple[Spectrum, RayCounts]:
-    """Sum of the light that so many chains of each lane's pixel meet, before the gain; and the rays traced."""
+    integrator: PathIntegrator,
+    pixel: PixelRays,
+    stream: SampleStream,
+    chains: UInt32,
+    active: Bool,
+    most: Float | None = None,
+) -> tuple[Spectrum, Spectrum, RayCounts]:
+    """Sum of the light that so many chains of each lane's pixel meet, before the gain; and the rays traced.
+
+    Between them stands what of the sum is from single chains beyond ``most``.
+    """
     light = mi.Spectrum(0)
+    excess: Any = None if most is None else mi.Spectrum(0)
     takes_shadow_rays = len(integrator.without_size) > 0
     rays = mi.UInt32(0)
     shadow: Any = mi.UInt32(0) if takes_shadow_rays else None
@@ -87,17 +110,25 @@ def seen_light(
     tracing = active & (number < chains)
     # What does not change is no state: else Dr.Jit would record the loop a second time, without it.
     while dr.hint(
-        tracing, label="chains", exclude=[integrator, of_chains, pixel, stream, chains, first, takes_shadow_rays]
+        tracing, label="chains", exclude=[integrator, of_chains, pixel, stream, chains, first, most, takes_shadow_rays]
     ):
         further = of_chains.at(first + number)
         met, traced, tests = _chain(integrator, pixel.ray(further), further, stream.index, tracing)
-        light += dr.select(dr.isfinite(dr.sum(met)), met, 0)
+        met = dr.select(dr.isfinite(dr.sum(met)), met, 0)
+        light += met
+        if dr.hint(most is not None, mode="scalar"):
+            brightest = dr.max(met)
+            excess += dr.select(brightest > most, met * (1 - most / brightest), 0)
         rays += traced
         if dr.hint(takes_shadow_rays, mode="scalar"):
             shadow += tests
         number += 1
         tracing &= number < chains
-    return light, RayCounts(rays, shadow if takes_shadow_rays else mi.UInt32(0))
+    return (
+        light,
+        mi.Spectrum(0) if most is None else excess,
+        RayCounts(rays, shadow if takes_shadow_rays else mi.UInt32(0)),
+    )
 
 
 @syntax

@@ -17,6 +17,10 @@ class TransportTuning:
         Emitter samples at the first surface of a path that is not purely specular: ``early_emitter_samples`` in each of
         a pixel's first ``early_samples`` samples, then ``later_emitter_samples``. Powers of two keep all points
         stratified.
+    most_of_chain, most_power:
+        Linear value of a pixel, white being 1, up to which a chain of seen light counts that is its only one; of more
+        chains one counts for as much more as this power of their number says. Without the limit, primitives lose 1.5 dB
+        with 16 samples (docs/research/seen-light.md).
     least_cosine_angle:
         Radians between half vector and normal up to which a reflection is sharp: 2.5 times the width of the widest lobe
         that counts as narrow.
@@ -46,6 +50,8 @@ class TransportTuning:
     early_emitter_samples: int = 4
     later_emitter_samples: int = 2
     early_samples: int = 4
+    most_of_chain: float = 1.2
+    most_power: float = 0.75
     least_cosine_angle: float = 0.05
     small_emitter: float = 1e-3
     least_agreement: float = 0.7
