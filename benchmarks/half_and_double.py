@@ -1,5 +1,7 @@
 """What every tuned constant of ``rendering`` is worth: the PSNR of small pictures with half of it and with double.
 
+Time on two cores: an estimated half an hour for all packages.
+
 One field of a package's dataclass of tuned constants is set at a time, a few small scenes are rendered with few
 samples, and the PSNR of the pixels against long references is compared with that of the program as it is. A constant
 that moves nothing here is either for other scenes (its text says which), for statements of the error and for stopping

@@ -80,7 +80,7 @@ def test_bad_input_is_one_line_and_code_2(lippmann, picture, tmp_path):
         return outcome.err
 
     assert "--as" in refused("export", picture, "-o", out)
-    assert "unknown value 'hdf5'; known are hci, lftoolbox, eslf, zarr, views" in refused(
+    assert "unknown layout 'hdf5'; known are hci, lftoolbox, eslf, zarr, views" in refused(
         "export", picture, "--as=hdf5", "-o", out
     )
     assert "lftoolbox files end in .mat" in refused("export", picture, "--as=lftoolbox", "-o", tmp_path / "out.png")

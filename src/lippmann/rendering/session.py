@@ -43,6 +43,7 @@ from lippmann.scene.values.description import Matrix
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
     from lippmann.device.whitted.scene import BuiltClassic
+    from lippmann.options.placement import PlacementOptions
     from lippmann.rendering.film.wavefront import Frame
     from lippmann.rendering.transport.integrator import Integrator
     from lippmann.rendering.transport.ray_source import RaySource
@@ -116,14 +117,17 @@ class Session:
         """
         placement = self.find_place(display)
         self.face_viewer(rotation_of(placement.world_from_display))
-        return replace(placement, warnings=(*placement.warnings, *self._warn_of_cut(display, placement)))
+        if placement.may_cut is None:
+            return placement
+        warnings = *placement.warnings, *self._warn_of_cut(display, placement.may_cut, placement)
+        return replace(placement, warnings=warnings, may_cut=None)
 
-    def _warn_of_cut(self, display: Display, placement: Placement) -> tuple[str, ...]:
+    def _warn_of_cut(self, display: Display, options: PlacementOptions, placement: Placement) -> tuple[str, ...]:
         from lippmann.rendering.transport.cut_edges import find_cut_edges
 
-        options, where = placement.may_cut, (trimmed(display), placement.world_from_display, self.engine.threads)
-        cut = None if options is None else self.watch.stage("build", lambda: find_cut_edges(self.built, *where))
-        if options is None or cut is None:
+        where = trimmed(display), placement.world_from_display, self.engine.threads
+        cut = self.watch.stage("build", lambda: find_cut_edges(self.built, *where))
+        if cut is None:
             return ()
         sides = ", ".join(f"{side} {100 * share:.0f} %" for side, share in cut.shares.items())
         x, y, z = options.shift
