@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from eyes import lenses_seen_by
 
 from lippmann.display import load_display
 from lippmann.errors import DisplayError
 from lippmann.optics.correction import LensCorrection, parts_beside
-from lippmann.optics.seen import lenses_seen_by
 
 WIDE = "print:lpi=60,ppi=720,size=36x10mm,thickness=26mil,radius=0.2877mm"
 ROWS = 40

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from eyes import lenses_seen_by
 
 from lippmann.display import load_display
 from lippmann.errors import DisplayError
 from lippmann.optics.lens import Lens
 from lippmann.optics.light_table import light_table
-from lippmann.optics.seen import lenses_seen_by, pixel_shares
+from lippmann.optics.seen import pixel_shares
 
 SHEET = load_display("print:lpi=60,ppi=720,size=40x10mm,thickness=26mil")
 LENSES = np.arange(8.0, SHEET.lens_grid.columns - 8)

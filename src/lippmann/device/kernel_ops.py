@@ -83,9 +83,6 @@ def arrays_of(whole: object) -> list[object]:
 
 
 def _collect(value: object, found: list[object], seen: set[int], depth: int) -> None:
-    import drjit as dr
-    import mitsuba as mi
-
     if id(value) in seen or depth > _DEEPEST:
         return
     seen.add(id(value))

@@ -15,6 +15,7 @@ Geometry (display frame, millimetres, right-handed: origin at the array's centre
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -323,21 +324,22 @@ class Display:
 
     def pinhole_offset(self, dx: Array, dy: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
         """:meth:`pinhole_place` of a panel point: its offset from the lens's centre, or the level point of its axis."""
-        if self.distortion is None:
-            return dx, dy
-        if self.lens_array.layout != "lenticular":
-            return self.distortion.pinhole_place(dx, dy, ops)
-        across, along = self.lattice.across(dx, dy), self.lattice.along(dx, dy)
-        return self.lattice.from_axes(self.pinhole_place(across, ops), along)
+        return self._distorted(Distortion.pinhole_place, dx, dy, ops)
 
     def panel_offset(self, dx: Array, dy: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
-        """The inverse of :meth:`pinhole_offset`: what lies along a cylinder stays."""
+        """The inverse of :meth:`pinhole_offset`."""
+        return self._distorted(Distortion.place, dx, dy, ops)
+
+    def _distorted(
+        self, way: Callable[..., tuple[Array, Array]], dx: Array, dy: Array, ops: ArrayOps
+    ) -> tuple[Array, Array]:
+        """An offset by one of the distortion's two ways; what lies along a cylinder stays."""
         if self.distortion is None:
             return dx, dy
         if self.lens_array.layout != "lenticular":
-            return self.distortion.place(dx, dy, ops)
+            return way(self.distortion, dx, dy, ops)
         across, along = self.lattice.across(dx, dy), self.lattice.along(dx, dy)
-        return self.lattice.from_axes(self.place(across, ops), along)
+        return self.lattice.from_axes(way(self.distortion, across, 0.0 * across, ops)[0], along)
 
     def project(
         self, px: Array, py: Array, pz: Array, i: Array, j: Array, ops: ArrayOps = NUMPY

@@ -197,10 +197,11 @@ class IntegralImage(Picture):
         Parameters, defaults and errors are those of :func:`lippmann.viewing.replay.replay`; with ``optics`` those of
         :func:`lippmann.viewing.optical_replay.replay_optics`, which takes the place of ``filter`` and ``subpixels``.
         """
-        from lippmann.viewing.optical_replay import replay_optics
         from lippmann.viewing.replay import replay
 
         if optics:
+            from lippmann.viewing.optical_replay import replay_optics
+
             if (filter, subpixels) != ("nearest", None):
                 rule = "the lens says which sub-pixels are seen, and how much of each"
                 parameter = "subpixels" if filter == "nearest" else "filter"

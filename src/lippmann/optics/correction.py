@@ -30,9 +30,6 @@ PARTS = 2
 #: Steps of FISTA: 15 are within 0.1 dB of 200.
 _STEPS = 15
 
-#: Rows by which a correction is judged.
-_ROWS_TOLD = 64
-
 #: Relative errors of radius, thickness and index whose cost is told.
 TOLERANCE = 0.03
 
@@ -100,11 +97,9 @@ class LensCorrection:
         return float(np.mean(squares))
 
     def told(self, pixels: Floats, parts: Sequence[Floats]) -> tuple[dict[str, object], str]:
-        """What a file says of corrected ``pixels``, and a line for people, by the rows about the middle."""
-        top = max(0, (len(pixels) - _ROWS_TOLD) // 2)
-        rows = slice(top, top + _ROWS_TOLD)
-        gains = self.gains(pixels[rows], [part[rows] for part in parts])
-        limited = float(np.mean((pixels[rows] <= 0.0) | (pixels[rows] >= 1.0)))
+        """What a file says of corrected ``pixels``, and a line for people."""
+        gains = self.gains(pixels, parts)
+        limited = float(np.mean((pixels <= 0.0) | (pixels >= 1.0)))
         options: dict[str, object] = {"correct": "lens", "correction_limited": limited}
         options |= {f"correction_gain_{name}": gain for name, gain in gains.items()}
         worst = min(("radius", "thickness", "index"), key=lambda name: gains[name])

@@ -91,9 +91,3 @@ def pixel_shares(display: Display, lens: Real, slopes: Real, offset: float = 0.0
     if len(lit_places):
         shares, first = shares[:, lit_places[0] : lit_places[-1] + 1], first + lit_places[0]
     return PixelShares(first, np.ascontiguousarray(shares))
-
-
-def lenses_seen_by(display: Display, eye: tuple[float, float, float], lens: Real, offset: float = 0.0) -> PixelShares:
-    """:func:`pixel_shares` of lenses in the directions of an eye at ``(x, y, z)`` mm in the display's frame."""
-    axis = display.lattice.origin_x + lens * display.lattice.pitch
-    return pixel_shares(display, lens, (eye[0] - axis) / eye[2], offset)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,17 +26,22 @@ from lippmann.image import IntegralImage, Provenance
 from lippmann.image.metadata import Metadata
 from lippmann.image.stored_values import FloatArray
 from lippmann.image.write import write_rows
-from lippmann.optics.correction import LensCorrection, parts_beside
 from lippmann.options.choices import Correction
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import Quilt
 from lippmann.runtime.engine_lock import cached_property
+
+if TYPE_CHECKING:
+    from lippmann.optics.correction import LensCorrection
 
 Real = NDArray[np.float64]
 ViewChoice = Literal["nearest", "linear"]
 
 #: Pixels per block, with some 50 arrays of this length; and pixels of the views that are made linear for a block.
 _BLOCK, _VIEW_BLOCK = 1 << 18, 1 << 24
+
+#: Rows about the middle of a picture by which its correction is judged.
+_ROWS_TOLD = 64
 
 #: Tolerance of aspect ratios: relative error that rounding in names and panel sizes causes.
 ASPECT_TOLERANCE = 0.02
@@ -178,12 +183,15 @@ class Weaving:
         """What a file says of the correction, and lines for people: of the rows about the middle."""
         if self._correction is None:
             return {}, ()
-        middle = self.display.panel.height // 2
-        parts = self._parts(max(0, middle - 32), min(self.display.panel.height, middle + 32))
+        height = self.display.panel.height
+        first = max(0, (height - _ROWS_TOLD) // 2)
+        parts = self._parts(first, min(height, first + _ROWS_TOLD))
         options, note = self._correction.told(self._correction.rows(parts), parts)
         return options, (note,)
 
     def _parts(self, first: int, last: int) -> list[FloatArray]:
+        from lippmann.optics.correction import parts_beside
+
         return [
             weave_window(self.quilt, self.display, self.choice, (first, last), None, beside)
             for beside in parts_beside(subpixels=self._has_subpixels)
@@ -195,7 +203,11 @@ class Weaving:
 
     @cached_property
     def _correction(self) -> LensCorrection | None:
-        return None if self.correct == "none" else LensCorrection(self.display, self._has_subpixels)
+        if self.correct == "none":
+            return None
+        from lippmann.optics.correction import LensCorrection
+
+        return LensCorrection(self.display, self._has_subpixels)
 
 
 def weave_provenance(

@@ -16,7 +16,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import Field, dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 import typer
 
@@ -26,10 +26,6 @@ from lippmann.options.choices import REUSING
 from lippmann.options.forms import LEFT_OUT, REUSES_NOTHING, Form
 from lippmann.options.option import Option, Options, default_of, kinds_of, options_of
 from lippmann.options.quality import MachineOptions
-
-if TYPE_CHECKING:
-    import typer
-
 
 T = TypeVar("T", bound=Options)
 
@@ -216,8 +212,6 @@ _makers: list[Callable[[], typer.Typer]] = []
 @cache
 def _options() -> Mapping[str, str]:
     """Options by the names of their parameters, of all commands; arguments by theirs, in capitals."""
-    import typer
-
     names: dict[str, str] = {}
     for command in (each for make in _makers for each in _commands(typer.main.get_command(make()))):
         for parameter in command.params:

@@ -45,7 +45,7 @@ class EstimateTuning:
     few:
         Pixels that one micro-image has fewer than the usual one count so many times, for its error to be another one.
     lean:
-        Pixels' worth of belief that a micro-image is as noisy as others.
+        Weight, in pixels, of the prior that a micro-image is as noisy as others.
     draws:
         Micro-images that may be the worst are drawn this many times.
     """
