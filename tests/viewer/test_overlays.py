@@ -8,7 +8,7 @@ import pytest
 from lippmann.display import Display, LensArray, Panel
 from lippmann.image import IntegralImage, Provenance
 from lippmann.metrics.error_image import BRIGHTEST, SCALE, in_false_color
-from lippmann.rendering.reprojection.common.point_image import INTERPOLATED, REPROJECTED, TRACED
+from lippmann.rendering.reprojection.point_image import INTERPOLATED, REPROJECTED, TRACED
 from lippmann.viewer.overlays import overlays
 from lippmann.viewer.tiles import Tiles
 from lippmann.viewing.diagnostic_maps import EMPTY_CODE

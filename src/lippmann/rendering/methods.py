@@ -25,7 +25,7 @@ from lippmann.rendering.film.wavefront import Frame, trace_frame
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.job import Job, Traced
 from lippmann.rendering.light_statements import is_among_mirrors
-from lippmann.rendering.reprojection.common.point_image import STATUS_LAYER, TRACED
+from lippmann.rendering.reprojection.point_image import STATUS_LAYER, TRACED
 from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.transport.integrator import ReusableIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays

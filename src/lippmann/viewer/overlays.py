@@ -13,7 +13,7 @@ from lippmann.color.transfer import quantize
 from lippmann.image import Picture
 from lippmann.metrics.error_image import BRIGHTEST, SCALE, in_false_color
 from lippmann.rendering.estimate.psnr import ERROR_LAYER
-from lippmann.rendering.reprojection.common.point_image import INTERPOLATED, REPROJECTED, STATUS_LAYER, TRACED
+from lippmann.rendering.reprojection.point_image import INTERPOLATED, REPROJECTED, STATUS_LAYER, TRACED
 from lippmann.viewing.diagnostic_maps import EMPTY_CODE, INTERPOLATED_CODE, REPROJECTED_CODE, TRACED_CODE
 
 Codes = NDArray[np.uint8]

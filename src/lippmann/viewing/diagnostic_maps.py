@@ -15,7 +15,7 @@ from lippmann.image import IntegralImage
 from lippmann.metrics import Comparison
 from lippmann.metrics.error_image import BRIGHTEST, in_false_color
 from lippmann.rendering.estimate.psnr import ERROR_LAYER
-from lippmann.rendering.reprojection.common.point_image import INTERPOLATED, REPROJECTED, STATUS_LAYER, TRACED
+from lippmann.rendering.reprojection.point_image import INTERPOLATED, REPROJECTED, STATUS_LAYER, TRACED
 from lippmann.runtime.atomic_write import replacing_folder
 from lippmann.viewing.replay import default_size, replay
 

@@ -8,9 +8,9 @@ from PIL import Image as Pillow
 
 import lippmann
 from lippmann.display import Display, LensArray, Panel
+from lippmann.display.seen_pixels import EyeMap
 from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.live.eye_preview import render_eye_preview
-from lippmann.rendering.live.seen_pixels import EyeMap
 from lippmann.rendering.request.render_request import RenderRequest
 
 pytestmark = pytest.mark.usefixtures("engine")

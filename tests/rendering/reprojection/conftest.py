@@ -28,7 +28,7 @@ class FlatTracer:
     calls: list = field(default_factory=list)
 
     def trace(self, numbers, points):
-        from lippmann.rendering.reprojection.common.point_image import BACKGROUND, TRACED
+        from lippmann.rendering.reprojection.point_image import BACKGROUND, TRACED
 
         display = self.display
         self.calls.append(np.array(numbers))
@@ -58,7 +58,7 @@ class FlatTracer:
 
     def full(self):
         """The whole picture traced."""
-        from lippmann.rendering.reprojection.common.point_image import PointImage
+        from lippmann.rendering.reprojection.point_image import PointImage
 
         height, width = self.display.panel.height, self.display.panel.width
         points = PointImage.empty(height, width)

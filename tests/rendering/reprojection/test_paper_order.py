@@ -47,8 +47,8 @@ class Scripted:
 
 def make(display, tracer, method="lens_view"):
     """The finished points, and how many pixels were reported as traced."""
-    from lippmann.rendering.reprojection.common.point_image import PointImage
     from lippmann.rendering.reprojection.paper_order import PaperOrder
+    from lippmann.rendering.reprojection.point_image import PointImage
     from lippmann.runtime.row_threads import Bands
 
     points = PointImage.empty(display.panel.height, display.panel.width)
@@ -219,9 +219,9 @@ def test_a_single_micro_image():
 )
 @settings(max_examples=300, deadline=None)
 def test_there_and_back_is_the_pixel(name, place, height, in_front):
-    from lippmann.rendering.reprojection.common.lens_map import LensField
-    from lippmann.rendering.reprojection.common.point_image import MISSED, REPROJECTED, TRACED, PointImage
+    from lippmann.display.lens_field import LensField
     from lippmann.rendering.reprojection.paper_order import _carry
+    from lippmann.rendering.reprojection.point_image import MISSED, REPROJECTED, TRACED, PointImage
 
     display = DISPLAYS[name]
     field = LensField.of(display)
@@ -269,7 +269,7 @@ def test_there_and_back_is_the_pixel(name, place, height, in_front):
 )
 @settings(max_examples=300, deadline=None)
 def test_points_move_as_the_display_projects_them(name, place, height, in_front, to):
-    from lippmann.rendering.reprojection.common.lens_map import LensField
+    from lippmann.display.lens_field import LensField
 
     display = DISPLAYS[name]
     field = LensField.of(display)

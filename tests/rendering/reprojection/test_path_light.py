@@ -46,7 +46,7 @@ def full(scenes):
 
 def means_of_lenses(image):
     """Mean colour of each micro-image, ``(lenses, 3)``, and its pixels."""
-    from lippmann.rendering.reprojection.common.lens_map import LensField
+    from lippmann.display.lens_field import LensField
 
     lens = LensField.of(image.display).lens.ravel()
     counts = np.bincount(lens)

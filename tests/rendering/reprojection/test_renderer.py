@@ -93,7 +93,7 @@ def test_with_care_every_micro_image_is_right(case, name, method):
 @pytest.mark.parametrize("preset", ["mla-square", "mla-hexagonal"])
 @pytest.mark.parametrize(("name", "method"), [("tree", "lens-view"), ("tree", "interpolated"), ("gears", "lens-view")])
 def test_with_care_every_micro_image_of_an_array_is_right(case, name, method, preset):
-    from lippmann.rendering.reprojection.common.lens_map import LensField
+    from lippmann.display.lens_field import LensField
 
     chosen = case(name, 255, 260, preset)
     frame, full = chosen.reused(method), chosen.full()
@@ -121,7 +121,7 @@ def test_without_care_few_pixels_are_traced(case, name, method):
 @pytest.mark.parametrize("method", ["lens-view", "interpolated"])
 @pytest.mark.parametrize(("careful", "samples"), [(True, 1), (False, 1), (False, 3)])
 def test_traced_pixels_equal_the_full_renderer_s(case, method, careful, samples):
-    from lippmann.rendering.reprojection.common.point_image import TRACED
+    from lippmann.rendering.reprojection.point_image import TRACED
 
     chosen = case("primitives")
     frame, full = chosen.reused(method, careful, samples), chosen.full(samples)

@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from lippmann.display import Display
+from lippmann.display.seen_pixels import EyeMap, Vector
 from lippmann.options.choices import POOLED_LIGHT, PROPERTIES
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import denoise
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.live.develop import arrange
-from lippmann.rendering.live.seen_pixels import EyeMap, Vector
 from lippmann.rendering.picture import placed_options
 from lippmann.rendering.preview import Preview
 from lippmann.rendering.request.plan import BUDGET, resolve

@@ -15,11 +15,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.frozen_kernel import Frozen, aligned
 from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
 from lippmann.device.types import Array, Float, Float64, Ray3f, UInt32
 from lippmann.display import Display
-from lippmann.rendering.live.seen_pixels import PixelSet
-from lippmann.rendering.reprojection.common.frozen_kernel import Frozen, aligned
+from lippmann.display.seen_pixels import PixelSet
 from lippmann.rendering.transport.first_surface import Surfaces
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays, opaque_rows, world_ray_by

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
+from lippmann.display.seen_pixels import PixelSet
 from lippmann.rendering.denoise.noisy_blend import weigh_samples
 from lippmann.rendering.denoise.oidn import denoise
 from lippmann.rendering.film.batched_picture import STREAMS
 from lippmann.rendering.live.develop import arrange, develop, develop_picture
 from lippmann.rendering.live.live_tracer import Lanes, PlacedDisplay
 from lippmann.rendering.live.live_view import LiveFrame, LiveView
-from lippmann.rendering.live.seen_pixels import PixelSet
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import machine
 from lippmann.runtime.engine_lock import exclusive

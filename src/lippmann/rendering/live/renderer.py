@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
+from lippmann.display.seen_pixels import EyeMap, PixelSet, window_pixels
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.choices import POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.live.develop import develop
 from lippmann.rendering.live.live_view import LiveFrame, LiveView
-from lippmann.rendering.live.seen_pixels import EyeMap, PixelSet, window_pixels
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session

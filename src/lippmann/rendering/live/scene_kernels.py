@@ -9,11 +9,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lippmann.device.pbr.emitter_updates import EmitterUpdates
 from lippmann.display import Display
 from lippmann.options.light import LightOptions
 from lippmann.rendering.film.memory_model import BYTES_PER_LANE, PREFERRED_LANES, SMALLEST_LANES
-from lippmann.rendering.live.emitter_updates import EmitterUpdates
-from lippmann.rendering.live.hull_bounds import bounds_by_hull
 from lippmann.rendering.live.live_tracer import FeatureTracer, LiveIntegrator, LiveTracer
 from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
 from lippmann.rendering.preparation.pilot import make_light_sampler, trace_pilot
@@ -24,6 +23,7 @@ from lippmann.rendering.transport.first_surface import make_surfaces
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.prepared_light import PreparedLight
 from lippmann.rendering.transport.ray_source import DisplayRays
+from lippmann.scene.hull_bounds import bounds_by_hull
 from lippmann.scene.placement import Placement
 
 if TYPE_CHECKING:

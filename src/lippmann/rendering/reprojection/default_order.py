@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from lippmann.display import Display
-from lippmann.rendering.reprojection.arrays.backward_warp import BackwardWarp
-from lippmann.rendering.reprojection.common.averaging import average_neighbors
-from lippmann.rendering.reprojection.common.lens_map import LensField
-from lippmann.rendering.reprojection.common.missed_runs import bridge, thin_out
-from lippmann.rendering.reprojection.common.pixel_tracer import Pixels, PixelTracer
-from lippmann.rendering.reprojection.common.point_image import MISSED, WANTED, PointImage
-from lippmann.rendering.reprojection.common.schedule import Lenses, odd_and_even, refine
-from lippmann.rendering.reprojection.common.thresholds import Rules
-from lippmann.rendering.reprojection.lenticular.forward_warp import ForwardWarp
-from lippmann.rendering.reprojection.retrace.adaptive_retrace import choose_neighborhoods, search
+from lippmann.display.lens_field import LensField
+from lippmann.rendering.reprojection.averaging import average_neighbors
+from lippmann.rendering.reprojection.backward_warp import BackwardWarp
+from lippmann.rendering.reprojection.forward_warp import ForwardWarp
+from lippmann.rendering.reprojection.missed_runs import bridge, thin_out
+from lippmann.rendering.reprojection.pixel_tracer import Pixels, PixelTracer
+from lippmann.rendering.reprojection.point_image import MISSED, WANTED, PointImage
+from lippmann.rendering.reprojection.rules import Rules
+from lippmann.rendering.reprojection.schedule import Lenses, odd_and_even, refine
+from lippmann.rendering.reprojection.search import choose_neighborhoods, search
 from lippmann.runtime.row_threads import Bands
 
 

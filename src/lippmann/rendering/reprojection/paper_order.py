@@ -6,12 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.rendering.reprojection.common.array_types import IntArray
-from lippmann.rendering.reprojection.common.averaging import average_neighbors
-from lippmann.rendering.reprojection.common.lens_map import LensField
-from lippmann.rendering.reprojection.common.pixel_tracer import Pixels, PixelTracer
-from lippmann.rendering.reprojection.common.point_image import BACKGROUND, MISSED, REPROJECTED, PointImage
-from lippmann.rendering.reprojection.common.thresholds import Rules, nearer
+from lippmann.display.lens_field import LensField
+from lippmann.rendering.reprojection.averaging import average_neighbors
+from lippmann.rendering.reprojection.pixel_tracer import Pixels, PixelTracer
+from lippmann.rendering.reprojection.point_image import BACKGROUND, MISSED, REPROJECTED, IntArray, PointImage
+from lippmann.rendering.reprojection.rules import Rules, nearer
 from lippmann.runtime.numba_jit import uncounted
 from lippmann.runtime.row_threads import Bands
 

@@ -12,17 +12,17 @@ from lippmann.color.transfer import Transfer
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.memory_model import PICTURE, POINT_IMAGE, SMALLEST_LANES, lanes_within
 from lippmann.rendering.film.wavefront import Frame
-from lippmann.rendering.reprojection.common.pixel_tracer import PixelTracer
-from lippmann.rendering.reprojection.common.point_image import (
+from lippmann.rendering.reprojection.default_order import DefaultOrder
+from lippmann.rendering.reprojection.paper_order import PaperOrder
+from lippmann.rendering.reprojection.pixel_tracer import PixelTracer
+from lippmann.rendering.reprojection.point_image import (
     INTERPOLATED,
     REPROJECTED,
     STATUS_LAYER,
     TRACED,
     PointImage,
 )
-from lippmann.rendering.reprojection.common.thresholds import choose_rules
-from lippmann.rendering.reprojection.default_order import DefaultOrder
-from lippmann.rendering.reprojection.paper_order import PaperOrder
+from lippmann.rendering.reprojection.rules import choose_rules
 from lippmann.rendering.transport.integrator import ReusableIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays
 from lippmann.runtime.row_threads import Bands
@@ -68,7 +68,7 @@ def trace_reused(
     Returns
     -------
     Frame
-        With the layer ``status`` ((H, W) int8: :data:`~lippmann.rendering.reprojection.common.point_image.TRACED`,
+        With the layer ``status`` ((H, W) int8: :data:`~lippmann.rendering.reprojection.point_image.TRACED`,
         ``REPROJECTED`` or ``INTERPOLATED``), and the shares of pixels that were ``traced``, ``reprojected`` and
         ``interpolated``.
 

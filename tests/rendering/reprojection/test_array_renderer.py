@@ -36,7 +36,7 @@ def disc(x0, y0, radius):
 
 
 def rules(careful=True, **others):
-    from lippmann.rendering.reprojection.common.thresholds import Rules
+    from lippmann.rendering.reprojection.rules import Rules
 
     if careful:
         return Rules(True, 0.06, False, probe_rows=4, probe_stride=16, run_step=3)._replace(**others)
@@ -44,8 +44,8 @@ def rules(careful=True, **others):
 
 
 def make(display, tracer, the_rules, method="lens_view", threads=1, searching=False):
-    from lippmann.rendering.reprojection.common.point_image import PointImage
     from lippmann.rendering.reprojection.default_order import DefaultOrder
+    from lippmann.rendering.reprojection.point_image import PointImage
     from lippmann.runtime.row_threads import Bands
 
     points = PointImage.empty(display.panel.height, display.panel.width)
@@ -174,7 +174,7 @@ def test_surfaces_do_not_mix(name, flat_tracer, sheet):
 
 
 def test_probes_come_to_every_row_and_column():
-    from lippmann.rendering.reprojection.arrays.backward_warp import scatter_shift
+    from lippmann.rendering.reprojection.backward_warp import scatter_shift
 
     for stride in range(2, 80):
         shift = scatter_shift(stride)
@@ -184,7 +184,7 @@ def test_probes_come_to_every_row_and_column():
 
 def test_what_memory_held_before_counts_for_nothing(flat_tracer, sheet, monkeypatch):
     """Depths that no source gives are not set; they may be no numbers."""
-    from lippmann.rendering.reprojection.arrays import backward_warp as arrays
+    from lippmann.rendering.reprojection import backward_warp as arrays
 
     gather = arrays.gather.py_func
     memory = SimpleNamespace(empty=lambda shape: np.full(shape, np.nan))
@@ -210,10 +210,10 @@ def test_threads_change_nothing(name, flat_tracer, sheet):
 
 def test_a_point_behind_what_probes_have_met_is_not_taken(flat_tracer, sheet):
     """A wall seen by all lenses, but the probes of one lens have met something nearer there."""
-    from lippmann.rendering.reprojection.arrays.backward_warp import Gathering, gather, probed_limit
-    from lippmann.rendering.reprojection.arrays.epipolar_march import mark_nearest
-    from lippmann.rendering.reprojection.common.lens_map import LensField
-    from lippmann.rendering.reprojection.common.point_image import MISSED, REPROJECTED, TRACED, WANTED
+    from lippmann.display.lens_field import LensField
+    from lippmann.rendering.reprojection.backward_warp import Gathering, gather, probed_limit
+    from lippmann.rendering.reprojection.epipolar_march import mark_nearest
+    from lippmann.rendering.reprojection.point_image import MISSED, REPROJECTED, TRACED, WANTED
 
     display = DISPLAYS["square"]
     field = LensField.of(display)
@@ -246,10 +246,10 @@ def test_a_point_behind_what_probes_have_met_is_not_taken(flat_tracer, sheet):
 
 @pytest.mark.parametrize(("apart", "careful", "taken"), [(0.02, True, True), (0.3, True, False), (0.3, False, True)])
 def test_care_does_not_gather_what_the_sources_dispute(apart, careful, taken, flat_tracer, sheet):
-    from lippmann.rendering.reprojection.arrays.backward_warp import Gathering, gather
-    from lippmann.rendering.reprojection.arrays.epipolar_march import mark_nearest
-    from lippmann.rendering.reprojection.common.lens_map import LensField
-    from lippmann.rendering.reprojection.common.point_image import MISSED, REPROJECTED, WANTED
+    from lippmann.display.lens_field import LensField
+    from lippmann.rendering.reprojection.backward_warp import Gathering, gather
+    from lippmann.rendering.reprojection.epipolar_march import mark_nearest
+    from lippmann.rendering.reprojection.point_image import MISSED, REPROJECTED, WANTED
 
     field = LensField.of(DISPLAYS["square"])
     points = flat_tracer(DISPLAYS["square"], [], sky=(0.2, 0.2, 0.2)).full()
@@ -270,9 +270,9 @@ def test_care_does_not_gather_what_the_sources_dispute(apart, careful, taken, fl
 
 @pytest.mark.parametrize(("shown", "missing"), [(-0.05, True), (-0.2, False), (0.1, False), (0.3, False)])
 def test_a_traced_point_is_missing_beside_unless_something_hides_it(shown, missing, flat_tracer, sheet):
-    from lippmann.rendering.reprojection.common.lens_map import LensField
-    from lippmann.rendering.reprojection.common.point_image import REPROJECTED, TRACED
-    from lippmann.rendering.reprojection.retrace.region_growing import follow_points
+    from lippmann.display.lens_field import LensField
+    from lippmann.rendering.reprojection.point_image import REPROJECTED, TRACED
+    from lippmann.rendering.reprojection.search import follow_points
 
     field = LensField.of(DISPLAYS["square"])
     points = flat_tracer(DISPLAYS["square"], [sheet(-30.0, soft)]).full()
@@ -295,7 +295,7 @@ def test_a_traced_point_is_missing_beside_unless_something_hides_it(shown, missi
 @pytest.mark.long_cases("slanted")
 @pytest.mark.parametrize("name", DISPLAYS)
 def test_only_even_micro_images_are_interpolated(name, flat_tracer, sheet):
-    from lippmann.rendering.reprojection.common.lens_map import LensField
+    from lippmann.display.lens_field import LensField
 
     display = DISPLAYS[name]
     tracer = flat_tracer(display, [sheet(2.5, soft, disc(0, 0, 30)), sheet(-40.0, soft)])
@@ -309,7 +309,7 @@ def test_only_even_micro_images_are_interpolated(name, flat_tracer, sheet):
 
 def test_the_mean_of_corresponding_pixels(flat_tracer, sheet):
     """A plane so near to the lens plane that every lens sees other points of it, one colour for each lens."""
-    from lippmann.rendering.reprojection.common.lens_map import LensField
+    from lippmann.display.lens_field import LensField
 
     display = DISPLAYS["square"]
     values = np.linspace(0.1, 0.8, 12)
@@ -345,14 +345,14 @@ def test_with_care_neighbors_that_disagree_are_traced(flat_tracer, sheet):
 
 @pytest.mark.parametrize("name", DISPLAYS)
 def test_reach_is_the_longest_stretch_of_one_lens_in_a_row(name):
-    from lippmann.rendering.reprojection.common.lens_map import LensField
+    from lippmann.display.lens_field import LensField
 
     field = LensField.of(DISPLAYS[name])
     assert field.reach == max(len(list(pixels)) for row in field.lens for _, pixels in groupby(row))
 
 
 def test_corresponding_pixels_lie_at_the_same_place():
-    from lippmann.rendering.reprojection.common.lens_map import LensField
+    from lippmann.display.lens_field import LensField
 
     field = LensField.of(DISPLAYS["square"])
     numbers = np.arange(96 * 96)

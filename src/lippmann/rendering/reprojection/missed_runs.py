@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from lippmann.rendering.reprojection.common.array_types import IntArray
-from lippmann.rendering.reprojection.common.point_image import BRIDGED, REPROJECTED, WANTED, PointImage
-from lippmann.rendering.reprojection.common.thresholds import Rules, alike, color_difference
-from lippmann.rendering.reprojection.common.tuning import TUNING
+from lippmann.rendering.reprojection.point_image import BRIDGED, REPROJECTED, WANTED, IntArray, PointImage
+from lippmann.rendering.reprojection.rules import Rules, alike, color_difference
+from lippmann.rendering.reprojection.tuning import TUNING
 from lippmann.runtime.numba_jit import uncounted
 
 

@@ -9,17 +9,16 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.frozen_kernel import Frozen, aligned
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
 from lippmann.device.types import Array, Float, Ray3f, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.batched_picture import STREAMS
 from lippmann.rendering.film.wavefront import RayTotals, compile_seconds
-from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray, RealArray
-from lippmann.rendering.reprojection.common.frozen_kernel import Frozen, aligned
-from lippmann.rendering.reprojection.common.point_image import BACKGROUND, TRACED, PointImage
-from lippmann.rendering.reprojection.common.thresholds import alike, nearer
-from lippmann.rendering.reprojection.common.tuning import TUNING
+from lippmann.rendering.reprojection.point_image import BACKGROUND, TRACED, BoolArray, IntArray, PointImage, RealArray
+from lippmann.rendering.reprojection.rules import alike, nearer
+from lippmann.rendering.reprojection.tuning import TUNING
 from lippmann.rendering.transport.integrator import ReusableIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays
 from lippmann.runtime.numba_jit import uncounted

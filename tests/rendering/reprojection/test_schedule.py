@@ -12,7 +12,7 @@ pytestmark = pytest.mark.usefixtures("engine")
 
 @given(st.integers(1, 300), st.sampled_from([1, 3, 40]), st.sampled_from([1, 2]))
 def test_each_lens_is_made_once_from_lenses_that_are_done(count, rows, step):
-    from lippmann.rendering.reprojection.common.schedule import refine
+    from lippmann.rendering.reprojection.schedule import refine
 
     columns = np.arange(count) * step
     width = step * count
@@ -30,7 +30,7 @@ def test_each_lens_is_made_once_from_lenses_that_are_done(count, rows, step):
 
 
 def test_sources_are_the_nearest_that_are_done():
-    from lippmann.rendering.reprojection.common.schedule import refine
+    from lippmann.rendering.reprojection.schedule import refine
 
     keys, steps = refine(np.arange(18), 1, 18)
     assert keys.tolist() == [0, 16, 17]
@@ -42,7 +42,7 @@ def test_sources_are_the_nearest_that_are_done():
 @pytest.mark.parametrize("rows", [1, 3])
 @pytest.mark.parametrize(("columns", "last_right"), [(1, None), (2, -1), (5, 4), (6, -1)])
 def test_even_micro_images_lie_between_odd_ones(columns, rows, last_right):
-    from lippmann.rendering.reprojection.common.schedule import odd_and_even
+    from lippmann.rendering.reprojection.schedule import odd_and_even
 
     odd, even = odd_and_even(columns, rows)
     assert np.all(odd % 2 == 0)  # counted from 1 these are the odd ones

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lippmann.rendering.reprojection.common.array_types import RealArray
+from lippmann.rendering.reprojection.point_image import RealArray
 from lippmann.runtime.numba_jit import inlined
 
 

@@ -23,7 +23,7 @@ class KnownTracer:
 
 
 def the_field():
-    from lippmann.rendering.reprojection.common.lens_map import LensField
+    from lippmann.display.lens_field import LensField
 
     edges = np.arange(LENSES + 1) * WIDE
     lens = np.broadcast_to(np.repeat(np.arange(LENSES, dtype=np.int32), WIDE), (HEIGHT, LENSES * WIDE))
@@ -33,9 +33,9 @@ def the_field():
 
 def found(truth, taken, of_edges=(), disparity=1.5):
     """The picture ``taken`` after the search; things at the usual disparity are seen through one lens only."""
-    from lippmann.rendering.reprojection.common.point_image import REPROJECTED, PointImage
-    from lippmann.rendering.reprojection.common.thresholds import Rules
-    from lippmann.rendering.reprojection.retrace.adaptive_retrace import Neighborhoods, Surroundings, search
+    from lippmann.rendering.reprojection.point_image import REPROJECTED, PointImage
+    from lippmann.rendering.reprojection.rules import Rules
+    from lippmann.rendering.reprojection.search import Neighborhoods, Surroundings, search
     from lippmann.runtime.row_threads import Bands
 
     points = PointImage.empty(HEIGHT, LENSES * WIDE)
@@ -108,8 +108,8 @@ def test_points_that_were_wrongly_predicted_are_traced_under_the_neighbouring_le
 
 
 def test_an_outline_before_the_background_is_an_edge():
-    from lippmann.rendering.reprojection.common.point_image import BACKGROUND, REPROJECTED, PointImage
-    from lippmann.rendering.reprojection.retrace.region_growing import mark_edges
+    from lippmann.rendering.reprojection.point_image import BACKGROUND, REPROJECTED, PointImage
+    from lippmann.rendering.reprojection.search import mark_edges
 
     points = PointImage.empty(2, 8)
     points.status[:] = REPROJECTED
@@ -122,7 +122,7 @@ def test_an_outline_before_the_background_is_an_edge():
 
 def test_arrays_are_searched_more_closely_than_cylinders():
     from lippmann.display import load_display
-    from lippmann.rendering.reprojection.retrace.adaptive_retrace import Surroundings, choose_neighborhoods
+    from lippmann.rendering.reprojection.search import Surroundings, choose_neighborhoods
 
     straight = choose_neighborhoods(load_display("seed-lenticular"), 8)
     for name in ("mla-square", "mla-hexagonal"):
@@ -133,8 +133,8 @@ def test_arrays_are_searched_more_closely_than_cylinders():
 
 @pytest.mark.parametrize("share", [2, 3, 4, 8])
 def test_surroundings_come_to_every_row_and_column(share):
-    from lippmann.rendering.reprojection.common.point_image import REPROJECTED, PointImage
-    from lippmann.rendering.reprojection.retrace.region_growing import mark_surroundings
+    from lippmann.rendering.reprojection.point_image import REPROJECTED, PointImage
+    from lippmann.rendering.reprojection.search import mark_surroundings
 
     points = PointImage.empty(HEIGHT, LENSES * WIDE)
     points.status[:] = REPROJECTED

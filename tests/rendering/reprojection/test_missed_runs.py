@@ -13,9 +13,9 @@ LENS = np.repeat([0, 1], [9, 3])
 
 def thinned(row, known=()):
     """A picture whose given row holds wanted pixels, thinned out; ``known`` ones have been traced."""
-    from lippmann.rendering.reprojection.common.missed_runs import thin_out
-    from lippmann.rendering.reprojection.common.point_image import TRACED, WANTED, PointImage
-    from lippmann.rendering.reprojection.common.thresholds import choose_rules
+    from lippmann.rendering.reprojection.missed_runs import thin_out
+    from lippmann.rendering.reprojection.point_image import TRACED, WANTED, PointImage
+    from lippmann.rendering.reprojection.rules import choose_rules
 
     points = PointImage.empty(row + 1, len(LENS))
     points.status[row] = WANTED
@@ -26,7 +26,7 @@ def thinned(row, known=()):
 
 
 def wanted(row, known=()):
-    from lippmann.rendering.reprojection.common.point_image import WANTED
+    from lippmann.rendering.reprojection.point_image import WANTED
 
     return np.flatnonzero(thinned(row, known)[0].status[row] == WANTED).tolist()
 
@@ -39,9 +39,9 @@ def test_the_first_pixel_of_each_run_and_one_in_four_are_traced():
 
 @pytest.mark.parametrize(("far", "expected"), [(0.5, [0.25, 0.5, 0.75]), (0.05, [0.0, 0.0, 1.0])])
 def test_the_others_are_blended_on_one_surface_and_copied_between_two(far, expected):
-    from lippmann.rendering.reprojection.common.missed_runs import bridge
-    from lippmann.rendering.reprojection.common.point_image import REPROJECTED, TRACED
-    from lippmann.rendering.reprojection.common.thresholds import choose_rules
+    from lippmann.rendering.reprojection.missed_runs import bridge
+    from lippmann.rendering.reprojection.point_image import REPROJECTED, TRACED
+    from lippmann.rendering.reprojection.rules import choose_rules
 
     points, lens = thinned(0)
     traced = points.status[0] == -2

@@ -34,7 +34,7 @@ class Wall:
 
 def tracer_of(integrator, samples=1, box_filter=False, most_lanes=1 << 20):
     from lippmann.display import Display, LensArray, Panel
-    from lippmann.rendering.reprojection.common.pixel_tracer import PixelTracer
+    from lippmann.rendering.reprojection.pixel_tracer import PixelTracer
     from lippmann.rendering.transport.ray_source import DisplayRays
     from lippmann.runtime.row_threads import Bands
 
@@ -53,7 +53,7 @@ def tracer_of(integrator, samples=1, box_filter=False, most_lanes=1 << 20):
 
 
 def test_points_colors_and_rays_are_entered():
-    from lippmann.rendering.reprojection.common.point_image import MISSED, TRACED, PointImage
+    from lippmann.rendering.reprojection.point_image import MISSED, TRACED, PointImage
 
     display, tracer = tracer_of(Wall(-20.0))
     points = PointImage.empty(6, 16)
@@ -76,7 +76,7 @@ def test_points_colors_and_rays_are_entered():
 
 
 def test_a_pixel_of_several_surfaces_is_fragile_and_takes_the_nearest():
-    from lippmann.rendering.reprojection.common.point_image import BACKGROUND, PointImage
+    from lippmann.rendering.reprojection.point_image import BACKGROUND, PointImage
 
     _, tracer = tracer_of(Wall(-20.0, edge=0.0), samples=16, box_filter=True)
     points = PointImage.empty(6, 16)
@@ -92,7 +92,7 @@ def test_a_pixel_of_several_surfaces_is_fragile_and_takes_the_nearest():
 
 def test_one_recording_serves_all_lists():
     """Telling the device anew what to compute takes longer than computing it."""
-    from lippmann.rendering.reprojection.common.point_image import PointImage
+    from lippmann.rendering.reprojection.point_image import PointImage
 
     _, tracer = tracer_of(Wall(-20.0))
     points = PointImage.empty(6, 16)
@@ -104,7 +104,7 @@ def test_one_recording_serves_all_lists():
 
 
 def test_lists_longer_than_a_wavefront_are_traced_in_parts():
-    from lippmann.rendering.reprojection.common.point_image import PointImage
+    from lippmann.rendering.reprojection.point_image import PointImage
 
     pictures = []
     for most in (1 << 20, 40):
@@ -118,7 +118,7 @@ def test_lists_longer_than_a_wavefront_are_traced_in_parts():
 
 
 def test_nothing_to_trace():
-    from lippmann.rendering.reprojection.common.point_image import PointImage
+    from lippmann.rendering.reprojection.point_image import PointImage
 
     _, tracer = tracer_of(Wall(-20.0))
     tracer.trace(np.empty(0, np.uint32), PointImage.empty(6, 16))

@@ -14,21 +14,21 @@ QUICK = settings(max_examples=60, deadline=None)
 
 
 def the_rows():
-    from lippmann.rendering.reprojection.lenticular.forward_warp import Rows
+    from lippmann.rendering.reprojection.forward_warp import Rows
 
     first = np.arange(LENSES + 1, dtype=np.int64) * WIDTH
     return Rows(first, first[:-1] + (WIDTH - 1) / 2)
 
 
 def the_rules(**others):
-    from lippmann.rendering.reprojection.common.thresholds import Rules
+    from lippmann.rendering.reprojection.rules import Rules
 
     return Rules(True, 0.5, False, probe_rows=100, probe_stride=16, run_step=3)._replace(**others)
 
 
 def plane(rows, level, slope, color, height=2):
     """Points of the plane on which disparity is ``level + slope * x * disparity`` at the lateral position x."""
-    from lippmann.rendering.reprojection.common.point_image import TRACED, PointImage
+    from lippmann.rendering.reprojection.point_image import TRACED, PointImage
 
     points = PointImage.empty(height, WIDTH * LENSES)
     for lens in range(LENSES):
@@ -44,7 +44,7 @@ def plane(rows, level, slope, color, height=2):
 
 
 def forget(points, rows, lenses):
-    from lippmann.rendering.reprojection.common.point_image import BACKGROUND, MISSED
+    from lippmann.rendering.reprojection.point_image import BACKGROUND, MISSED
 
     for lens in lenses:
         columns = slice(rows.first[lens], rows.first[lens + 1])
@@ -54,7 +54,7 @@ def forget(points, rows, lenses):
 
 
 def draw(points, rows, targets, sources, rules):
-    from lippmann.rendering.reprojection.lenticular.forward_warp import receive
+    from lippmann.rendering.reprojection.forward_warp import receive
 
     height = len(points.status)
     targets, sources = np.array(targets, dtype=np.int64), np.array(sources, dtype=np.int64)
@@ -71,7 +71,7 @@ def draw(points, rows, targets, sources, rules):
 )
 def test_a_plane_is_reprojected_exactly(level, slope, careful, tilt):
     """Colours that are linear along the plane's line of sight come out as they are, wherever a source reaches."""
-    from lippmann.rendering.reprojection.common.point_image import REPROJECTED, WANTED
+    from lippmann.rendering.reprojection.point_image import REPROJECTED, WANTED
 
     rows = the_rows()
     slope *= abs(level)
@@ -157,7 +157,7 @@ def test_a_point_in_front_of_the_lens_plane_hides_one_behind():
 
 
 def test_traced_pixels_stay():
-    from lippmann.rendering.reprojection.common.point_image import TRACED
+    from lippmann.rendering.reprojection.point_image import TRACED
 
     rows = the_rows()
     points = plane(rows, -0.1, 0.0, constant(0.2))
@@ -169,7 +169,7 @@ def test_traced_pixels_stay():
 
 
 def test_nothing_farther_than_what_probes_met_is_taken():
-    from lippmann.rendering.reprojection.common.point_image import REPROJECTED, TRACED, WANTED
+    from lippmann.rendering.reprojection.point_image import REPROJECTED, TRACED, WANTED
 
     rows = the_rows()
     # Between probes that have met different surfaces, the nearer one counts.
@@ -185,7 +185,7 @@ def test_nothing_farther_than_what_probes_met_is_taken():
 
 @pytest.mark.parametrize("careful", [False, True])
 def test_care_leaves_fragile_points_and_edges_to_tracing(careful):
-    from lippmann.rendering.reprojection.common.point_image import WANTED
+    from lippmann.rendering.reprojection.point_image import WANTED
 
     rows = the_rows()
     rules = the_rules(careful=careful, tolerance=0.06)
@@ -207,7 +207,7 @@ def test_care_leaves_fragile_points_and_edges_to_tracing(careful):
 
 @pytest.mark.parametrize("column", [12, 28])
 def test_one_fragile_pixel_of_one_source_is_enough(column):
-    from lippmann.rendering.reprojection.common.point_image import WANTED
+    from lippmann.rendering.reprojection.point_image import WANTED
 
     rows = the_rows()
     points = plane(rows, -1e-4, 0.0, constant(0.2))
@@ -221,7 +221,7 @@ def test_one_fragile_pixel_of_one_source_is_enough(column):
 
 
 def test_care_leaves_to_tracing_what_the_sources_dispute():
-    from lippmann.rendering.reprojection.common.point_image import REPROJECTED, WANTED
+    from lippmann.rendering.reprojection.point_image import REPROJECTED, WANTED
 
     rows = the_rows()
     for apart, expected in ((0.02, REPROJECTED), (0.3, WANTED)):
@@ -238,7 +238,7 @@ def test_care_leaves_to_tracing_what_the_sources_dispute():
 @pytest.mark.parametrize("sources", [1, 2])
 def test_where_an_outline_may_reach_farther_points_are_not_taken(careful, sources):
     """Between its last pixel and the next one, which sees the wall, the nearer thing may go on."""
-    from lippmann.rendering.reprojection.common.point_image import WANTED
+    from lippmann.rendering.reprojection.point_image import WANTED
 
     rows = the_rows()
     points = plane(rows, -1e-4, 0.0, constant(0.2))

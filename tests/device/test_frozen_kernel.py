@@ -9,7 +9,7 @@ import pytest
 
 @pytest.fixture
 def frozen(engine):
-    from lippmann.rendering.reprojection.common.frozen_kernel import Frozen
+    from lippmann.device.frozen_kernel import Frozen
 
     return Frozen
 

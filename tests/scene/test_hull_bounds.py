@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from lippmann.rendering.live import hull_bounds
-from lippmann.rendering.live.hull_bounds import bounds_by_hull
+from lippmann.scene import hull_bounds
+from lippmann.scene.hull_bounds import bounds_by_hull
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+#: Arrays that compiled kernels take: numbers of pixels or lenses; disparities, weights, colours; masks.
+IntArray: TypeAlias = NDArray[np.integer]
+RealArray: TypeAlias = NDArray[np.floating]
+BoolArray: TypeAlias = NDArray[np.bool_]
 
 #: Status of a pixel, as the paper keeps it: -1 is missed, 0 filled. What was filled without tracing keeps marks of its
 #: own, so that maps and counts can tell them apart.

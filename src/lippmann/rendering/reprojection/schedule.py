@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.rendering.reprojection.common.tuning import TUNING
+from lippmann.rendering.reprojection.tuning import TUNING
 
 Lenses = NDArray[np.int64]
 

@@ -19,14 +19,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.rendering.reprojection.arrays.bilinear import color_at, is_trusted
-from lippmann.rendering.reprojection.arrays.epipolar_march import look_along, mark_nearest
-from lippmann.rendering.reprojection.common.array_types import RealArray
-from lippmann.rendering.reprojection.common.lens_map import LensField
-from lippmann.rendering.reprojection.common.point_image import BACKGROUND, REPROJECTED, TRACED, WANTED, PointImage
-from lippmann.rendering.reprojection.common.schedule import Lenses, Step
-from lippmann.rendering.reprojection.common.thresholds import Rules, alike, coded_value, nearer
-from lippmann.rendering.reprojection.common.tuning import TUNING
+from lippmann.display.lens_field import LensField
+from lippmann.rendering.reprojection.epipolar_march import color_at, is_trusted, look_along, mark_nearest
+from lippmann.rendering.reprojection.point_image import BACKGROUND, REPROJECTED, TRACED, WANTED, PointImage, RealArray
+from lippmann.rendering.reprojection.rules import Rules, alike, coded_value, nearer
+from lippmann.rendering.reprojection.schedule import Lenses, Step
+from lippmann.rendering.reprojection.tuning import TUNING
 from lippmann.runtime.numba_jit import compiled, uncounted
 from lippmann.runtime.row_threads import Bands
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from lippmann.rendering.reprojection.common.array_types import IntArray
-from lippmann.rendering.reprojection.common.lens_map import LensField
-from lippmann.rendering.reprojection.common.pixel_tracer import Pixels
-from lippmann.rendering.reprojection.common.point_image import INTERPOLATED, PointImage
-from lippmann.rendering.reprojection.common.thresholds import Rules, color_difference
-from lippmann.rendering.reprojection.common.tuning import TUNING
+from lippmann.display.lens_field import LensField
+from lippmann.rendering.reprojection.pixel_tracer import Pixels
+from lippmann.rendering.reprojection.point_image import INTERPOLATED, IntArray, PointImage
+from lippmann.rendering.reprojection.rules import Rules, color_difference
+from lippmann.rendering.reprojection.tuning import TUNING
 from lippmann.runtime.numba_jit import uncounted
 from lippmann.runtime.row_threads import Bands
 

@@ -17,12 +17,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.rendering.reprojection.common.array_types import IntArray, RealArray
-from lippmann.rendering.reprojection.common.lens_map import LensField
-from lippmann.rendering.reprojection.common.point_image import BACKGROUND, REPROJECTED, TRACED, WANTED, PointImage
-from lippmann.rendering.reprojection.common.schedule import Lenses, Step
-from lippmann.rendering.reprojection.common.thresholds import Rules, alike, coded_value, color_difference, nearer
-from lippmann.rendering.reprojection.common.tuning import TUNING
+from lippmann.display.lens_field import LensField
+from lippmann.rendering.reprojection.point_image import (
+    BACKGROUND,
+    REPROJECTED,
+    TRACED,
+    WANTED,
+    IntArray,
+    PointImage,
+    RealArray,
+)
+from lippmann.rendering.reprojection.rules import Rules, alike, coded_value, color_difference, nearer
+from lippmann.rendering.reprojection.schedule import Lenses, Step
+from lippmann.rendering.reprojection.tuning import TUNING
 from lippmann.runtime.numba_jit import compiled, inlined, uncounted
 from lippmann.runtime.row_threads import Bands
 

@@ -29,7 +29,7 @@ def checks(x, y):
 
 
 def rules(careful=True, **others):
-    from lippmann.rendering.reprojection.common.thresholds import Rules
+    from lippmann.rendering.reprojection.rules import Rules
 
     if careful:
         return Rules(True, 0.06, False, probe_rows=4, probe_stride=16, run_step=3)._replace(**others)
@@ -37,8 +37,8 @@ def rules(careful=True, **others):
 
 
 def make(display, tracer, the_rules, method="lens_view", threads=1):
-    from lippmann.rendering.reprojection.common.point_image import PointImage
     from lippmann.rendering.reprojection.default_order import DefaultOrder
+    from lippmann.rendering.reprojection.point_image import PointImage
     from lippmann.runtime.row_threads import Bands
 
     points = PointImage.empty(display.panel.height, display.panel.width)

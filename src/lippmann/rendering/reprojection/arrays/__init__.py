@@ -1,1 +1,0 @@
-"""Reprojection under lens arrays of any layout: backward warps along epipolar lines."""

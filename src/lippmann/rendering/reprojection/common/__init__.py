@@ -1,1 +1,0 @@
-"""Parts that all reprojection methods share: point images, gaps, thresholds, schedules."""

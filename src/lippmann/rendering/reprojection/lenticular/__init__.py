@@ -1,1 +1,0 @@
-"""Reprojection under straight cylindrical lenses: forward warps of rows."""

@@ -1,1 +1,0 @@
-"""The careful mode: pixels that reprojection may have falsified are found and traced again."""
