@@ -36,7 +36,8 @@ def test_installed_plugins_render_their_own_files(engine, tmp_path):
     gem = str(tmp_path / "off_reader" / "gem.off")
     quick = ["--spp", "2", "--method", "full", "--threads", "2"]
     commands = [
-        ["render", gem, "--display", "acme-9", *quick, "-o", "gem.png"],
+        ["render", gem, "--display", "acme-9", "--reader-option", "roughness=0.2", *quick, "-o", "gem.png"],
+        ["info", "gem.png"],
         ["render", "teapot", "--integrator", "sky-seen", *quick, "-o", "teapot.png"],
         ["export", "gem.png", "--as", "strip", "-o", "strip"],
         ["replay", "gem.png", "--sweep", "--frames", "3", "--size", "64x48", "-o", "gem.gif"],
@@ -60,6 +61,8 @@ def test_installed_plugins_render_their_own_files(engine, tmp_path):
     assert lightness.getextrema() == (0, 255)  # what sees nothing of the sky, and what sees all of it
     with Image.open(tmp_path / "strip.png") as strip, Image.open(tmp_path / "gem.gif") as film:
         assert (strip.size[1], film.n_frames) == (768, 3)
+    assert 'reader_options = {"roughness" = "0.2"}' in done.stdout
+    assert '"options": {"roughness": 0.5}' in " ".join(done.stdout.split())
     for name in ("off", "acme", "strip", "gif", "sky-seen"):
         assert f'"name": "{name}"' in done.stdout
 

@@ -8,7 +8,7 @@ import numpy as np
 from lippmann.plugins import Instance, Material, Mesh, Reader, SceneDescription, SceneError
 
 
-def read(path: Path) -> SceneDescription:
+def read(path: Path, roughness: float = 0.5) -> SceneDescription:
     """A mesh for each colour, whose three numbers are sRGB codes, 0 to 255; polygons without one are grey."""
     lines = [line.partition("#")[0].split() for line in path.read_text(encoding="utf-8").splitlines()]
     rows = [line for line in lines if line]
@@ -24,7 +24,7 @@ def read(path: Path) -> SceneDescription:
             faces.setdefault(color, []).extend([corners[0], *pair] for pair in pairwise(corners[1:]))
     except (ValueError, IndexError) as error:
         raise SceneError(f"is damaged ({error})", where=path.name) from None
-    materials = [Material(base_color=tuple(linear(color)), roughness=0.5, double_sided=True) for color in faces]
+    materials = [Material(base_color=linear(color), roughness=roughness, double_sided=True) for color in faces]
     meshes = [
         Mesh(path.stem, positions, np.array(each, dtype=np.uint32), material=index)
         for index, each in enumerate(faces.values())
@@ -32,8 +32,8 @@ def read(path: Path) -> SceneDescription:
     return SceneDescription(path.stem, meshes, materials, [Instance(index, np.eye(4)) for index in range(len(meshes))])
 
 
-def linear(codes: tuple[int, ...]) -> list[float]:
-    return ((np.array(codes) / 255) ** 2.2).tolist()
+def linear(codes: tuple[int, ...]) -> tuple[float, ...]:
+    return tuple(((np.array(codes) / 255) ** 2.2).tolist())
 
 
-READER = Reader((".off",), read, beginnings={b"OFF": ".off"}, up="y")
+READER = Reader((".off",), read, beginnings={b"OFF": ".off"}, up="y", settings={"roughness": 0.5})

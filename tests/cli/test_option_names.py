@@ -16,7 +16,7 @@ from lippmann.errors import UsageError
 assert make_app  # whose module says which commands there are
 SOURCE = Path(package.__file__).parent
 #: Parameters of the library that no command has.
-OF_THE_LIBRARY = {"form", "effort", "stereo", "pick", "framed_by", "height", "row_step", "placement"}
+OF_THE_LIBRARY = {"form", "effort", "stereo", "pick", "framed_by", "height", "row_step", "placement", "pupil"}
 #: Files whose texts are for other programs: pip, a style sheet's variables, Dask's own command, Blender, commands that
 #: are run.
 OTHER_PROGRAMS = {

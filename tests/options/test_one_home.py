@@ -37,7 +37,7 @@ each_option = pytest.mark.parametrize(("kind", "each", "its"), OPTIONS, ids=[eac
 
 def sample(each, its):
     """A value that is not the default."""
-    if each.name == "variants":
+    if each.name in ("variants", "reader_options"):
         return {"shading": "red"}
     if its.words is not None:
         return Path("a file.exr") if its.words == Path | None else "fire"

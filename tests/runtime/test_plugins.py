@@ -8,6 +8,7 @@ import sys
 import pytest
 
 import lippmann
+from lippmann.cli import run
 from lippmann.errors import DisplayError, OutputError, SceneError, UsageError
 from lippmann.plugins import doors, installed
 from lippmann.runtime.plugins import function_of
@@ -70,9 +71,51 @@ def test_a_reader_reads_its_files_with_the_options_that_it_takes(install, save):
     assert [(group, each.claims) for group, each in installed()] == [("lippmann.readers", (".tri",))]
 
 
+def test_a_reader_has_options_of_its_own(install, save, capsys):
+    settings = "settings={'scale': 1.0, 'count': 2, 'smooth': False, 'tint': 'red'}"
+    install("sound", SOUND + READER.replace("'z')", f"'z', {settings})"))
+    asked = {"scale": "2", "count": "3", "smooth": "true", "tint": "blue=green"}
+    assert load_scene(save("a.tri"), up="y", reader_options=asked).notes[:4] == (
+        "scale=2.0",
+        "count=3",
+        "smooth=True",
+        "tint=blue=green",
+    )
+    assert load_scene(save("a.tri"), up="y", reader_options={"smooth": False, "scale": 2}).notes[:2] == (
+        "smooth=False",
+        "scale=2.0",
+    )
+    for name, value, message in [
+        ("scales", "2", r"reader_options: unknown option of the reader of a\.tri 'scales', did you mean 'scale'"),
+        ("scale", "x", "reader_options: scale=x; must be a finite number"),
+        ("scale", "nan", "reader_options: scale=nan; must be a finite number"),
+        ("count", "2.5", "reader_options: count=2.5; must be a whole number"),
+        ("smooth", "1", "reader_options: smooth=1; must be true or false"),
+    ]:
+        with pytest.raises(UsageError, match=message):
+            load_scene(save("a.tri"), reader_options={name: value})
+    for source in ("teapot", save("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")):
+        with pytest.raises(UsageError, match=r"reader_options: .*(teapot is no file|a\.obj has no options)"):
+            load_scene(source, reader_options={"scale": "2"})
+    assert run(["doctor"]) in (0, 1)
+    assert "(lippmann.readers): .tri; options: scale=1.0, count=2, smooth=False, tint=red\n" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("code", "problem"),
     [
+        (
+            SOUND + "READER = Reader(('.tri',), read, settings={'up-to': 1})",
+            "its option 'up-to' is no word of its own .*",
+        ),
+        (
+            SOUND + "READER = Reader(('.tri',), read, settings={'files': 1})",
+            "its option 'files' is no word of its own .*",
+        ),
+        (
+            SOUND + "READER = Reader(('.tri',), read, settings={'a': None})",
+            "the default of its option 'a' is no text, .*",
+        ),
         ("1 / 0", "ZeroDivisionError: division by zero"),
         (SOUND + "READER = Reader(('.tri',))", "TypeError: .*missing 1 required positional argument: 'read'"),
         (SOUND + "READER = read", r"it names a function, and has to name a lippmann\.plugins\.Reader"),

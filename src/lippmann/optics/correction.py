@@ -60,7 +60,7 @@ class LensCorrection:
         Lens.of(self.display)
         if not self.display.lattice.rows_are_alike or self.display.panel.subpixel_cells is not None:
             rule = "pictures are corrected for upright cylinders before pixels that are all alike"
-            fix = "leave --correct out: its rays follow the true directions of the lens all the same"
+            fix = "leave the correction out: its rays follow the true directions of the lens all the same"
             raise DisplayError("cannot be corrected for its lens", where=self.display.name, rule=rule, fix=fix)
 
     def rows(self, parts: Sequence[Floats]) -> Floats:

@@ -10,7 +10,7 @@ from lippmann.runtime.plugins import Door, Extension, Target
 
 @dataclass(frozen=True)
 class IntegratorFactory(Extension):
-    """An integrator, asked for by the name of its entry point: ``lippmann render --integrator NAME``.
+    """An integrator: the name of its entry point is asked for by the option ``integrator``.
 
     Its light is sampled like that of ``path`` and may be denoised. It is not pooled, and its tone is not mapped.
 

@@ -42,6 +42,14 @@ class SceneOptions(Options):
         read=texts.variants,
         words=list[str] | None,
     )
+    reader_options: Mapping[str, str] | None = _scene(
+        None,
+        "An option of the plugin that reads the file (repeatable); lippmann doctor lists them.",
+        flag="reader-option",
+        metavar="NAME=VALUE",
+        read=texts.reader_options,
+        words=list[str] | None,
+    )
     depth_map: "str | Path | None" = _scene(
         None,
         "The depth of a photograph: .pfm, .npy, .exr (metres), a picture of 16 bits (millimetres) or of 8 bits "
@@ -105,6 +113,7 @@ class SceneKeywords(TypedDict, total=False):
 
     up: Up | None
     variants: Mapping[str, str] | None
+    reader_options: Mapping[str, str] | None
     depth_map: "str | Path | None"
     transfer_function: "str | Path | TransferFunction | None"
     window: tuple[float, float] | None

@@ -178,3 +178,14 @@ def variants(texts: list[str], option: str) -> dict[str, str]:
             raise UsageError(f"'{text}'", where=option, rule=rule)
         chosen[name] = choice
     return chosen
+
+
+def reader_options(texts: list[str], option: str) -> dict[str, str]:
+    """``NAME=VALUE``, as often as it was given."""
+    chosen = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not (name and equals):
+            raise UsageError(f"'{text}'", where=option, rule="NAME=VALUE, an option of the plugin that reads the file")
+        chosen[name] = value
+    return chosen

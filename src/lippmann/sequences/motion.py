@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from lippmann.display import Display
-from lippmann.errors import SceneError, UsageError
+from lippmann.errors import UsageError
 from lippmann.options.light import LightOptions
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.scene import SceneOptions
-from lippmann.runtime.plugins import function_of
 from lippmann.scene.matrices import Bounds
-from lippmann.scene.parsing.files import NamedFiles
 from lippmann.scene.placement import Placement
-from lippmann.scene.readers.load import kind_of_file, read_scene
-from lippmann.scene.readers.registry import READERS, MovingScene
+from lippmann.scene.readers.load import open_moving, read_scene
 from lippmann.scene.scene import Scene, check_description, find_camera, override_light
 from lippmann.scene.values.description import Camera, Matrix, SceneDescription
 from lippmann.scene.values.whitted_scene import CameraPose, ClassicScene
@@ -33,7 +30,7 @@ FRAMES_PER_SECOND = 24.0
 AS_IT_IS = SceneOptions()
 
 #: Options of a scene's file that go with its motion.
-_OF_MOVING = ("variants", "environment", "background", "single_scattering")
+_OF_MOVING = ("variants", "reader_options", "environment", "background", "single_scattering")
 
 #: Moments, spread evenly over an animation, whose boxes together stand for all that it ever fills.
 _MOMENTS = 65
@@ -96,7 +93,7 @@ class AnimatedFile(Motion):
 
     def __init__(
         self,
-        path: Path,
+        path: str | Path,
         *,
         fps: float = FRAMES_PER_SECOND,
         animation: str | None = None,
@@ -109,11 +106,12 @@ class AnimatedFile(Motion):
                 raise UsageError("is for scenes at rest", parameter=name, fix="leave it out")
         if not (math.isfinite(fps) and fps > 0.0):
             raise UsageError(f"{fps:g} frames per second", parameter="fps", rule="a number above 0")
-        self._file = path.name
+        self._file = Path(path).name
         self._fps = fps
-        self._moving = _open_moving(path, animation, allow_outside, asked.variants)
+        self._moving = open_moving(path, animation, asked, allow_outside=allow_outside)
         # Surroundings and background are read once, with the first frame.
-        self._first = read_scene(self._moving.at(0.0), replace(asked, variants=None), light)
+        plain = replace(asked, variants=None, reader_options=None)
+        self._first = read_scene(self._moving.at(0.0), plain, light)
 
     @property
     def count(self) -> int:
@@ -141,19 +139,6 @@ class AnimatedFile(Motion):
             multiple_scattering=physical.multiple_scattering,
         )
         return replace(self._first, description=override_light(description, physical.environment, physical.background))
-
-
-def _open_moving(
-    path: Path, animation: str | None, allow_outside: bool, variants: Mapping[str, str] | None
-) -> MovingScene:
-    plugin = READERS.find(kind_of_file(path) or "")
-    assert plugin is not None
-    assert plugin.value.moving is not None
-    values = {"files": NamedFiles(path.parent, allow_outside), "variants": variants}
-    chosen = {name: value for name, value in values.items() if value and name in plugin.value.options}
-    with plugin.guarded(SceneError, path.name):
-        moving: MovingScene = function_of(plugin.value.moving)(path, animation=animation, **chosen)
-    return moving
 
 
 class Flight(Motion):
@@ -233,16 +218,8 @@ def open_motion(
         from lippmann.scene.readers.tachyon.reader import read_cam
 
         return Flight(read_scene(source, asked, light, allow_outside=allow_outside), read_cam(camera_path))
-    plugin = READERS.find(kind_of_file(source) or "")
-    if plugin is None or plugin.value.moving is None:
-        raise UsageError(
-            f"nothing moves in '{source}'",
-            parameter="frames",
-            rule="glTF and Blender files and USD stages have animations; Tachyon and NFF scenes are flown through",
-            fix="add camera_path=FILE.cam for a flight, or turntable=48 for a turn",
-        )
     return AnimatedFile(
-        Path(source),
+        source,
         fps=FRAMES_PER_SECOND if fps is None else fps,
         animation=animation,
         asked=asked,

@@ -26,7 +26,7 @@ def doctor(
     as_json: options.Json = False,
 ) -> None:
     """Check the rendering engine of this machine, say how to fix what is missing, and list plugins."""
-    from lippmann.plugins import installed
+    from lippmann.plugins import Reader, installed
     from lippmann.runtime import engine
 
     diagnosis = engine.diagnose()
@@ -38,18 +38,21 @@ def doctor(
         lines.append(f"{_mark(check)} {check.name:<{width}}  {check.value}")
         if check.fix:
             lines.append(f"{'':<{width + 4}} -> {check.fix}")
-    plugins = [
-        {
-            "group": group,
-            "name": plugin.name,
-            "distribution": plugin.distribution,
-            "claims": list(plugin.claims),
-            "problem": plugin.problem,
-        }
-        for group, plugin in installed()
-    ]
+    plugins = []
     for group, plugin in installed():
-        said = plugin.problem or ", ".join(plugin.claims)
+        settings = dict(plugin.extension.settings) if isinstance(plugin.extension, Reader) else {}
+        plugins.append(
+            {
+                "group": group,
+                "name": plugin.name,
+                "distribution": plugin.distribution,
+                "claims": list(plugin.claims),
+                "options": settings,
+                "problem": plugin.problem,
+            }
+        )
+        options_said = f"; options: {', '.join(f'{name}={value}' for name, value in settings.items())}" * bool(settings)
+        said = plugin.problem or ", ".join(plugin.claims) + options_said
         lines.append(f"{'!! ' if plugin.problem else 'ok '} plugin {plugin} ({group}): {said}")
     verdict = "ready to render" if diagnosis.ok else "not ready to render"
     checks = [asdict(check) for check in diagnosis.checks]

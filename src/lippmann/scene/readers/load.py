@@ -20,7 +20,7 @@ from lippmann.scene.cloud_selection import SplatSelection, VolumeSelection
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.dicom_files import DICOM, holds_dicom
 from lippmann.scene.parsing.files import NamedFiles, read_bytes
-from lippmann.scene.readers.registry import READERS, VTK, Reader, ReaderOption, suffixes_with
+from lippmann.scene.readers.registry import READERS, VTK, MovingScene, Reader, ReaderOption, suffixes_with
 from lippmann.scene.readers.splats.sog_folder import holds_sog
 from lippmann.scene.scene import Scene, check_description, override_light
 from lippmann.scene.splat_clouds import moved
@@ -143,7 +143,7 @@ def read_scene(
     if isinstance(source, str | Path):
         scene = _from_name(source, allow_outside, asked)
     else:
-        for name in ("up", "variants", "depth_map", "series"):
+        for name in ("up", "variants", "reader_options", "depth_map", "series"):
             if getattr(asked, name):
                 raise UsageError("is for files", parameter=name, fix="leave it out")
         scene = _from_object(source)
@@ -228,15 +228,9 @@ def _from_name(source: str | Path, allow_outside: bool, asked: SceneOptions) -> 
             raise SceneError.unknown("bundled scene or file", source, bundled.names())
     plugin = _reader_of(path, suffix)
     reader = plugin.value
-    values = {
-        "files": NamedFiles(path.parent, allow_outside),
-        "variants": asked.variants,
-        "depth_map": None if asked.depth_map is None else Path(asked.depth_map),
-        "series": asked.series,
-    }
-    chosen = {name: values[name] for name in reader.options if values[name]}
+    keywords = _keywords(reader, path, asked, allow_outside)
     with plugin.guarded(SceneError, path.name):
-        description = function_of(reader.read)(path, **chosen)
+        description = function_of(reader.read)(path, **keywords)
     if isinstance(description, ClassicScene):
         return _classic(description, world_camera(description))
     if isinstance(description, SceneDescription):
@@ -247,6 +241,46 @@ def _from_name(source: str | Path, allow_outside: bool, asked: SceneOptions) -> 
     return Scene(description.name, description)
 
 
+def _keywords(reader: Reader, path: Path, asked: SceneOptions, allow_outside: bool) -> dict[str, object]:
+    """What a reader's functions take of what is asked for."""
+    values = {
+        "files": NamedFiles(path.parent, allow_outside),
+        "variants": asked.variants,
+        "depth_map": None if asked.depth_map is None else Path(asked.depth_map),
+        "series": asked.series,
+    }
+    own = reader.values_of(asked.reader_options or {}, path.name)
+    return {**{name: values[name] for name in reader.options if values[name]}, **own}
+
+
+def open_moving(
+    source: str | Path, animation: str | None, asked: SceneOptions, *, allow_outside: bool = False
+) -> MovingScene:
+    """The scene file ``source``, which moves.
+
+    Raises
+    ------
+    SceneError
+        As its reader, and where it has no (such) animation.
+    UsageError
+        Nothing moves in scenes of this kind.
+    """
+    plugin = READERS.find(kind_of_file(source) or "")
+    if plugin is None or plugin.value.moving is None:
+        raise UsageError(
+            f"nothing moves in '{source}'",
+            parameter="frames",
+            rule="glTF and Blender files and USD stages have animations; Tachyon and NFF scenes are flown through",
+            fix="add camera_path=FILE.cam for a flight, or turntable=48 for a turn",
+        )
+    path = Path(source)
+    _check_options(path, kind_of_name(path), asked)
+    keywords = _keywords(plugin.value, path, asked, allow_outside)
+    with plugin.guarded(SceneError, path.name):
+        moving: MovingScene = function_of(plugin.value.moving)(path, animation=animation, **keywords)
+    return moving
+
+
 def _check_options(source: str | Path, suffix: str, asked: SceneOptions) -> None:
     """Refuse options that are not for files of this kind."""
     name = Path(source).name
@@ -255,6 +289,8 @@ def _check_options(source: str | Path, suffix: str, asked: SceneOptions) -> None
         guessed = ", ".join(each for own in READERS.own.values() if own.up for each in own.suffixes)
         what = f"{name} says itself which way is up"
         raise UsageError(what, parameter="up", rule=f"y, z or -y, for {guessed}", fix="leave it out")
+    if asked.reader_options and kind_of_file(source) is None:
+        raise UsageError(f"{name} is no file", parameter="reader_options", fix="leave it out")
     has_none: dict[ReaderOption, str] = {
         "variants": f"{name} has no variants",
         "depth_map": f"{name} is no photograph",

@@ -5,19 +5,25 @@ None is imported before a file of its kind is read.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal, Protocol
+from typing import ClassVar, Literal, Protocol, get_args
 
+from lippmann.errors import UsageError
 from lippmann.options.scene import Up
 from lippmann.runtime.plugins import Door, Extension, Target
 from lippmann.scene.values.description import SceneDescription
+
+#: A value of an option of a reader's own.
+Setting = bool | int | float | str
 
 #: Options of a scene that are for some readers alone: ``files`` are those that a file may name,
 #: ``variants`` chooses among those of a file, ``depth_map`` names a photograph's, ``series`` one of several volumes.
 ReaderOption = Literal["files", "variants", "depth_map", "series"]
 
+_NAME = re.compile(r"[a-z][a-z0-9_]*")
 _SUFFIX = re.compile(r"(\.[a-z0-9_+-]+){1,2}")
 
 
@@ -57,6 +63,9 @@ class Reader(Extension):
     options:
         Which of ``files``, ``variants``, ``depth_map`` and ``series`` ``read`` takes as keywords. ``files.find(name,
         where=..., what="texture")`` is the path of a file that the scene names, by the rules that hold for all scenes.
+    settings:
+        Options of its own, and their defaults: ``{"scale": 1.0}``. ``read`` (and ``moving``) takes each as a keyword of
+        the type of its default: text, truth, whole number or number. Users set them by the option ``reader_options``.
     up:
         The way that mostly is up in files which do not say it: ``"y"``, ``"z"`` or ``"-y"``. Users may then ask for
         another (``up``). None: files say it.
@@ -68,7 +77,7 @@ class Reader(Extension):
     Examples
     --------
     >>> from lippmann.plugins import Reader
-    >>> Reader((".tri",), "tri_reader:read").suffixes
+    >>> Reader((".tri",), "tri_reader:read", settings={"scale": 1.0}).suffixes
     ('.tri',)
     """
 
@@ -78,6 +87,7 @@ class Reader(Extension):
     options: tuple[ReaderOption, ...] = ()
     up: Up | None = None
     moving: Target | None = None
+    settings: Mapping[str, Setting] = field(default_factory=dict)
 
     group: ClassVar[str] = "lippmann.readers"
 
@@ -87,8 +97,51 @@ class Reader(Extension):
 
     def fault(self) -> str:
         """What is wrong with its fields."""
-        wrong = next((each for each in self.suffixes if not _SUFFIX.fullmatch(each)), None)
-        return "" if wrong is None else f"its suffix '{wrong}' is no dot and letters in lower case"
+        for each in self.suffixes:
+            if not _SUFFIX.fullmatch(each):
+                return f"its suffix '{each}' is no dot and letters in lower case"
+        for name, default in self.settings.items():
+            if not _NAME.fullmatch(name) or name in (*get_args(ReaderOption), "animation"):
+                return f"its option '{name}' is no word of its own in lower case"
+            if type(default) not in get_args(Setting):
+                return f"the default of its option '{name}' is no text, number or truth"
+        return ""
+
+    def values_of(self, asked: Mapping[str, object], file: str) -> dict[str, Setting]:
+        """What ``read`` takes of :attr:`settings` that were asked for, as values of the defaults' types.
+
+        Raises
+        ------
+        UsageError
+            It has no such option, or the value is of another type.
+        """
+        if asked and not self.settings:
+            rule = "only readers of plugins have some"
+            raise UsageError(
+                f"the reader of {file} has no options", parameter="reader_options", rule=rule, fix="leave it out"
+            )
+        UsageError.refuse_unknown(f"option of the reader of {file}", asked, self.settings, parameter="reader_options")
+        return {name: _setting(name, self.settings[name], str(value)) for name, value in asked.items()}
+
+
+def _setting(name: str, default: Setting, text: str) -> Setting:
+    """A text as a value of the default's type."""
+    rule = ""
+    if isinstance(default, bool):
+        if text.lower() in ("true", "false"):
+            return text.lower() == "true"
+        rule = "must be true or false"
+    elif isinstance(default, (int, float)):
+        rule = "must be a whole number" if isinstance(default, int) else "must be a finite number"
+        try:
+            value = type(default)(text)
+            if math.isfinite(value):
+                return value
+        except ValueError:
+            pass
+    else:
+        return text
+    raise UsageError(f"{name}={text}", parameter="reader_options", rule=rule)
 
 
 _HERE = "lippmann.scene.readers"
