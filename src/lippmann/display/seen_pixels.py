@@ -17,6 +17,7 @@ from lippmann.display.pixel_window import PixelWindow
 
 Vector = tuple[float, float, float]
 Indices = NDArray[np.uint32]
+Floats = NDArray[np.float32]
 
 #: Lenses wider than this many pixels of the picture are seen as blocks, each of one colour.
 _BLOCK_WIDTH = 1.5
@@ -51,6 +52,25 @@ class PixelSet:
     def channels(self) -> int:
         """3 where sub-pixels have rays of their own, else 1."""
         return int(self.number.shape[2])
+
+    def arrange(self, values: Floats) -> Floats:
+        """The picture ``(height, width, 3)`` of the pixels' values ``(n, 3)``; 0 where none is seen."""
+        with_black = np.concatenate([values, np.zeros((1, 3), np.float32)])
+        return with_black[self.number[..., 0]] if self.channels == 1 else with_black[self.number, np.arange(3)]
+
+    def arrange_lenses(self, values: Floats) -> Floats:
+        """The same picture; where lenses are blocks that of the lenses ``(rows, columns, 3)``, as denoisers see it."""
+        if self.blocks is None:
+            return self.arrange(values)
+        return np.concatenate([values, np.zeros((1, 3), np.float32)])[self.blocks]
+
+    def values_of_lenses(self, picture: Floats) -> Floats:
+        """The pixels' values ``(n, 3)`` from a picture of lenses that are blocks."""
+        assert self.blocks is not None
+        values = np.zeros((len(self.column), 3), np.float32)
+        shown = self.blocks >= 0
+        values[self.blocks[shown]] = picture[shown]
+        return values
 
 
 class EyeMap:

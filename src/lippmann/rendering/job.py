@@ -14,7 +14,7 @@ from lippmann.rendering.film.wavefront import Frame
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Session
 from lippmann.rendering.transport.integrator import Integrator
-from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays
+from lippmann.rendering.transport.ray_source import DisplayRays, OnePicture, QuiltRays, SubpixelRays, WindowRays
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Job:
 
     session: Session
     integrator: Integrator
-    source: DisplayRays | WindowRays | QuiltRays
+    source: OnePicture | QuiltRays
     display_from_world: NDArray[np.float64]
     is_part: bool = False
 
@@ -50,10 +50,10 @@ class Job:
         return self.session.watch.progress
 
     @property
-    def traced(self) -> DisplayRays | WindowRays | QuiltRays | SubpixelRays:
+    def traced(self) -> OnePicture | QuiltRays:
         """Whose samples are gathered: of sub-pixels that are denoised, all colours."""
         source = self.source
-        if isinstance(source, QuiltRays) or not self.request.keeps_colors(source.display):
+        if not isinstance(source, DisplayRays | WindowRays) or not self.request.keeps_colors(source.display):
             return source
         return SubpixelRays(source)
 

@@ -10,6 +10,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.display import Display
 from lippmann.options.choices import Method
 from lippmann.rendering.adaptive.goal import Goal, goal_of
 from lippmann.rendering.adaptive.stopping import Outcome, reach
@@ -47,11 +48,16 @@ def trace_samples(job: Job) -> Traced:
     """Every pixel's own samples: a given number, or as many as a goal takes; denoised where that is asked for."""
     why = why_no_estimate(job.request)
     if why is not None:
-        return _denoised_whole(job, _one_stream(job, why))
+        return trace_unjudged(job, why)
     if job.is_part:
         return _denoised_part(job)
     is_plain = job.request.denoise == "none" and not job.request.is_open_ended
     return _fixed_samples(job) if is_plain else _in_rounds(job)
+
+
+def trace_unjudged(job: Job, *notes: str) -> Traced:
+    """So many samples, of which nothing tells the error; denoised where that is asked for."""
+    return _denoised_whole(job, one_stream(job, *notes))
 
 
 def trace_reused(job: Job) -> Traced:
@@ -77,7 +83,7 @@ def _samples_of_pixels(traced: Traced) -> NDArray[np.uint32]:
     return np.where(status == TRACED, np.uint32(traced.samples), np.uint32(0))
 
 
-def _one_stream(job: Job, why: str) -> Traced:
+def one_stream(job: Job, *notes: str) -> Traced:
     """All samples in one stream: nothing is known of the error."""
     request, source = job.request, job.traced
     plan = cut_wavefronts(
@@ -92,7 +98,7 @@ def _one_stream(job: Job, why: str) -> Traced:
         for_denoiser=request.denoise != "none",
         progress=job.progress,
     )
-    return Traced(frame, request.samples, notes=(why,))
+    return Traced(frame, request.samples, notes=notes)
 
 
 def _fixed_samples(job: Job) -> Traced:
@@ -114,7 +120,7 @@ def _fixed_samples(job: Job) -> Traced:
 def _in_rounds(job: Job) -> Traced:
     """As many samples as the goal takes, denoised unless the noise is to stay."""
     batches = _batches(job)
-    denoiser = None if job.request.denoise == "none" else _denoiser(job)
+    denoiser = None if job.request.denoise == "none" else guided_denoiser(job)
     picture = batches if denoiser is None else _denoised(job, batches, denoiser)
     goal = _timed_goal(job)
     assessment = 0.0 if denoiser is None or goal.max_time is None else denoiser.probe(TUNING.first_denoised)
@@ -181,7 +187,7 @@ def _denoised_part(job: Job) -> Traced:
     """So many samples without their noise, for a picture that is put together and assessed elsewhere."""
     batches = _batches(job)
     batches.add(job.request.samples, job.progress)
-    denoiser = _denoiser(job)
+    denoiser = guided_denoiser(job)
     picture = _denoised(job, batches, denoiser)
     return _traced(job, batches, picture, denoiser, errors=picture.squared_error(), estimate=None)
 
@@ -192,14 +198,18 @@ def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Den
 
 def _estimator(job: Job) -> PictureEstimator:
     """Judges a display's picture by its micro-images, a quilt by its views."""
-    source, parts = job.source, None
+    source = job.source
+    parts: Display | Parts
     if isinstance(source, QuiltRays):
         window, (width, height) = source.window, source.view_size
         known = width * height - window.pixels
         parts = Parts.views(source.columns, source.rows, (window.width, window.height), known)
     elif isinstance(source, WindowRays):
         parts = Parts.micro_images(source.display, source.window)
-    return PictureEstimator(parts or source.display, is_among_mirrors(job.session.choices))
+    else:
+        assert isinstance(source, DisplayRays)
+        parts = source.display
+    return PictureEstimator(parts, is_among_mirrors(job.session.choices))
 
 
 def _reused(job: Job) -> Traced:
@@ -232,7 +242,7 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     if job.request.denoise == "none":
         return traced
     frame, source = traced.frame, job.traced
-    denoiser = _denoiser(job)
+    denoiser = guided_denoiser(job)
     noisy = frame.pixels
     if frame.coverage is not None and (further := denoiser.coverage()) is not None:
         noisy = exchange_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)
@@ -241,7 +251,8 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     return replace(traced, options=_denoiser_options(denoiser), seconds={"denoise": denoiser.seconds})
 
 
-def _denoiser(job: Job) -> GuidedDenoiser:
+def guided_denoiser(job: Job) -> GuidedDenoiser:
+    """The denoiser of a job's picture."""
     return GuidedDenoiser(
         job.session.built,
         job.traced,

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from lippmann.image import Provenance
 from lippmann.progress import ProgressCallback, silent
-from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session
@@ -47,11 +46,12 @@ def render_preview(
     session = open_session(scene, request, size, progress=progress)
     pose = scene.camera(camera)
 
-    from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.transport.ray_source import CameraRays, RaySource
+    from lippmann.rendering.job import Job
+    from lippmann.rendering.methods import trace_unjudged
+    from lippmann.rendering.transport.ray_source import CameraRays, OnePicture
     from lippmann.rendering.transport.whitted_camera import WhittedCameraRays
 
-    source: RaySource
+    source: OnePicture
     if request.integrator == "classic" and scene.classic is not None:
         # Its own camera, with all that only such a camera does.
         source = WhittedCameraRays(scene.classic.camera, scene.classic.handedness, *size)
@@ -60,7 +60,8 @@ def render_preview(
     session.face_viewer(remove_scale(pose))
     frame_from_world = np.linalg.inv(np.asarray(pose.world_from_camera, dtype=np.float64))
     integrator = session.integrator(source, frame_from_world, pose.exposure)
-    plan = cut_wavefronts(*size, request.samples, memory=session.memory)
-    frame = trace_frame(integrator, source, plan, seed=request.seed, box_filter=request.box_filter, progress=progress)
-    options = {"pixel_filter": request.pixel_filter, "camera": pose.name}
-    return Preview(request.shown(frame.pixels), session.provenance(frame, samples=request.samples, options=options))
+    traced = trace_unjudged(Job(session, integrator, source, frame_from_world))
+    session.watch.seconds.update(traced.seconds)
+    options = {"pixel_filter": request.pixel_filter, "camera": pose.name, **traced.options}
+    provenance = session.provenance(traced.frame, samples=traced.samples, options=options)
+    return Preview(request.shown(traced.frame.pixels), provenance)

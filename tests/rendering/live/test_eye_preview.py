@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 from PIL import Image as Pillow
@@ -9,6 +11,7 @@ from PIL import Image as Pillow
 import lippmann
 from lippmann.display import Display, LensArray, Panel
 from lippmann.display.seen_pixels import EyeMap
+from lippmann.errors import UsageError
 from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.live.eye_preview import render_eye_preview
 from lippmann.rendering.request.render_request import RenderRequest
@@ -54,17 +57,31 @@ def test_it_is_the_replay_of_the_whole_picture(teapot, name, eye):
     assert found.pixels.mean() == pytest.approx(replayed.mean(), rel=0.02)
 
 
-@pytest.mark.long
-def test_few_samples_are_denoised_and_near_many(teapot):
-    display = Display("fine", Panel(360, 240, 0.125), LensArray("lenticular", 0.6, 12.0), 0.8, "", 400.0, 20.0)
+FINE = Display("fine", Panel(360, 240, 0.125), LensArray("lenticular", 0.6, 12.0), 0.8, "", 400.0, 20.0)
+BLOCKS = Display("blocks", Panel(192, 128, 0.25), LensArray("square", 1.0), 1.0, "", 400.0, 20.0)
 
+
+@pytest.mark.slow
+@pytest.mark.parametrize("display", [pytest.param(FINE, marks=pytest.mark.long), BLOCKS], ids=["fine", "blocks"])
+def test_noise_is_taken_out_of_what_is_seen(teapot, display):
     def shown(**options):
         return render_eye_preview(teapot, display, EYES[0], RenderRequest(**options), (120, 120))
 
-    fine = shown(spp=256, denoise="none").pixels
-    noisy, clean = shown(spp=2, denoise="none", seed=3).pixels, shown(spp=2, seed=3)
-    assert clean.provenance.options["denoise"] == "oidn"
-    assert np.mean((clean.pixels - fine) ** 2) < 0.5 * np.mean((noisy - fine) ** 2)
+    many = shown(spp=256, denoise="none").pixels
+    noisy, clean, asked = (shown(spp=4, denoise=each, seed=3) for each in ("none", "auto", "oidn-high"))
+    assert "denoise" not in noisy.provenance.options
+    assert clean.provenance.options["denoise_effort"] == "fast"
+    assert asked.provenance.options["denoise_effort"] == "high"
+    error = np.mean((noisy.pixels - many) ** 2)
+    assert max(np.mean((each.pixels - many) ** 2) for each in (clean, asked)) < 0.5 * error
+
+
+def test_a_denoiser_that_is_asked_for_is_there_or_missed_at_once(teapot, monkeypatch):
+    with pytest.raises(UsageError, match="denoise: normal has no noise"):
+        render_eye_preview(teapot, BLOCKS, EYES[0], RenderRequest(integrator="normal", denoise="oidn"))
+    monkeypatch.setitem(sys.modules, "pyoidn", None)
+    with pytest.raises(UsageError, match="denoise: Open Image Denoise is not installed"):
+        render_eye_preview(teapot, BLOCKS, EYES[0], RenderRequest(denoise="oidn"))
 
 
 def test_every_pixel_is_traced_once_and_what_lies_past_the_panel_not_at_all():

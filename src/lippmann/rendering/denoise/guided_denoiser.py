@@ -23,7 +23,7 @@ from lippmann.rendering.film.wavefront import Coverage
 from lippmann.rendering.sharing.cross_lens import lens_numbers, lens_numbers_in_full_color, share_light
 from lippmann.rendering.sharing.cross_view import share_views
 from lippmann.rendering.sharing.tuning import TUNING as SHARING
-from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays
+from lippmann.rendering.transport.ray_source import DisplayRays, OnePicture, QuiltRays, SubpixelRays, WindowRays
 
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
@@ -65,7 +65,7 @@ class GuidedDenoiser:
     def __init__(
         self,
         built: BuiltScene | BuiltClassic,
-        source: DisplayRays | WindowRays | QuiltRays | SubpixelRays,
+        source: OnePicture | QuiltRays,
         display_from_world: NDArray[np.float64],
         *,
         seed: int,
@@ -115,7 +115,7 @@ class GuidedDenoiser:
     def _share(self, clean: Floats) -> Floats:
         """A clean picture that has shared its light."""
         source = self._source
-        assert not isinstance(source, QuiltRays)
+        assert isinstance(source, DisplayRays | WindowRays | SubpixelRays)
         if self._lenses is None:
             window = None if isinstance(source, DisplayRays) else source.window
             if isinstance(source, SubpixelRays):

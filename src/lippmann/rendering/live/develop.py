@@ -18,7 +18,7 @@ Codes = NDArray[np.uint8]
 def develop(values: Floats, pixels: PixelSet, request: RenderRequest) -> Codes:
     """Codes ``(height, width, 3)`` of the picture of pixels whose linear radiance is ``values`` ``(n, 3)``."""
     if pixels.channels == 3:
-        return develop_picture(arrange(values, pixels), pixels, request)
+        return develop_picture(pixels.arrange(values), pixels, request)
     # Each pixel is coded once, and its three codes are copied as one number; the last stands for places past the panel.
     codes = np.zeros((len(values) + 1, 4), np.uint8)
     codes[:-1, :3] = encode_light(values, request)
@@ -31,14 +31,6 @@ def develop_picture(picture: Floats, pixels: PixelSet, request: RenderRequest) -
     codes = encode_light(picture, request)
     codes[pixels.number < 0 if pixels.channels == 3 else (pixels.number < 0)[..., 0]] = 0
     return codes
-
-
-def arrange(values: Floats, pixels: PixelSet) -> Floats:
-    """The picture ``(height, width, 3)`` of the values ``(n, 3)`` of pixels; 0 where none is seen."""
-    with_black = np.concatenate([values, np.zeros((1, 3), np.float32)])
-    if pixels.channels == 1:
-        return with_black[pixels.number[..., 0]]
-    return with_black[pixels.number, np.arange(3)]
 
 
 def encode_light(values: Floats, request: RenderRequest) -> Codes:

@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from lippmann.display import Display
-from lippmann.display.seen_pixels import EyeMap, Vector
-from lippmann.options.choices import POOLED_LIGHT, PROPERTIES
+from lippmann.display.seen_pixels import EyeMap, Floats, Vector
+from lippmann.options.choices import POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
-from lippmann.rendering.denoise.oidn import denoise
-from lippmann.rendering.film.wavefront_plan import cut_wavefronts
-from lippmann.rendering.live.develop import arrange
+from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.picture import placed_options
 from lippmann.rendering.preview import Preview
 from lippmann.rendering.request.plan import BUDGET, resolve
@@ -44,8 +42,8 @@ def render_eye_preview(
     eye:
         Its place in the display's frame, mm.
     request:
-        Of a whole picture. Only ``full`` light is traced, whatever the method; few samples are denoised, unless
-        ``denoise`` is "none".
+        Of a whole picture. Only ``full`` light is traced, whatever the method. Its noise is taken out where ``denoise``
+        asks for that; left "auto", where light is sampled.
     size:
         Width and height that the picture, which has the panel's shape, keeps to. None: 512 pixels on its longer side.
 
@@ -54,55 +52,49 @@ def render_eye_preview(
     UsageError, SceneError, MemoryLimitError, EngineError
         As the stages find them.
     """
-    # Of splats and volumes nothing is denoised, and a denoiser that is asked for is refused.
-    denoiser = request.denoise if scene.lies_off_surfaces else "none"
-    plain = replace(request, method="full", denoise=denoiser, order=None, respect_gloss=None, layers=False)
-    resolved = resolve(plain, scene, display)
+    resolved = resolve(replace(request, method="full"), scene, display)
     width, height = display.panel.size_inside(*(size or (LONGER_SIDE, LONGER_SIDE)))
-    session = open_session(scene, resolved, (width, height), progress=progress)
+    seen = EyeMap(display, (width, height), subpixels=bool(resolved.subpixels)).seen_by(eye)
+    samples = _choose_samples(request, resolved, len(seen.column))
+    denoises = _denoises(request, resolved, scene)
+    # The noise is taken out of what the eye sees, not of what is traced.
+    plain = replace(resolved, spp=samples, denoise="none")
+    session = open_session(scene, plain, (width, height), progress=progress)
     placement = session.place(display)
 
     # Mitsuba may be loaded now that the engine has chosen its libraries.
-    from lippmann.rendering.film.feature_buffers import trace_guides
-    from lippmann.rendering.film.wavefront import trace_frame
+    from lippmann.rendering.denoise.dual_buffer import clean_light
+    from lippmann.rendering.denoise.guided_denoiser import SurfacePart, denoise_seen, effort_of
+    from lippmann.rendering.job import Job
+    from lippmann.rendering.methods import guided_denoiser, one_stream
     from lippmann.rendering.transport.ray_source import DisplayRays, SinglePixelRays
 
-    seen = EyeMap(display, (width, height), subpixels=bool(resolved.subpixels)).seen_by(eye)
     whole = DisplayRays(display, placement.world_from_display, bool(resolved.subpixels))
     source = SinglePixelRays(whole, seen.column, seen.row, seen.channel)
-    samples = _choose_samples(request, resolved, source.width)
     integrator = session.integrator(whole, placement.display_from_world, placement.exposure)
-    plan = cut_wavefronts(source.width, 1, samples, memory=session.memory)
-    frame = trace_frame(integrator, source, plan, seed=resolved.seed, box_filter=resolved.box_filter, progress=progress)
-    picture = arrange(frame.pixels[0], seen)
-    # Where lenses are larger than the picture's pixels, it is made of blocks, which the denoiser has never seen.
-    is_fine = 2 * source.width > width * height * whole.channels
-    # With 32 samples noise is not worth taking out.
-    denoises = samples < 32 and is_fine and request.denoise != "none" and resolved.integrator not in PROPERTIES
-    denoises &= machine.has_denoiser() and not (scene.lies_off_surfaces or scene.fills_panel)
+    job = Job(session, integrator, source, placement.display_from_world)
+    frame = one_stream(job).frame
+    picture = seen.arrange(frame.pixels[0])
+    options: dict[str, object] = {}
     if denoises:
-        guides = trace_guides(
-            session.built,
-            source,
-            cut_wavefronts(source.width, 1, 1, memory=session.memory),
-            placement.display_from_world,
-            seed=resolved.seed + 1,
-            box_filter=resolved.box_filter,
+        effort, guides = effort_of(request.denoise, samples), guided_denoiser(job).guides()
+        noisy, albedo, normal = (
+            seen.arrange_lenses(values[0]) for values in (frame.pixels, guides.albedo, guides.normal)
         )
-        picture = session.watch.stage(
-            "denoise",
-            lambda: denoise(picture, arrange(guides.albedo[0], seen), arrange(guides.normal[0], seen), effort="fast"),
-        )
+        surfaces = SurfacePart.of(normal)
+
+        def take_noise_out(light: Floats, *_: object) -> Floats:
+            return denoise_seen(light, albedo, normal, surfaces, effort=effort)
+
+        clean = session.watch.stage("denoise", lambda: clean_light(noisy, None, take_noise_out, samples))
+        picture = clean if seen.blocks is None else seen.arrange(seen.values_of_lenses(clean))
         picture *= seen.number >= 0
+        options = {"denoise": "oidn", "denoise_effort": effort}
     frame.pixels = picture
     provenance = session.provenance(
         frame,
         samples=samples,
-        options={
-            "eye": list(eye),
-            **({"denoise": "oidn"} if denoises else {}),
-            **placed_options(resolved, placement),
-        },
+        options={"eye": list(eye), **options, **placed_options(resolved, placement)},
         notes=placement.warnings,
     )
     return Preview(resolved.shown(picture), provenance)
@@ -112,3 +104,11 @@ def _choose_samples(asked: RenderRequest, resolved: RenderRequest, pixels: int) 
     if asked.spp is not None or resolved.spp == 1 or resolved.integrator not in POOLED_LIGHT:
         return resolved.samples
     return min(max(1, BUDGET.values // max(1, pixels)), 64)
+
+
+def _denoises(asked: RenderRequest, resolved: RenderRequest, scene: Scene) -> bool:
+    if resolved.denoises:
+        load_denoiser()
+        return True
+    is_noisy = asked.denoise == "auto" and resolved.integrator in POOLED_LIGHT
+    return is_noisy and not (scene.lies_off_surfaces or scene.fills_panel) and machine.has_denoiser()

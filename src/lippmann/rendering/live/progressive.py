@@ -19,7 +19,7 @@ from lippmann.display.seen_pixels import PixelSet
 from lippmann.rendering.denoise.noisy_blend import weigh_samples
 from lippmann.rendering.denoise.oidn import denoise
 from lippmann.rendering.film.batched_picture import STREAMS
-from lippmann.rendering.live.develop import arrange, develop, develop_picture
+from lippmann.rendering.live.develop import develop, develop_picture
 from lippmann.rendering.live.live_tracer import Lanes, PlacedDisplay
 from lippmann.rendering.live.live_view import LiveFrame, LiveView
 from lippmann.rendering.request.render_request import RenderRequest
@@ -135,8 +135,9 @@ class Progressive:
                 self._trace_features(seconds)
             assert self._features is not None
             self._denoised_at = self.samples
-            albedo, normal = (self._picture(values) for values in self._features)
-            first, second = (self._picture(sums / np.float32(self._taken)) for sums in self._sums)
+            albedo, normal = (self._pixels.arrange_lenses(values) for values in self._features)
+            halves = (sums / np.float32(self._taken) for sums in self._sums)
+            first, second = (self._pixels.arrange_lenses(half) for half in halves)
             threads = self._kernels.session.engine.threads
             self._task = _denoised((first, second), (albedo, normal), self.samples, threads)
         picture = next(self._task)
@@ -146,22 +147,10 @@ class Progressive:
         self._task = None
         return self._frame(self._developed(picture), seconds, is_denoised=True)
 
-    def _picture(self, values: Floats) -> Floats:
-        """Values ``(n, 3)`` of the pixels as the picture that the denoiser sees: of lenses, where they are blocks."""
-        blocks = self._pixels.blocks
-        if blocks is None:
-            return arrange(values, self._pixels)
-        with_black = np.concatenate([values, np.zeros((1, 3), np.float32)])
-        return np.ascontiguousarray(with_black[blocks])
-
     def _developed(self, picture: Floats) -> NDArray[np.uint8]:
-        blocks = self._pixels.blocks
-        if blocks is None:
+        if self._pixels.blocks is None:
             return develop_picture(picture, self._pixels, self._request)
-        values = np.zeros((len(self._pixels.column), 3), np.float32)
-        shown = blocks >= 0
-        values[blocks[shown]] = picture[shown]
-        return develop(values, self._pixels, self._request)
+        return develop(self._pixels.values_of_lenses(picture), self._pixels, self._request)
 
     def _frame(self, pixels: NDArray[np.uint8], seconds: dict[str, float], *, is_denoised: bool) -> LiveFrame:
         return LiveFrame(pixels, self.samples, is_denoised, self._placement, self._exposure, seconds)

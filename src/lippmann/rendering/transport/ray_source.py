@@ -80,18 +80,15 @@ class PixelRays:
         return self._source.rays(*self._at, point)
 
 
-class _OnePicture:
+class OnePicture(RaySource):
     """A ray source with a single view."""
-
-    width: int
-    height: int
 
     def tiles(self) -> Iterator[tuple[slice, slice]]:
         """Rows and columns of each view: here one, the whole picture."""
         yield slice(0, self.height), slice(0, self.width)
 
 
-class DisplayRays(_OnePicture):
+class DisplayRays(OnePicture):
     """Rays along the light lines of a display's pixels or sub-pixels.
 
     The samples of a pixel fill its square. Those of a sub-pixel fill a third of its width about the sub-pixel's own
@@ -129,7 +126,7 @@ class DisplayRays(_OnePicture):
         return self.display.light_ray(x, y, DEVICE)
 
 
-class WindowRays(_OnePicture):
+class WindowRays(OnePicture):
     """Rays of a window of a display's pixels, which keep the random numbers that they have in the whole picture."""
 
     def __init__(self, source: DisplayRays, window: PixelWindow) -> None:
@@ -149,7 +146,7 @@ class WindowRays(_OnePicture):
         return (row + self._top) * self._source.width + (column + self._left)
 
 
-class SinglePixelRays(_OnePicture):
+class SinglePixelRays(OnePicture):
     """Rays of single (sub-)pixels of a display, one beside the other, with the random numbers of the whole picture.
 
     Parameters
@@ -190,7 +187,7 @@ class SinglePixelRays(_OnePicture):
         return x, y, channel
 
 
-class SubpixelRays(_OnePicture):
+class SubpixelRays(OnePicture):
     """Rays of the sub-pixels of a display or of a window, as the pixels of a picture three times as wide.
 
     A sub-pixel has the rays and the random numbers that it has in ``source``, and is rendered in all three colours, of
@@ -305,7 +302,7 @@ class QuiltRays:
         return world_ray(self.world_from_display, origin, (slope_x, slope_y, dr.full(mi.Float64, -1, dr.width(x))))
 
 
-class CameraRays:
+class CameraRays(OnePicture):
     """Rays of a perspective or orthographic camera; pixel (0, 0) is at the top left."""
 
     def __init__(self, camera: Camera, width: int, height: int) -> None:

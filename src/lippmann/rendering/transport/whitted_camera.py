@@ -7,10 +7,11 @@ import mitsuba as mi
 
 from lippmann.device.sobol import hash32
 from lippmann.device.types import Float64, Point2f, Ray3f, UInt32, Vector3d
+from lippmann.rendering.transport.ray_source import OnePicture
 from lippmann.scene.values.whitted_scene import ClassicCamera, Handedness
 
 
-class WhittedCameraRays:
+class WhittedCameraRays(OnePicture):
     """Rays of the camera of a Whitted-style scene; pixel (0, 0) is at the top left.
 
     Samples fill a square of one pixel about the pixel's reference point: its upper right corner (Tachyon) or its
