@@ -70,7 +70,9 @@ def test_installed_plugins_render_their_own_files(engine, tmp_path):
 #: What makes each picture of the gallery small, and so its test quick.
 SMALLER = {
     "anaglyph": {"spp": 1},
+    "epipolar_image": {"lenses": (120, 100)},
     "focal_stack": {"spp": 1},
+    "micro_images": {"spp": 1},
     "molecule": {"spp": 1},
     "photograph": {"width": 320},
     "print_seen": {"size": "30x20mm"},

@@ -1,6 +1,6 @@
 """The numbers that the methods are tuned by.
 
-``benchmarks/reuse.py`` (light as in the paper) and ``benchmarks/careful.py`` (sampled light) measure their effect.
+``benchmarks/reuse.py`` measures their effect: with light as in the paper, and with sampled light.
 """
 
 from __future__ import annotations
