@@ -114,19 +114,49 @@ class UsageError(LippmannError):
 
 
 class SceneError(LippmannError):
-    """A scene file that is missing, damaged, foreign or beyond what can be rendered."""
+    """A scene file that is missing, damaged, foreign or beyond what can be rendered.
+
+    Examples
+    --------
+    >>> print(lippmann.plugins.SceneError("is no OFF file", where="gem.off", rule="its first line is OFF"))
+    gem.off: is no OFF file; its first line is OFF
+    """
 
 
 class DisplayError(LippmannError):
-    """A display description that is unknown, incomplete or physically impossible."""
+    """A display description that is unknown, incomplete or physically impossible.
+
+    Examples
+    --------
+    >>> lippmann.load_display("portait")
+    Traceback (most recent call last):
+    ...
+    lippmann.errors.DisplayError: unknown display 'portait', did you mean 'portrait'...
+    """
 
 
 class PictureError(LippmannError):
-    """A picture that cannot be read, or that does not fit what is asked of it."""
+    """A picture that cannot be read, or that does not fit what is asked of it.
+
+    Examples
+    --------
+    >>> lippmann.read_picture("none.png")
+    Traceback (most recent call last):
+    ...
+    lippmann.errors.PictureError: none.png...
+    """
 
 
 class OutputError(LippmannError):
-    """A place that cannot be written: unknown format, missing permission, full disk."""
+    """A place that cannot be written: unknown format, missing permission, full disk.
+
+    Examples
+    --------
+    >>> lippmann.render("teapot", integrator="normal", spp=1).save("teapot.bmp")
+    Traceback (most recent call last):
+    ...
+    lippmann.errors.OutputError: teapot.bmp...
+    """
 
 
 class MemoryLimitError(LippmannError):

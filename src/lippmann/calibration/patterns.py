@@ -157,6 +157,14 @@ def draw(pattern: Pattern, monitor: Monitor, window: PixelWindow | None = None) 
     ------
     UsageError
         If a field has values that no monitor can have, or there are more fields than pixels.
+
+    Examples
+    --------
+    >>> from lippmann.calibration.patterns import Pattern, draw
+    >>> from lippmann.display.formats.monitor import Monitor
+    >>> monitor = Monitor("tablet", lippmann.Panel(64, 48, 0.1), pitch=50.0, slope=6.0, center=0.0)
+    >>> draw(Pattern("stripes", views=5), monitor).shape
+    (48, 64, 3)
     """
     window = whole(monitor) if window is None else window
     pixels = np.zeros((*window.shape, 3), dtype=np.float32)

@@ -131,6 +131,15 @@ def export_image(
         If the layout cannot hold the views of the picture's display.
     OutputError
         If the layout has no such ``bits``, or ``path`` cannot be written or has the wrong ending.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from lippmann.exchange.layouts import export_image
+    >>> image = lippmann.render("teapot", "mla-square", integrator="normal", spp=1)
+    >>> exported = export_image(image, Path("views"), "views", bits=8)
+    >>> len(list(Path("views").glob("*.png"))) > 1
+    True
     """
     check_target(layout, path)
     plugin, found = _plugin(layout), _layout(layout)
@@ -172,6 +181,16 @@ def import_image(
         If the layout is unknown, or a library of the extra ``exchange`` is not installed.
     PictureError
         If a file is missing or damaged, the views do not match the display, or there is no display.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from lippmann.exchange.layouts import export_image, import_image
+    >>> image = lippmann.render("teapot", "mla-square", integrator="normal", spp=1)
+    >>> exported = export_image(image, Path("views"), "views", bits=8)
+    >>> picture, notes = import_image(Path("views"))
+    >>> picture.pixels.shape == image.pixels.shape
+    True
     """
     name = recognize(path) if layout is None else layout
     if name == "views" and is_composable(path):

@@ -72,6 +72,13 @@ class LightField:
     ------
     PictureError
         If ``values`` has another shape or type, or more than :data:`MOST_PIXELS` pixels.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from lippmann.plugins import LightField
+    >>> LightField(np.zeros((3, 5, 20, 30, 3), np.uint8)).shape
+    (3, 5, 20, 30)
     """
 
     values: Values

@@ -52,6 +52,14 @@ class Comparison:
         Change of the errors from view to view; None if there is one view only.
     paper:
         The figures of the 2014 paper.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from lippmann.metrics.comparison import compare
+    >>> white = lippmann.IntegralImage(np.ones((8, 16, 3)), lippmann.load_display("seed-lenticular").resized(16, 8))
+    >>> compare(white, white.with_pixels(np.zeros((8, 16, 3)))).micro_image_errors.shape
+    (1, 2)
     """
 
     reference: Picture
@@ -186,6 +194,14 @@ def compare(reference: Picture, test: Picture, progress: ProgressCallback = sile
     ------
     PictureError
         If the pictures have different sizes or displays, or the file of one is damaged.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from lippmann.metrics.comparison import compare
+    >>> white = lippmann.IntegralImage(np.ones((8, 16, 3)), lippmann.load_display("seed-lenticular").resized(16, 8))
+    >>> compare(white, white).mean_squared_error
+    0.0
     """
     check_comparable(reference, test)
     panel = reference.display.panel

@@ -129,6 +129,13 @@ class Quilt:
         The display that the views are for; None if unknown.
     notes:
         What of its files is not shown, each in one line.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from lippmann.quilts.quilt import Quilt, QuiltLayout
+    >>> Quilt(np.zeros((20, 90, 3), np.float32), QuiltLayout(3, 1, 1.5)).view(2).shape
+    (20, 30, 3)
     """
 
     values: Values

@@ -80,6 +80,15 @@ def weave(
         If the choice is unknown.
     PictureError
         If the display is not lenticular, or the quilt has another aspect ratio than its panel.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from lippmann.quilts.quilt import Quilt, QuiltLayout
+    >>> from lippmann.quilts.weave import weave
+    >>> small = lippmann.load_display("seed-lenticular").resized(16, 8)
+    >>> weave(Quilt(np.zeros((20, 120, 3), np.float32), QuiltLayout(3, 1, 2.0)), small).pixels.shape
+    (8, 16, 3)
     """
     check_weave(quilt, display, choice)
     weaving = Weaving(quilt, display, choice, correct)

@@ -38,6 +38,12 @@ class FrameRange:
     ------
     UsageError
         It is empty, or a number is out of range.
+
+    Examples
+    --------
+    >>> from lippmann.sequences.frames import FrameRange
+    >>> FrameRange(0, 48, 2).step
+    2
     """
 
     first: int = 0
@@ -168,6 +174,16 @@ def render_sequence(
     ------
     LippmannError
         Of the kind that says what was wrong; before the first frame for what can be told then.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from lippmann.sequences.frames import open_motion, render_sequence
+    >>> Path("flight.cam").write_text("0 0 1  0 1 0  0 0 -3   0 0 1  0 1 0  0 0 -2.9")
+    45
+    >>> motion, small = open_motion("teapot", camera_path=Path("flight.cam")), lippmann.load_display("mla-square")
+    >>> [frame for frame, image in render_sequence(motion, small.resized(32, 32), spp=1)]
+    [0, 1]
     """
     target, numbers, where = _begin(motion, display, frames, placement)
     return render_frames(motion, target, numbers, where, RenderRequest.of(options), INTEGRAL, progress)
@@ -204,6 +220,17 @@ def render_quilt_sequence(
     ------
     LippmannError
         Of the kind that says what was wrong; before the first frame for what can be told then.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from lippmann.sequences.frames import open_motion, render_quilt_sequence
+    >>> Path("flight.cam").write_text("0 0 1  0 1 0  0 0 -3   0 0 1  0 1 0  0 0 -2.9")
+    45
+    >>> motion = open_motion("teapot", camera_path=Path("flight.cam"))
+    >>> frames = render_quilt_sequence(motion, views=(2, 1), size=(256, 256), integrator="normal", spp=1)
+    >>> [quilt.layout.columns for frame, quilt in frames]
+    [2, 2]
     """
     from lippmann.quilts.quilt import quilt_of_display
 

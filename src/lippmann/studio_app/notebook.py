@@ -63,6 +63,12 @@ class NotebookStudio:
     ------
     LippmannError
         In one line: a value out of its range, no such scene, display or folder, a port in use.
+
+    Examples
+    --------
+    >>> with lippmann.studio("teapot") as page:  # doctest: +SKIP
+    ...     page.state.display
+    'seed-lenticular'
     """
 
     def __init__(

@@ -46,6 +46,12 @@ class StudioState(QualityOptions, LightOptions, PlacementOptions, SceneOptions):
     ------
     UsageError
         A value is of another type, out of its range, or does not go with another one.
+
+    Examples
+    --------
+    >>> from lippmann.studio_app.state import StudioState
+    >>> StudioState(scene="gears", turn=(30.0, 0.0, 0.0)).placement().turn
+    (30.0, 0.0, 0.0)
     """
 
     scene: str = option(FIRST_SCENE, "Scene file, or a bundled scene's name.", group="Scene")

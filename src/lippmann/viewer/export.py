@@ -50,6 +50,14 @@ def export_page(pictures: Sequence[tuple[str, Picture]], path: Path) -> None:
         If there is no picture, or there are more than two, or one has more than :data:`MOST_PIXELS`.
     OutputError
         If the place cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from lippmann.viewer.export import export_page
+    >>> small = lippmann.load_display("seed-lenticular").resized(16, 8)
+    >>> export_page([("white", lippmann.IntegralImage(np.ones((8, 16, 3)), small))], Path("page.html"))
     """
     if not 1 <= len(pictures) <= MAX_PICTURES:
         raise UsageError(f"{len(pictures)} pictures", rule="must be one or two")

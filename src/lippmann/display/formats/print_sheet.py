@@ -123,6 +123,12 @@ class Print:
     ------
     DisplayError
         If a value is out of range, or two say the same; ``where`` names it.
+
+    Examples
+    --------
+    >>> from lippmann.display.formats.print_sheet import Print
+    >>> Print(ppi=600, size=(60.0, 45.0), lpi=60).display().panel.width
+    1417
     """
 
     ppi: float

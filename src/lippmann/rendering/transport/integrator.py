@@ -12,7 +12,15 @@ if TYPE_CHECKING:  # plugins take their names from here before the engine starts
 
 @dataclass
 class RayCounts:
-    """Rays per lane beyond the primary: ``secondary`` follow scattered light, ``shadow`` test visibility."""
+    """Rays per lane beyond the primary: ``secondary`` follow scattered light, ``shadow`` test visibility.
+
+    Examples
+    --------
+    >>> import mitsuba as mi
+    >>> from lippmann.plugins import RayCounts
+    >>> RayCounts(secondary=mi.UInt32(2), shadow=mi.UInt32(1)).shadow
+    [1]
+    """
 
     secondary: UInt32
     shadow: UInt32

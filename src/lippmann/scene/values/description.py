@@ -36,6 +36,13 @@ class Image:
 
     ``pixels`` is ``(height, width, channels)`` uint8 or float32, row 0 on top, channels 1 (L), 3 (RGB) or 4 (RGBA) as
     stored. The texture that uses the image says whether its values are sRGB-coded.
+
+    Examples
+    --------
+    >>> from lippmann.plugins import Image
+    >>> import numpy as np
+    >>> Image("white", np.full((1, 2, 3), 255, np.uint8)).pixels.shape
+    (1, 2, 3)
     """
 
     name: str
@@ -44,7 +51,15 @@ class Image:
 
 @dataclass(frozen=True, eq=False)
 class Texture:
-    """An image seen through a sampler: ``uv' = uv_transform @ (u, v, 1)``, v pointing down from the top row."""
+    """An image seen through a sampler: ``uv' = uv_transform @ (u, v, 1)``, v pointing down from the top row.
+
+    Examples
+    --------
+    >>> from lippmann.plugins import Image, Texture
+    >>> import numpy as np
+    >>> Texture(Image("white", np.full((1, 2, 3), 255, np.uint8)), srgb=True).wrap_u
+    'repeat'
+    """
 
     image: Image
     srgb: bool
@@ -66,6 +81,12 @@ class Material:
     [0, 1]. ``anisotropy`` is a strength in [0, 1], its ``rotation`` in radians from +u toward the top of the picture;
     its texture holds a direction in RG and a strength in B. The thin film of ``iridescence`` is some nanometres thick:
     from minimum to maximum as its texture says, the maximum without one.
+
+    Examples
+    --------
+    >>> from lippmann.plugins import Material
+    >>> Material("red", base_color=(0.8, 0.0, 0.0), roughness=0.3).metallic
+    0.0
     """
 
     name: str = ""
@@ -127,6 +148,14 @@ class Mesh:
     ball of radius 1 about the origin, or a rod of radius 1 from there to (0, 0, 1), open at its ends; what can trace
     such bodies does so instead. ``points``: vertices of each of the balls that stand for points of a cloud, one ball
     after the other; 0 for other meshes.
+
+    Examples
+    --------
+    >>> from lippmann.plugins import Mesh
+    >>> import numpy as np
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    >>> Mesh("triangle", corners, np.array([[0, 1, 2]], np.uint32), material=0).normals is None
+    True
     """
 
     name: str
@@ -147,6 +176,13 @@ class Instance:
     """Placements of one mesh (index into ``SceneDescription.meshes``).
 
     ``world_from_mesh`` is ``(4, 4)``, or ``(k, 4, 4)`` for k copies, which takes less memory than k instances.
+
+    Examples
+    --------
+    >>> from lippmann.plugins import Instance
+    >>> import numpy as np
+    >>> Instance(0, np.stack([np.eye(4), np.diag([2, 2, 2, 1])])).world_from_mesh.shape  # two copies
+    (2, 4, 4)
     """
 
     mesh: int
@@ -160,6 +196,13 @@ class Light:
     ``point``: ``color`` is radiant intensity (W/sr, falling with the square of the distance); ``spot``: the same inside
     a cone about the light's -z, smooth between the inner and outer half-angle (radians); ``directional``: irradiance
     (W/m^2) travelling along the light's -z. ``radius`` > 0 makes point and spot lights emissive spheres of that size.
+
+    Examples
+    --------
+    >>> from lippmann.plugins import Light
+    >>> import numpy as np
+    >>> Light("point", (10.0, 10.0, 10.0), np.eye(4)).radius
+    0.0
     """
 
     kind: Literal["point", "spot", "directional"]
@@ -180,6 +223,13 @@ class Camera:
     ``focus_distance`` (world units) becomes the lens plane when the camera places a display; None means
     the distance of the scene's centre. ``shift`` is where the middle of the picture lies beside the axis, to the right
     and up: a slope (perspective), or world units (orthographic). ``exposure`` is the camera's own, in stops.
+
+    Examples
+    --------
+    >>> from lippmann.plugins import Camera
+    >>> import numpy as np
+    >>> Camera("front", np.eye(4), fov_y=np.radians(40)).shift
+    (0.0, 0.0)
     """
 
     name: str
@@ -199,6 +249,12 @@ class Environment:
     Row 0 lies at +y (up), the middle column at -z, ahead of a viewer who looks that way; columns run to the right (+x).
     ``follows_viewer`` says that this holds for whoever looks at the scene, wherever the display or camera stands;
     ``world_from_environment`` is then set for each picture. ``notes`` say what of its file is not used.
+
+    Examples
+    --------
+    >>> from lippmann.plugins import Environment
+    >>> import numpy as np
+    >>> scene = lippmann.load_scene("teapot", environment=Environment(np.ones((8, 16, 3), np.float32)))
     """
 
     pixels: FloatArray
@@ -219,6 +275,16 @@ class SceneDescription:
     lux or candela. ``splats`` and ``volume`` stand in the world. ``fills_panel`` says that displays are to show no
     border of the scene, as of a photograph. ``up`` is the direction that points up by the file's own words, where its
     format leaves that open; None where nothing says it.
+
+    Examples
+    --------
+    >>> from lippmann.plugins import Instance, Material, Mesh, SceneDescription
+    >>> import numpy as np
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    >>> triangle = Mesh("triangle", corners, np.array([[0, 1, 2]], np.uint32), material=0)
+    >>> scene = SceneDescription("one", [triangle], [Material()], [Instance(0, np.eye(4))])
+    >>> lippmann.load_scene(scene).bounds.tolist()
+    [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]]
     """
 
     name: str
