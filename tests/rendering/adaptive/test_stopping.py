@@ -94,11 +94,11 @@ def test_a_picture_that_converges_slowly_gets_larger_rounds():
 
 
 def test_a_default_picture_ends_with_its_first_round_where_it_is_likely_clean():
-    goal = Goal(TUNING.clean, TUNING.clean_worst, spp=64, is_promise=False)
+    goal = Goal(TUNING.clean, TUNING.clean_worst, spp=128, is_promise=False)
     clean, noisy = Noise(error=1e-3), Noise(error=2e-2)
     assert (run(goal, clean, first=8).end, clean.samples) == ("quality", 8)
     assert run(goal, noisy, first=8).end == "quality"
-    assert 32 < noisy.samples <= 64
+    assert 64 < noisy.samples <= 128
 
 
 def test_the_mean_asks_for_less_than_the_worst():

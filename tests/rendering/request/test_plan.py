@@ -205,7 +205,7 @@ def test_whatever_is_left_open_has_a_reason():
     planned = resolve(RenderRequest(), SCENE, load_display("looking-glass-portrait"))
     plan = planned.plan
     assert all(choice.reason and choice.reason != ASKED for choice in plan.entries.values())
-    assert (plan.samples.value, plan.reserve.value, plan.subpixels.value) == (4, 16, True)
+    assert (plan.samples.value, plan.reserve.value, plan.subpixels.value) == (4, 20, True)
     assert plan.to_dict()["samples"] == {"value": 4, "reason": plan.samples.reason}
     assert f"samples: 4 ({plan.samples.reason})" in plan.lines()
     # A picture may be planned again, as a sequence's frames are: its values are asked for then.
@@ -215,7 +215,7 @@ def test_whatever_is_left_open_has_a_reason():
 
 @pytest.mark.parametrize(
     ("width", "samples", "reserve"),
-    [(64, 16, 128), (512, 4, 32), (1024, 4, 32), (1500, 4, 16), (4200, 4, 8), (6000, 4, None)],
+    [(64, 16, 128), (512, 4, 32), (1024, 4, 32), (1500, 4, 32), (4200, 4, 8), (6000, 4, None)],
 )
 def test_samples_and_reserve_follow_the_size(width, samples, reserve):
     plan = resolve(RenderRequest(), SCENE, load_display("seed-lenticular"), size=(width, width)).plan

@@ -44,8 +44,8 @@ class AdaptiveTuning:
     tolerance: float = 1.0
     most_below: float = 12.0
     time_share: float = 0.9
-    clean: float = 35.0
-    clean_worst: float = 25.0
+    clean: float = 37.0
+    clean_worst: float = 28.0
 
 
 TUNING = AdaptiveTuning()

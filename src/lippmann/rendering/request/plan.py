@@ -50,9 +50,9 @@ class SampleBudget:
         16 are for who asks for them (``docs/research/equal-time.md``).
     fewest_of_many, many:
         Samples per sub-pixel of pictures of more than ``many`` values.
-    reserve:
-        Pairs of values that a picture has at most, and how many times its samples it may have if it is not clean with
-        them. Beyond the last a pass takes minutes: who asks for so large a picture may say how clean it shall be.
+    reserve, most_in_reserve:
+        How many times its samples a picture may have if it is not clean with them, and how many these may
+        be in all: minutes of two cores. Who asks for so large a picture may say how clean it shall be.
     """
 
     values: int = 1 << 20
@@ -60,7 +60,8 @@ class SampleBudget:
     most: int = 16
     fewest_of_many: int = 2
     many: int = 1 << 24
-    reserve: tuple[tuple[int, int], ...] = ((1 << 20, 8), (1 << 24, 4), (1 << 25, 2))
+    reserve: int = 8
+    most_in_reserve: int = 200_000_000
 
 
 BUDGET = SampleBudget()
@@ -351,12 +352,13 @@ def _quality(facts: _Facts, method: Method) -> Choice[float | None]:
 def _reserve(facts: _Facts, method: Method, samples: int | None, values: int | None) -> Choice[int | None]:
     is_given = facts.request.spp is not None or facts.request.effort != "normal" or samples is None
     is_other = facts.form not in ("picture", "forecast") or method != "pooled" or values is None
-    factor = next((factor for most, factor in BUDGET.reserve if (values or 0) <= most), None)
+    spent = (values or 1) * (samples or 1)
+    factor = min(BUDGET.reserve, BUDGET.most_in_reserve // spent)
     return _first(
         (is_given, None, "the number of samples, or the goal, was asked for"),
         (is_other, None, "a pooled picture in one piece has one"),
-        (factor is None, None, "the picture is too large"),
-        (True, (factor or 1) * (samples or 1), "up to so many if it is not clean by its own estimate"),
+        (factor < 2, None, "the picture is too large"),
+        (True, factor * (samples or 1), "up to so many if it is not clean by its own estimate"),
     )
 
 
