@@ -44,6 +44,8 @@ def cheaper(words: list[str]) -> list[str]:
     if "--turntable" in words:
         words = list(words)
         words[words.index("--turntable") + 1] = "2"
+    if "--target" in words and words[1] == "quilt":
+        return [*words, "--size", "960x270" if "displayxr" in words else "480x270", "--spp", "2"]
     if words[1:3] == ["quilt", "render"]:
         return [*words, "--size", "384x384", "--spp", "2"]
     if "--sweep" in words:

@@ -85,8 +85,8 @@ def test_plan_says_what_to_expect(lippmann, calibration, monkeypatch):
     outcome = lippmann(*words)
     assert outcome.code == 0, outcome.err
     starts = [line.split()[0] for line in outcome.out.splitlines()]
-    assert starts[:7] == ["picture", "scene", "resolved", "blur", "rays", "memory", "time"]
-    assert set(starts[7:]) >= {"integrator", "method", "samples", "tone_map", "window", "wavefronts"}
+    assert starts[:8] == ["picture", "scene", "resolved", "comfort", "blur", "rays", "memory", "time"]
+    assert set(starts[8:]) >= {"integrator", "method", "samples", "tone_map", "window", "wavefronts"}
     assert "150x200 pixels, a ray for every sub-pixel" in outcome.out
     assert "0.4 M from pixels (4 samples each)" in outcome.out
     assert "what lies beyond is blurred" in outcome.err

@@ -10,8 +10,17 @@ from PIL import Image
 
 from lippmann.color.transfer import dequantize
 from lippmann.display import load_display
-from lippmann.errors import PictureError
-from lippmann.quilts.quilt import DEVICE_QUILTS, Quilt, QuiltLayout, check_size, layout_of_name
+from lippmann.errors import PictureError, UsageError
+from lippmann.quilts.quilt import (
+    DEVICE_QUILTS,
+    Quilt,
+    QuiltLayout,
+    check_size,
+    ending_of_name,
+    layout_of_name,
+    names_layout,
+    quilt_of_display,
+)
 
 LAYOUT = QuiltLayout(8, 6, 0.75)
 
@@ -103,3 +112,47 @@ def test_a_quilt_shows_itself_in_notebooks_and_gives_its_codes():
     assert (quilt.srgb(16) == 48192).all()
     with pytest.raises(PictureError, match="codes of 12 bits; display codes have 8 or 16 bits"):
         quilt.srgb(12)
+
+
+@pytest.mark.parametrize(
+    ("display", "size", "expected"),
+    [
+        ("odyssey-3d", None, (3840, 2160, "_half_2x1")),
+        ("odyssey-3d", (7680, 2160), (7680, 2160, "_2x1")),
+        ("odyssey-3d", (480, 270), (480, 270, "_half_2x1")),
+        ("displayxr", None, (3840, 1080, "_2x1")),
+        ("lume-pad", None, (5120, 1600, "_2x1")),
+        ("lume-pad", (2560, 1600), (2560, 1600, "_half_2x1")),
+    ],
+)
+def test_pairs_of_monitors(display, size, expected):
+    found = quilt_of_display(load_display(display), None, size)
+    assert (found.width, found.height, found.ending) == expected
+    panel = load_display(display).panel
+    assert found.layout == (2, 1, pytest.approx(panel.width / panel.height, rel=1e-5))
+
+
+@pytest.mark.parametrize(
+    ("grid", "size", "error", "said"),
+    [
+        ((8, 6), None, UsageError, "8x6; odyssey-3d shows one view to either eye"),
+        (
+            None,
+            (1000, 1000),
+            PictureError,
+            "it is 1000 x 1000 pixels; pairs for odyssey-3d have the shape of 7680x2160",
+        ),
+        (None, (16, 9), PictureError, "a quilt's sides are 256 to 16384 pixels"),
+    ],
+)
+def test_other_pictures_are_not_for_monitors(grid, size, error, said):
+    with pytest.raises(error, match=said):
+        quilt_of_display(load_display("odyssey-3d"), grid, size)
+
+
+def test_a_pair_is_known_by_its_name(tmp_path):
+    for stem, ending in (("a_2x1", "_2x1"), ("a_half_2x1", "_half_2x1"), ("a_12x1", ""), ("a_2x1_b", "")):
+        path = tmp_path / f"{stem}.png"
+        assert ending_of_name(path) == ending
+        assert names_layout(path) == bool(ending)
+    assert layout_of_name(tmp_path / "a_half_2x1.png") == (2, 1, None)

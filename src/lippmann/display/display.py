@@ -30,6 +30,7 @@ from lippmann.display.lens_profile import LensProfile
 from lippmann.display.panel import Panel
 from lippmann.display.pixel_aperture import PixelAperture
 from lippmann.display.sheet import Sheet
+from lippmann.display.stereo import COMFORTABLE, StereoPair, depth_of_disparity
 from lippmann.display.validation import Table, check_keys, check_text, number, positive
 from lippmann.errors import DisplayError
 from lippmann.json_values import JsonObject
@@ -42,11 +43,14 @@ INFINITE = "infinite"
 Vector = tuple[Array, Array, Array]
 
 #: Tables of a display that may be left out.
-OPTIONAL_TABLES: dict[str, type[Sheet] | type[LensProfile] | type[Distortion] | type[PixelAperture]] = {
+OPTIONAL_TABLES: dict[
+    str, type[Sheet] | type[LensProfile] | type[Distortion] | type[PixelAperture] | type[StereoPair]
+] = {
     "sheet": Sheet,
     "lens": LensProfile,
     "distortion": Distortion,
     "pixel": PixelAperture,
+    "stereo": StereoPair,
 }
 
 #: A scene point is resolved while it spreads over at most one lens pitch, or over so small a share of the panel's
@@ -84,6 +88,8 @@ class Display:
     distortion:
         How the true directions of the lenses differ from those of a pinhole at the gap, see
         :func:`lippmann.optics.directions.distortion_of`; None for the pinhole's.
+    stereo:
+        The side-by-side picture that an eye-tracked monitor takes; None for displays that take native pixels or quilts.
 
     Notes
     -----
@@ -120,6 +126,7 @@ class Display:
     lens: LensProfile | None = None
     pixel: PixelAperture | None = None
     distortion: Distortion | None = None
+    stereo: StereoPair | None = None
 
     def __post_init__(self) -> None:
         check_text(self.name, "name", empty=False)
@@ -247,8 +254,11 @@ class Display:
 
         A point is held to be resolved while the light of one pixel, at its height, spreads over at most one lens pitch,
         the display's own sampling in the lens plane, or a 150th of the panel's shorter side: ``z = s g / d`` for a
-        spread s. Where sub-pixels lie under a slanted sheet, each shows a direction of its own: d is theirs.
+        spread s. Where sub-pixels lie under a slanted sheet, each shows a direction of its own: d is theirs. An
+        eye-tracked monitor resolves all depths, and is held to what is comfortable.
         """
+        if self.stereo is not None:
+            return depth_of_disparity(COMFORTABLE, COMFORTABLE, self.viewing_distance, self.stereo.eyes)
         depth = self.resolved_size * self.gap / self.panel.pixel_pitch * (3.0 if self.has_slanted_stripes else 1.0)
         return min(depth, self.viewing_distance), -depth
 

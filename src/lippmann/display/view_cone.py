@@ -24,6 +24,13 @@ def depth_gain_of_fused_cone(display: Display) -> float:
     return zone_slopes(display)[0] / math.tan(math.radians(FUSED_CONE) / 2.0)
 
 
+def cone_in_words(cone: float, gain: float) -> str:
+    """A view cone in degrees, and what :func:`depth_gain_of_fused_cone` says if it is wider than that."""
+    is_wide = cone > FUSED_CONE + 0.5  # a nominal cone is 35 after rounding
+    fused = f" (in {FUSED_CONE:.0f}, {gain:.1f} times as much would fuse)" if is_wide else ""
+    return f"in a view cone of {cone:.0f} degrees{fused}"
+
+
 def cone_tangent(display: Display) -> float:
     """Tangent of half the angle over which an eye sees a lenticular display's own views as it moves level, sideways.
 

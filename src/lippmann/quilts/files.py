@@ -24,7 +24,15 @@ from lippmann.image.read import MOST_PIXELS, opaque_colors, open_file
 from lippmann.image.stored_values import Stored, Values
 from lippmann.image.write import format_for, replacing_output
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.quilts.quilt import MOST_SIDE, Quilt, QuiltLayout, check_size, layout_of_name, names_layout
+from lippmann.quilts.quilt import (
+    MOST_SIDE,
+    Quilt,
+    QuiltLayout,
+    check_size,
+    layout_of_name,
+    names_half_pair,
+    names_layout,
+)
 from lippmann.quilts.quilt_metadata import metadata_of_text, quilt_text
 from lippmann.runtime.atomic_write import replacing_folder
 from lippmann.runtime.regular_file import check_kind
@@ -73,6 +81,8 @@ def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
             layout = metadata.layout if metadata and not names_layout(path) else layout_of_name(path)
         if layout.aspect is None and metadata is not None:
             layout = layout._replace(aspect=metadata.layout.aspect)
+        elif layout.aspect is None and names_half_pair(path):
+            layout = layout._replace(aspect=file.size[0] / file.size[1])
         check_size(*file.size, layout, str(path))
         values = file.read()
     stored = cast("Stored", values.dtype.name)

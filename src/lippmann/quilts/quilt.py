@@ -4,12 +4,15 @@ View 0, that of the leftmost camera, is at the bottom left; views follow to the 
 quilt's name ends in ``_qs8x6a0.75``: columns x rows, and the aspect ratio of the displayed picture, which the tiles
 need not have. If the sides of the file are no multiples of columns and rows (4096 / 5), the rest is unused, on the
 right and on top.
+
+A stereo pair is a quilt of two views, the left eye's first. Its name ends in ``_2x1``, or in ``_half_2x1`` if the views
+are to be shown at twice their width: by these endings players of eye-tracked monitors know it.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
+from lippmann.display.stereo import PairWidth, StereoPair
 from lippmann.errors import PictureError, UsageError
 from lippmann.image.encoding import display_codes, linear_values
 from lippmann.image.provenance import Provenance
@@ -29,6 +33,7 @@ LEAST_SIDE, MOST_SIDE, MOST_TILES = 256, 16384, 32
 _NOTEBOOK_WIDTH = 768
 
 _NAME = re.compile(r"_qs(\d{1,4})x(\d{1,4})(?:a(\d{1,4}(?:\.\d{1,17})?))?$")
+_PAIR = re.compile(r"_(?:half_)?2x1$")
 _CONVENTION = "a quilt's name ends in columns x rows and aspect ratio, such as _qs8x6a0.75.png"
 
 
@@ -71,6 +76,8 @@ class DeviceQuilt(NamedTuple):
         Columns, rows and aspect ratio.
     serial:
         Prefix of the serial numbers of such devices; empty if unknown.
+    pair:
+        Ending of a stereo pair's name; empty for other quilts.
     """
 
     display: str
@@ -78,6 +85,12 @@ class DeviceQuilt(NamedTuple):
     height: int
     layout: QuiltLayout
     serial: str = ""
+    pair: str = ""
+
+    @property
+    def ending(self) -> str:
+        """The ending of the file's stem, such as ``_qs8x6a0.75`` or ``_half_2x1``."""
+        return self.pair or self.layout.ending
 
 
 #: Prefix of the names of the devices' presets.
@@ -214,7 +227,8 @@ def quilt_of_display(
     grid:
         Columns and rows of views, 1 to 32 each. None: as recommended for the device.
     size:
-        Width and height of the quilt in pixels, 256 to 16384 each. None: as recommended for the device.
+        Width and height of the quilt in pixels, 256 to 16384 each. None: as recommended for the device. Of a stereo
+        pair the shape says whether its views have the panel's shape or half of its width.
 
     Returns
     -------
@@ -223,13 +237,16 @@ def quilt_of_display(
     Raises
     ------
     UsageError
-        If the grid is out of range, or no recommendation is known for what is None.
+        If the grid is out of range, or no recommendation is known for what is None; an eye-tracked monitor is given
+        other views than two side by side.
     PictureError
         If the size is out of range, or does not divide into views.
     """
     if grid is not None and not (1 <= grid[0] <= MOST_TILES and 1 <= grid[1] <= MOST_TILES):
         rule = f"there are 1 to {MOST_TILES} columns and rows"
         raise UsageError(f"{grid[0]}x{grid[1]} is out of range", parameter="views", rule=rule)
+    if display.stereo is not None:
+        return _pair_of_display(display, display.stereo, grid, size)
     layout = grid
     known = [
         device
@@ -253,9 +270,52 @@ def quilt_of_display(
     return quilt
 
 
+def _pair_of_display(
+    display: Display, stereo: StereoPair, grid: tuple[int, int] | None, size: tuple[int, int] | None
+) -> DeviceQuilt:
+    """The side-by-side picture of an eye-tracked monitor; parameters and errors as of :func:`quilt_of_display`."""
+    if grid is not None and grid != (2, 1):
+        rule = f"{display.name} shows one view to either eye"
+        raise UsageError(f"{grid[0]}x{grid[1]}", parameter="views", rule=rule, fix="leave it out")
+    panel = display.panel
+    whole: dict[PairWidth, tuple[int, int]] = {
+        "full": (2 * panel.width, panel.height),
+        "half": (panel.width, panel.height),
+    }
+    width, height = size or whole[stereo.width]
+    # To a pixel of either side, so that any whole size of that shape is one.
+    fitting = [name for name, (w, h) in whole.items() if abs(width * h - height * w) <= max(w, h)]
+    if not fitting:
+        shapes = " or ".join(f"{w}x{h} ({name} width)" for name, (w, h) in whole.items())
+        raise PictureError(
+            f"it is {width} x {height} pixels", rule=f"pairs for {display.name} have the shape of {shapes}"
+        )
+    layout = QuiltLayout(2, 1, float(f"{panel.width / panel.height:.6g}"))
+    check_size(width, height, layout, "pair")
+    ending = replace(stereo, width=fitting[0]).ending
+    return DeviceQuilt(display.name, width, height, layout, pair=ending)
+
+
 def names_layout(path: Path) -> bool:
     """Whether a file's name says a quilt's layout."""
-    return _NAME.search(path.stem) is not None
+    return _NAME.search(path.stem) is not None or _PAIR.search(path.stem) is not None
+
+
+def names_half_pair(path: Path) -> bool:
+    """Whether a file's name says a stereo pair of half width, whose layout has the shape of the whole picture."""
+    return path.stem.endswith("_half_2x1")
+
+
+def ending_of_name(path: Path) -> str:
+    """The ending of a file's stem that says its layout, as :attr:`DeviceQuilt.ending`; empty without one.
+
+    Raises
+    ------
+    PictureError
+        As :func:`layout_of_name`.
+    """
+    pair = _PAIR.search(path.stem)
+    return pair[0] if pair else layout_of_name(path).ending if names_layout(path) else ""
 
 
 def layout_of_name(path: Path) -> QuiltLayout:
@@ -266,6 +326,8 @@ def layout_of_name(path: Path) -> QuiltLayout:
     PictureError
         If the name has no layout, or its numbers are out of range.
     """
+    if _PAIR.search(path.stem):
+        return QuiltLayout(2, 1, None)
     match = _NAME.search(path.stem)
     if match is None:
         raise PictureError("the name does not say how many views there are", where=str(path), rule=_CONVENTION)

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from lippmann.device.types import Point2f, Ray3f, UInt32
 from lippmann.display import Display
-from lippmann.display.view_cone import FUSED_CONE, depth_gain_of_fused_cone, view_cone
+from lippmann.display.comfort import comfort_in_words
+from lippmann.display.view_cone import cone_in_words, depth_gain_of_fused_cone, view_cone
 from lippmann.optics.lens import lens_notes
 from lippmann.optics.proof import Proof, prove
 from lippmann.progress import Progress, ProgressCallback, silent
@@ -59,6 +60,8 @@ class Forecast:
     view_cone, fused_gain:
         Degrees over which an eye sees the display's own views; how many times as much depth the same panel would
         resolve in :data:`lippmann.display.view_cone.FUSED_CONE`.
+    comfort:
+        Disparity at either end of the depth range from the viewing distance, in words; empty if that is infinite.
     blur:
         Over how many lens pitches one pixel's light spreads at either end of the depth range; up to 1 is resolved.
     blurred_share:
@@ -92,6 +95,7 @@ class Forecast:
     resolvable_range: tuple[float, float]
     view_cone: float
     fused_gain: float
+    comfort: str
     blur: tuple[float, float]
     blurred_share: float
     rays: dict[str, int]
@@ -109,21 +113,18 @@ class Forecast:
         of_frames = f", {self.frames} frames" if self.frames > 1 else ""
         of_subpixels = ", a ray for every sub-pixel" if self.subpixels else ""
         back, front = self.blur
-        is_wide = self.view_cone > FUSED_CONE + 0.5  # a nominal cone is 35 after rounding
-        gain = f" (in {FUSED_CONE:.0f}, {self.fused_gain:.1f} times as much would fuse)" if is_wide else ""
         stages = ", ".join(f"{stage} {duration_in_words(s)}" for stage, s in self.seconds.items() if stage != "total")
-        others = self.rays["shadow"] + self.rays["secondary"]
-        resolved = depths_in_words(*self.resolvable_range)
         proof = {} if self.proof is None else self.proof.in_words()
         return {
             "picture": f"{self.scene} for {self.display}, {width}x{height} pixels{of_frames}{of_subpixels}",
             "scene": depths_in_words(*self.depth_range),
-            "resolved": f"{resolved}, in a view cone of {self.view_cone:.0f} degrees{gain}",
+            "resolved": f"{depths_in_words(*self.resolvable_range)}, {cone_in_words(self.view_cone, self.fused_gain)}",
+            **({"comfort": self.comfort} if self.comfort else {}),
             "blur": f"{100 * self.blurred_share:.0f} % of the pixels see what lies beyond; "
             f"a pixel's light spreads over {back:.1f} lenses at the back, {front:.1f} at the front",
             **{name: proof[name] for name in ("crosstalk", "advice") if name in proof},
             "rays": f"{self.rays['primary'] / 1e6:.1f} M from pixels ({samples_in_words(self.spp, 'each')}), "
-            f"about {others / 1e6:.1f} M more",
+            f"about {(self.rays['shadow'] + self.rays['secondary']) / 1e6:.1f} M more",
             "memory": f"about {self.memory['expected'] / 2**30:.1f} GiB, "
             f"with a limit of {self.memory['limit'] / 2**30:.1f} GiB for the picture",
             "time": f"about {duration_in_words(self.seconds['total'])} on {self.device} ({stages})",
@@ -177,7 +178,7 @@ def forecast(
     if request.denoises:
         seconds["denoise"] = frames * _denoise_seconds(session, source, placement)
     seconds["total"] = sum(seconds.values())
-    per_pixel = display.panel.pixel_pitch / display.gap / display.lens_array.pitch
+    per_pixel = 0.0 if display.stereo else display.panel.pixel_pitch / display.gap / display.lens_array.pitch
     share_beyond = probe.share_beyond(session, placement) * source.width * source.height / (width * height)
     return Forecast(
         scene=scene.name,
@@ -191,6 +192,7 @@ def forecast(
         resolvable_range=placement.resolvable_range,
         view_cone=view_cone(display),
         fused_gain=depth_gain_of_fused_cone(display),
+        comfort=comfort_in_words(display, *placement.depth_range),
         blur=(abs(placement.depth_range[0]) * per_pixel, abs(placement.depth_range[1]) * per_pixel),
         blurred_share=share_beyond,
         rays={

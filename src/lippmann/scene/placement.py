@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lippmann.display import Display
+from lippmann.display.comfort import fusion_warning
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.placement import Mode, PlacementOptions
 from lippmann.scene.camera_placement import DepthProbe, frame_whole, place_by_camera
@@ -247,9 +248,10 @@ def _fit(
         covers=covers,
     )
     if options.depth_scale is None and fit.depth_scale < 1.0 - 1e-6:
+        beyond, within = ("soft", "sharp") if display.stereo is None else ("a strain", "comfortable")
         warnings.append(
-            f"depth {fit.depth:.3g} mm flattened to {100 * fit.depth_scale:.2g} %: depth_scale=1 keeps it, soft at "
-            f"its ends; scale={options.scale * fit.depth_scale:.2g} keeps it sharp, in a smaller picture"
+            f"depth {fit.depth:.3g} mm flattened to {100 * fit.depth_scale:.2g} %: depth_scale=1 keeps it, {beyond} at "
+            f"its ends; scale={options.scale * fit.depth_scale:.2g} keeps it {within}, in a smaller picture"
         )
     if options.pop_out is not None and fit.front < fit.full_front * (1.0 - 1e-9):
         warnings.append(
@@ -274,7 +276,14 @@ def _find_warnings(corners: Bounds, display: Display) -> list[str]:
             f"the scene reaches {high[2]:.3g} mm in front of the lens plane; recorded rays begin at "
             f"{display.aperture_distance:g} mm, what lies nearer is cut off"
         )
-    if high[2] > near + 1e-6 or low[2] < far - 1e-6:
+    if double := fusion_warning(display, float(low[2]), float(high[2])):
+        warnings.append(double)
+    elif display.stereo is not None and (high[2] > near + 1e-6 or low[2] < far - 1e-6):
+        warnings.append(
+            f"the scene reaches from {low[2]:.3g} to {high[2]:.3g} mm; from {far:.3g} to {near:.3g} mm it is "
+            "comfortable to look at"
+        )
+    if display.stereo is None and (high[2] > near + 1e-6 or low[2] < far - 1e-6):
         warnings.append(
             f"the scene reaches from {low[2]:.3g} to {high[2]:.3g} mm; the display resolves "
             f"{far:.3g} to {near:.3g} mm, what lies beyond is blurred"

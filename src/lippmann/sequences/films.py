@@ -14,7 +14,7 @@ from lippmann.errors import OutputError, UsageError
 from lippmann.image.stored_values import FloatArray
 from lippmann.options.choices import REUSING
 from lippmann.progress import silent
-from lippmann.quilts.quilt import DeviceQuilt, Quilt, QuiltLayout
+from lippmann.quilts.quilt import DeviceQuilt, Quilt, QuiltLayout, ending_of_name, layout_of_name, names_layout
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import options_of_sequence
 from lippmann.sequences.files import SavedFrame
@@ -102,10 +102,10 @@ def film_of_quilts(video: Path, display: Display, form: QuiltForm, eye: FilmEye,
         An eye is given beside a film of all views.
     """
     views = form.quilt.layout.views
-    layout = layout_of_video(video)
+    layout = layout_of_name(video) if form.quilt.pair and names_layout(video) else layout_of_video(video)
     if layout is not None:
-        if layout[:2] != form.quilt.layout[:2]:
-            rule = f"the quilts end in {form.quilt.layout.ending}"
+        if layout[:2] != form.quilt.layout[:2] or (form.quilt.pair and ending_of_name(video) != form.quilt.pair):
+            rule = f"the quilts end in {form.quilt.ending}"
             raise OutputError("the name says another quilt", where=str(video), rule=rule)
         if eye is not None:
             raise UsageError("a film of quilts shows all views", parameter="eye", fix="leave it out")

@@ -194,7 +194,7 @@ class StudioSession:
         if kind == "quilt":
             from lippmann.quilts.quilt import quilt_of_display
 
-            ending = f"{quilt_of_display(self.display(state), None, None).layout.ending}.png"
+            ending = f"{quilt_of_display(self.display(state), None, None).ending}.png"
         elif kind == "print" and not _is_print(self.display(state)):
             raise UsageError(f"{self.display(state).name} is no print", fix="choose a print, or render a picture")
         display = state.display if state.display in self._presets else self.display(state).name

@@ -14,6 +14,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from lippmann.display.stereo import EYE_DISTANCE
 from lippmann.errors import UsageError
 from lippmann.image.picture import Picture
 from lippmann.image.stored_values import FloatArray
@@ -22,10 +23,6 @@ from lippmann.viewing.replay import Eye, Filter, checked_eye, default_eye, repla
 
 #: How a pair becomes one picture: side by side at full or half width, or for red-cyan glasses.
 Stereo = Literal["full", "half", "anaglyph"]
-
-#: Mean distance between the pupils of adults, mm: N. A. Dodgson, "Variation and extrema of human interpupillary
-#: distance", Proc. SPIE 5291 (2004).
-EYE_DISTANCE = 63.0
 
 #: Largest distance between two eyes, mm: wide bases are used for distant scenes.
 WIDEST_EYES = 1000.0

@@ -47,7 +47,9 @@ def test_presets():
     names = [display.name for display in list_displays()]
     devices = [name for name in names if name.startswith("looking-glass-")]
     expected = ["mla-hexagonal", "mla-square", "panel-4k", "panel-8k", "print-60lpi", "seed-lenticular"]
-    assert names == sorted(expected + devices)
+    monitors = [display.name for display in list_displays() if display.stereo is not None]
+    assert monitors == ["displayxr", "elf-sr", "lume-pad", "odyssey-3d", "spatiallabs"]
+    assert names == sorted(expected + devices + monitors)
     assert len(devices) == 14
     assert [load_display(name) for name in names] == list_displays()
     assert all(display.title for display in list_displays())
@@ -69,7 +71,7 @@ def test_presets_are_what_they_say():
     # A crest at best focus is nearer to its pinhole than thickness / index, 0.42 mm.
     assert print_.gap == pytest.approx(0.3825, abs=1e-4)
     assert [display.name for display in list_displays() if display.lens is not None] == ["print-60lpi"]
-    assert {d.name for d in list_displays() if covers_whole_pixels(d)} == {
+    assert {d.name for d in list_displays() if covers_whole_pixels(d) and d.stereo is None} == {
         "mla-hexagonal",
         "mla-square",
         "seed-lenticular",

@@ -330,7 +330,8 @@ def quilt_of(picture: Path, layout: str | None, aspect: float | None) -> Quilt |
 
 def _stereo(sbs: Literal["full", "half"] | None, anaglyph: bool, eyes: float | None) -> tuple[Stereo, float] | None:
     """How two eyes become one picture, and their distance in mm; None for one eye."""
-    from lippmann.viewing.stereo import EYE_DISTANCE, eyes_of
+    from lippmann.display.stereo import EYE_DISTANCE
+    from lippmann.viewing.stereo import eyes_of
 
     if sbs is not None and anaglyph:
         raise UsageError("a picture is one or the other", where="--anaglyph", fix="leave out --sbs or --anaglyph")

@@ -37,7 +37,9 @@ Device = Annotated[
     typer.Option(
         "--display",
         "-d",
-        help="A device (see 'lippmann quilt sizes'; 'portrait' will do), its visual.json, or any lenticular display.",
+        "--target",
+        help="A device (see 'lippmann quilt sizes'; 'portrait' will do), its visual.json, an eye-tracked monitor such "
+        "as 'odyssey-3d', or any lenticular display.",
         rich_help_panel="Display",
     ),
 ]
@@ -118,10 +120,10 @@ def render(
     moving = sequence.Wanted.part_of(in_frames)
     path = output or Path(f"{Path(scene).stem}{'' if moving else '.png'}")
     moving, file = sequence.with_film(moving, path)
-    if file != path:
-        moving = moving if moving.eye is not None else replace(moving, video=_named(path, wanted.layout.ending))
-    elif not moving or (path.suffix and not path.is_dir()):
-        file = _named(path, wanted.layout.ending)
+    if moving.video is not None and moving.eye is None and (file != path or wanted.pair):
+        moving = replace(moving, video=_named(moving.video, wanted.ending))
+    if file == path and (not moving or (path.suffix and not path.is_dir())):
+        file = _named(path, wanted.ending)
     if not moving:
         if resume:
             raise UsageError("a quilt is rendered in one piece", where="--resume", fix="leave it out")
@@ -301,11 +303,12 @@ def weave(
 def _named(path: Path, ending: str) -> Path:
     """``path`` with the ending of its quilt's layout."""
     from lippmann.errors import OutputError
-    from lippmann.quilts.quilt import layout_of_name, names_layout
+    from lippmann.quilts.quilt import ending_of_name
 
-    if not names_layout(path):
+    named = ending_of_name(path)
+    if not named:
         return path.with_name(f"{path.stem}{ending}{path.suffix}")
-    if layout_of_name(path).ending != ending:
+    if named != ending:
         rule = f"the quilt's ends in {ending}{path.suffix}"
         raise OutputError("the name says another quilt", where=str(path), rule=rule, fix="leave --output out")
     return path

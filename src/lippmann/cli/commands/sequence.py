@@ -134,7 +134,7 @@ def render_frames(
     output = files.output
     motion = open_moving(source, wanted, request)
     frames = chosen.of(motion)
-    ending = form.quilt.layout.ending if isinstance(form, QuiltForm) else ""
+    ending = form.quilt.ending if isinstance(form, QuiltForm) else ""
     path_of = numbered(output, len(frames), ending)
     name, _ = format_for(path_of(frames[0]), files.bits)
     filming = _filming(wanted, motion, display, request, form, len(frames))

@@ -51,6 +51,7 @@ DisplayName = Annotated[
     typer.Option(
         "--display",
         "-d",
+        "--target",
         help="A name (see 'lippmann displays'), a TOML file, a device's visual.json, or print:... or monitor:...",
         autocompletion=complete_displays,
         rich_help_panel="Display",

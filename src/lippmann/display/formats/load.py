@@ -23,9 +23,10 @@ A file without a ``name`` has its own, less the ending.
 Tables ``[lens]`` and ``[pixel]`` describe a real lens, in place of the gap, and the part of a sub-pixel that shines,
 see :mod:`lippmann.display.formats.lens_tables`.
 
-A slanted monitor may be given by pitch, slope and centre instead, see :mod:`lippmann.display.formats.monitor_toml`. A
-JSON file is the calibration of a Looking Glass, see :mod:`lippmann.display.formats.looking_glass`. Prints and monitors
-also have short forms, see :func:`display_of_short_form`.
+An eye-tracked monitor has a table ``[stereo]``, see :mod:`lippmann.display.formats.stereo_toml`. A slanted monitor may
+be given by pitch, slope and centre instead, see :mod:`lippmann.display.formats.monitor_toml`. A JSON file is the
+calibration of a Looking Glass, see :mod:`lippmann.display.formats.looking_glass`. Prints and monitors also have short
+forms, see :func:`display_of_short_form`.
 """
 
 from __future__ import annotations
@@ -48,6 +49,8 @@ from lippmann.display.formats.monitor_toml import TABLE as MONITOR
 from lippmann.display.formats.monitor_toml import monitor_of_texts
 from lippmann.display.formats.print_sheet import print_of_texts
 from lippmann.display.formats.recorded_depth import default_aperture
+from lippmann.display.formats.stereo_toml import TABLE as STEREO
+from lippmann.display.formats.stereo_toml import stereo_display
 from lippmann.display.panel import stripe
 from lippmann.display.validation import MILLIMETRES, Arguments, length, positive
 from lippmann.errors import DisplayError
@@ -254,7 +257,7 @@ def _of_plugin(name: str, path: Path) -> Display | None:
     if plugin is None and not path.exists():
         known = [each for each in door.claims() if not each.startswith(".")]
         rule = f"known are {', '.join(known)}, or a .toml file, or a Looking Glass's visual.json"
-        names = [*known, *(preset.removeprefix(_FAMILY) for preset in door.own[_OWN].presets)]
+        names = dict.fromkeys([*known, *(preset.removeprefix(_FAMILY) for preset in door.own[_OWN].presets)])
         raise DisplayError.unknown("display", name, names, rule=rule, fix=door.problems)
     if plugin is None or not plugin.distribution:
         return None
@@ -274,8 +277,8 @@ def list_displays() -> list[Display]:
 
     Examples
     --------
-    >>> [display.name for display in lippmann.list_displays()][-1]
-    'seed-lenticular'
+    >>> [display.name for display in lippmann.list_displays()][0]
+    'displayxr'
     """
     door = displays()
     plugins = [each.value for each in door.plugins if not each.problem]
@@ -345,6 +348,8 @@ def _from_toml(text: str, *, where: str, stem: str) -> Display:
         values = {"name": stem, **values}
         if MONITOR in values:
             return monitor_display(values)
+        if STEREO in values:
+            return stereo_display(values)
         lens, pixel = values.pop("lens", None), values.pop("pixel", None)
         check_tables(values if lens is None else {"gap": None, **values})
         parts = _convert_tables(values)

@@ -45,7 +45,7 @@ def check(request: RenderRequest, form: Form, display: Display | None) -> None:
     _refuse(
         [
             *_of_form(request, form),
-            *_of_size(request, display, form),
+            *_of_display(request, display, form),
             *_of_denoiser(request),
             *_of_caustics(request),
             *_of_reuse(request),
@@ -100,17 +100,11 @@ def _refuse(refusals: list[_Refusal], where: str = "") -> None:
 def _of_denoiser(request: RenderRequest) -> list[_Refusal]:
     name, is_pooled = request.integrator, request.method == "pooled"
     pooled, light = f'method="pooled" works with {" and ".join(POOLED_LIGHT)}', f"it is for {', '.join(LIGHT)}"
-    no_network = f"{_FULL}, or leave denoise out"
+    shared, no_network = "pooled shares denoised light", f"{_FULL}, or leave denoise out"
     return [
         (is_pooled and name not in POOLED_LIGHT, f"the light of {name} cannot be pooled", "integrator", pooled, _FULL),
         (request.denoises and name in PROPERTIES, f"{name} has no noise", "denoise", light, _LEAVE),
-        (
-            is_pooled and request.denoise == "none",
-            "pooled needs the denoiser",
-            "denoise",
-            "pooled shares denoised light",
-            no_network,
-        ),
+        (is_pooled and request.denoise == "none", "pooled needs the denoiser", "denoise", shared, no_network),
     ]
 
 
@@ -169,11 +163,15 @@ def _of_form(request: RenderRequest, form: Form) -> list[_Refusal]:
     ]
 
 
-def _of_size(request: RenderRequest, display: Display | None, form: Form) -> list[_Refusal]:
-    if form != "tiles" or display is None:
+def _of_display(request: RenderRequest, display: Display | None, form: Form) -> list[_Refusal]:
+    if display is None:
         return []
-    panel = display.panel
-    is_large = panel.width * panel.height * request.channels >= MOST_SUBPIXELS
+    panel, weaves = display.panel, "an eye-tracked monitor weaves the pictures of the two eyes by itself"
+    weaves_itself = display.stereo is not None and form in ("picture", "tiles")
+    is_large = form == "tiles" and panel.width * panel.height * request.channels >= MOST_SUBPIXELS
     what = f"the display {display.name} has {panel.width} x {panel.height} pixels"
     rule = f"pictures of fewer than {MOST_SUBPIXELS} (sub-)pixels are rendered"
-    return [(is_large, what, "display", rule, "render it in parts")]
+    return [
+        (weaves_itself, f"{display.name} takes no native pixels", "display", weaves, "use lippmann quilt render"),
+        (is_large, what, "display", rule, "render it in parts"),
+    ]

@@ -9,7 +9,7 @@ in mirrors and through glass counts as lying as far behind as light travels to i
 That is done before the denoiser: what it leaves of the noise, and what it blurs with it, it leaves and blurs in all
 views alike, so that sharing its results gains less (docs/background/quilts.md). What is told of the error includes what
 sharing itself falsifies, such as highlights, which move over a surface from view to view: each half of the samples is
-shared for itself, and judged by the other, which is not.
+shared for itself, and judged by the other, which is not. The two eyes of a stereo pair always share.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def share_views(pixels: Floats, source: QuiltRays, guides: Guides) -> Floats:
         source.columns,
         1 / source.display.viewing_distance,
         source.view_size[0] / display_width,
-        int(TUNING.view_reach / step),
+        max(int(TUNING.view_reach / step), int(source.display.stereo is not None)),
     )
     shared = light_of_pixels(views.mean_light, light.shape)
     return np.asarray(shared * albedo, dtype=np.float32)

@@ -1,0 +1,51 @@
+"""Whether two eyes fuse the depth of a scene in front of a display, in words."""
+
+from __future__ import annotations
+
+import math
+
+from lippmann.display.display import Display
+from lippmann.display.stereo import COMFORTABLE, EYE_DISTANCE, depth_of_disparity, disparity
+
+#: Crossed and uncrossed disparity in degrees that 84 % of 392 viewers fuse: S. Nagata, "Distributions of 'vergence
+#: fusional stereoscopic limit'", Trans. VR Soc. Japan 7 (2002).
+FUSED = 1.84, 2.04
+
+
+def fusion_warning(display: Display, back: float, front: float) -> str:
+    """One line if a scene from z = ``back`` to ``front`` mm has more disparity than eyes fuse; else empty."""
+    distance = display.viewing_distance
+    if math.isinf(distance):
+        return ""
+    near, far = depth_of_disparity(*FUSED, distance, eyes_of_viewer(display))
+    if far - 1e-6 <= back and front <= near + 1e-6:
+        return ""
+    limit = "all that lies behind" if math.isinf(far) else f"{-far:.0f} mm behind"
+    return (
+        f"the scene reaches {-back:.0f} mm behind the panel and {front:.0f} mm in front; from {distance:.0f} mm most "
+        f"eyes fuse {limit} and {near:.0f} mm in front, what lies beyond is seen double: flatten or shift it"
+    )
+
+
+def eyes_of_viewer(display: Display) -> float:
+    """Distance between the eyes of a display's viewer in mm."""
+    return EYE_DISTANCE if display.stereo is None else display.stereo.eyes
+
+
+def comfort_in_words(display: Display, back: float, front: float) -> str:
+    """Disparity of a scene from z = ``back`` to ``front`` mm, and whether it is comfortable.
+
+    Empty where the viewing distance is infinite.
+    """
+    distance, eyes = display.viewing_distance, eyes_of_viewer(display)
+    if math.isinf(distance) or front >= distance:
+        return ""
+    behind, before = (disparity(z, distance, eyes) for z in (back, front))
+    is_fused = before <= FUSED[0] and -behind <= FUSED[1]
+    verdict = "too much to fuse" if not is_fused else "strains"
+    if max(before, -behind) <= COMFORTABLE + 1e-6:
+        verdict = "comfortable"
+    return (
+        f"{verdict}: disparity {-behind:.2f} degrees behind, {before:.2f} in front, from {distance:.0f} mm with eyes "
+        f"{eyes:.0f} mm apart (up to {COMFORTABLE:.0f} is comfortable, up to {FUSED[0]:.1f} fuses)"
+    )

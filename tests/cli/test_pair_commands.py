@@ -1,0 +1,115 @@
+"""Pictures and films for eye-tracked monitors, read again by Pillow and FFmpeg: which eye is where, and how deep."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from lippmann.display import load_display
+
+pytestmark = [pytest.mark.usefixtures("engine"), pytest.mark.slow]
+
+#: Where two balls stand in the frame of the display, mm, and their colours: red 60 in front, blue 100 behind.
+BALLS = {"red": (-60.0, 10.0, 60.0), "blue": (70.0, -20.0, -100.0)}
+
+
+@pytest.fixture(scope="module")
+def balls(tmp_path_factory):
+    import trimesh
+
+    scene = trimesh.Scene()
+    for color, place in BALLS.items():
+        ball = trimesh.creation.icosphere(3, 12.0)
+        ball.apply_translation(place)
+        tint = [255 * (color == "red"), 0, 255 * (color == "blue"), 255]
+        ball.visual = trimesh.visual.TextureVisuals(
+            material=trimesh.visual.material.PBRMaterial(baseColorFactor=tint, metallicFactor=0.0)
+        )
+        scene.add_geometry(ball)
+    path = tmp_path_factory.mktemp("balls") / "balls.glb"
+    path.write_bytes(trimesh.exchange.gltf.export_glb(scene))
+    return path
+
+
+def places(picture, color):
+    """Column and row of the middle of what is red or blue, in pixels."""
+    values = np.asarray(picture, float)
+    channel = {"red": 0, "blue": 2}[color]
+    is_there = values[..., channel] > values.sum(axis=-1) - values[..., channel] + 30
+    rows, columns = np.nonzero(is_there)
+    return columns.mean() + 0.5, rows.mean() + 0.5
+
+
+@pytest.mark.parametrize(
+    ("target", "size", "ending"), [("odyssey-3d", "960x540", "_half_2x1"), ("displayxr", "960x270", "_2x1")]
+)
+def test_each_eye_sees_the_panel_from_its_own_place(lippmann, balls, tmp_path, target, size, ending):
+    words = ("--place", "display", "--integrator", "albedo", "--spp", 4, "--threads", 1, "--quiet")
+    done = lippmann("quilt", "render", balls, "--target", target, "--size", size, *words, "-o", tmp_path / "seen.png")
+    assert done.code == 0, done.err
+    display = load_display(target)
+    with Image.open(tmp_path / f"seen{ending}.png") as pair:
+        width, height = pair.width // 2, pair.height
+        halves = {-1: pair.crop((0, 0, width, height)), 1: pair.crop((width, 0, 2 * width, height))}
+        found = {(side, color): places(half, color) for side, half in halves.items() for color in BALLS}
+    panel_width, panel_height = display.size_mm
+    for color, (x, y, z) in BALLS.items():
+        for side in (-1, 1):
+            eye, distance = side * display.stereo.eyes / 2, display.viewing_distance
+            # Where the line from the eye to the ball's middle meets the panel.
+            at = eye + (x - eye) * distance / (distance - z), y * distance / (distance - z)
+            column, row = (at[0] / panel_width + 0.5) * width, (0.5 - at[1] / panel_height) * height
+            assert found[side, color] == pytest.approx((column, row), abs=1.0)
+    # Crossed in front of the panel, uncrossed behind it.
+    assert found[-1, "red"][0] > found[1, "red"][0] + 2
+    assert found[-1, "blue"][0] < found[1, "blue"][0] - 2
+
+
+def test_our_own_reader_knows_the_eyes(lippmann, balls, tmp_path):
+    words = ("--integrator", "albedo", "--spp", 1, "--threads", 1, "--quiet", "-o", tmp_path / "seen.png")
+    assert lippmann("quilt", "render", balls, "-d", "odyssey-3d", "--size", "480x270", *words).code == 0
+    pair = tmp_path / "seen_half_2x1.png"
+    done = lippmann("quilt", "unpack", pair, "-o", tmp_path / "eyes", "--json")
+    assert done.json["views"] == 2
+    whole = np.asarray(Image.open(pair))
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "eyes" / "view_0.png")), whole[:, :240])
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "eyes" / "view_1.png")), whole[:, 240:])
+    # A name alone says the same: views of half width are to be shown at twice of it.
+    bare = tmp_path / "bare_half_2x1.png"
+    Image.fromarray(whole).save(bare)
+    assert "2x1 of 240x270 pixels, aspect 1.77778" in lippmann("info", bare).out
+
+
+def test_a_film_holds_both_eyes(lippmann, balls, tmp_path):
+    import av
+
+    words = ("--integrator", "albedo", "--spp", 1, "--threads", 1, "--turntable", 2, "--quiet")
+    film = tmp_path / "turn.mp4"
+    done = lippmann("quilt", "render", balls, "--target", "odyssey-3d", "--size", "480x270", *words, "-o", film)
+    assert done.code == 0, done.err
+    with av.open(str(tmp_path / "turn_half_2x1.mp4")) as container:
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert len(frames) == 2
+    assert frames[0].shape == (270, 480, 3)
+    assert abs(places(frames[0][:, :240], "red")[0] - places(frames[0][:, 240:], "red")[0]) > 0.2
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("render", "--target", "odyssey-3d"), "--display: odyssey-3d takes no native pixels; an eye-tracked monitor"),
+        (("quilt", "render", "--target", "odyssey-3d", "--size", "999x999"), "it is 999 x 999 pixels; pairs for"),
+        (("quilt", "render", "--target", "odyssey-3d", "--views", "8x6"), "--views: 8x6; odyssey-3d shows one view"),
+        (("quilt", "render", "--target", "oddyssey-3d"), "unknown display 'oddyssey-3d', did you mean 'odyssey-3d'?"),
+        (("quilt", "render", "--target", "odyssey-3d", "-o", "a_2x1.png"), "a_2x1.png: the name says another quilt"),
+        (("quilt", "render", "--target", "odyssey-3d", "-o", "a_qs8x6a0.75.png"), "the quilt's ends in _half_2x1.png"),
+    ],
+)
+def test_refused_in_one_line(lippmann, balls, tmp_path, monkeypatch, words, said):
+    monkeypatch.chdir(tmp_path)
+    done = lippmann(*words, balls)
+    assert done.code == 2
+    assert said in done.err
+    assert done.err.count("\n") == 1
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,44 @@
+"""What is said of the depth of a scene that two eyes look at."""
+
+from __future__ import annotations
+
+import pytest
+
+from lippmann.display import load_display
+from lippmann.display.comfort import comfort_in_words, fusion_warning
+
+MONITOR, PANEL = load_display("odyssey-3d"), load_display("portrait")
+
+
+# From 600 mm with eyes 63 mm apart: 1 degree is 85.8 mm in front and 119.9 behind, 1.84 degrees are 141 mm in front,
+# 2.04 degrees 309 behind.
+@pytest.mark.parametrize(
+    ("back", "front", "verdict", "is_double"),
+    [
+        (-119.9, 85.7, "comfortable", False),
+        (-120.1, 0, "strains", False),
+        (0, 85.9, "strains", False),
+        (-305, 140, "strains", False),
+        (-315, 0, "too much to fuse", True),
+        (0, 142, "too much to fuse", True),
+    ],
+)
+def test_verdicts(back, front, verdict, is_double):
+    assert comfort_in_words(MONITOR, back, front).startswith(f"{verdict}: ")
+    assert bool(fusion_warning(MONITOR, back, front)) == is_double
+
+
+def test_a_panel_is_judged_from_its_own_distance():
+    assert comfort_in_words(PANEL, -50, 50).startswith("comfortable: disparity 0.39 degrees behind, 0.46 in front")
+    assert "from 654 mm" in comfort_in_words(PANEL, -50, 50)
+    assert fusion_warning(PANEL, -50, 50) == ""
+    warning = fusion_warning(PANEL, -600, 50)
+    assert warning.startswith(
+        "the scene reaches 600 mm behind the panel and 50 mm in front; from 654 mm most eyes fuse"
+    )
+    assert "\n" not in warning
+
+
+def test_nothing_is_said_without_a_viewing_distance():
+    endless = load_display("seed-lenticular")
+    assert comfort_in_words(endless, -5000, 50) == fusion_warning(endless, -5000, 50) == ""
