@@ -233,6 +233,39 @@ def test_quilts_with_a_number_get_the_ending_of_their_kind(engine, lippmann, tmp
 
 
 @pytest.mark.slow
+def test_a_film_of_native_pixels_and_one_of_colour_beside_depth(engine, lippmann, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    call = ("render", "teapot", "--turntable", "2", *QUICK, "--layers", "-o", "f_%d.exr")
+    done = lippmann(*call, "--video", "native.mp4", "--shows", "native")
+    assert done.code == 0, done.err
+    _, shown = frames_of("native.mp4")
+    for number, frame in enumerate(shown):
+        np.testing.assert_array_equal(frame, read_picture(Path(f"f_{number}.exr")).srgb())
+    assert lippmann(*call, "--video", "depth.mp4", "--shows", "rgbd-half").code == 0
+    _, shown = frames_of("depth.mp4")
+    seen = replay(read_picture(Path("f_0.exr")))
+    assert shown[0].shape == seen.shape
+    color, depth = np.split(shown[0].astype(int), 2, axis=1)
+    assert np.ptp(depth, axis=2).max() < 12  # grey, as far as a film of 4:2:0 goes
+    hit = depth[..., 1] > 40
+    assert 0.05 < hit.mean() < 0.9
+    assert color[hit].sum(axis=-1).mean() > 60
+
+
+@pytest.mark.slow
+def test_a_film_for_a_hololuminescent_display(engine, lippmann, tmp_path):
+    call = ("--display", "looking-glass-go", "--views", "1x1", "--size", "288x512", "--turntable", "2", "--fps", "30")
+    done = lippmann("quilt", "render", "teapot", *call, *QUICK, "-o", tmp_path / "h.mp4", "--shows", "hololuminescent")
+    assert done.code == 0, done.err
+    with av.open(str(tmp_path / "h.mp4")) as film:
+        stream = film.streams.video[0]
+        assert (stream.codec_context.codec_tag, stream.width, stream.height) == ("hvc1", 3840, 2160)
+        upright = np.rot90(next(film.decode(stream)).to_ndarray(format="rgb24"), -1)
+    assert upright[:340].max() < 8
+    assert upright[400:-100, 120:-120].max() > 50
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -248,6 +281,18 @@ def test_quilts_with_a_number_get_the_ending_of_their_kind(engine, lippmann, tmp
         (("quilt", "render", "--turntable", "8", "-o", "x_qs8x6a0.75.png"), "x_%04d_qs8x6a0.75.png, or a folder"),
         (("quilt", "render", "--turntable", "8", "--video", "x_qs5x9a0.75.mp4"), "the name says another quilt"),
         (("quilt", "render", "--turntable", "8", "--video", "x.mp4", "--eye", "0,0,0"), "--eye: an eye at z = 0"),
+        (("render", "--turntable", "8", "-o", "out", "--shows", "native"), "--shows: there is no film"),
+        (("render", "-o", "x.png", "--shows", "native"), "--shows: has no meaning for a single picture"),
+        (
+            ("render", "--turntable", "8", "-o", "a.mp4", "--shows", "native", "--codec", "hevc"),
+            "hevc halves the resolution",
+        ),
+        (("render", "--turntable", "8", "-o", "a.mp4", "--shows", "rgbd"), "--shows: the frames have no depth"),
+        (
+            ("render", "--turntable", "8", "-o", "a.mp4", "--shows", "hololuminescent"),
+            "--fps: 24 frames per second; the",
+        ),
+        (("quilt", "render", "--turntable", "8", "-o", "a.mp4", "--shows", "native"), "--shows: 'native' of quilts"),
         (("quilt", "render", "--resume"), "--resume: a quilt is rendered in one piece"),
     ],
 )

@@ -1,4 +1,8 @@
 import os
+import threading
+import weakref
+from contextlib import suppress
+from pathlib import Path
 
 import av
 import numpy as np
@@ -9,7 +13,7 @@ from lippmann.color.transfer import quantize
 from lippmann.errors import OutputError, UsageError
 from lippmann.quilts.quilt import QuiltLayout
 from lippmann.quilts.quilt_metadata import metadata_of_text
-from lippmann.viewing import video_file
+from lippmann.viewing import mp4_film, video_file
 from lippmann.viewing.video_file import check_animation_path, write_animation
 
 
@@ -90,7 +94,9 @@ def test_no_encoder_puts_the_process_into_real_time(tmp_path, codec):
 
     def watched():
         for frame in frames(40):
-            policies.extend(os.sched_getscheduler(int(thread)) for thread in os.listdir("/proc/self/task"))
+            for thread in os.listdir("/proc/self/task"):
+                with suppress(ProcessLookupError):  # an encoder's, which ended meanwhile
+                    policies.append(os.sched_getscheduler(int(thread)))
             yield frame
 
     before = os.sched_getscheduler(0)
@@ -102,8 +108,8 @@ def test_no_encoder_puts_the_process_into_real_time(tmp_path, codec):
 def test_a_codec_that_cannot_be(tmp_path, monkeypatch):
     with pytest.raises(UsageError, match="codec: only MP4 has a choice of codecs"):
         write_animation(frames(), tmp_path / "a.png", codec="av1")
-    encoder = video_file._Encoder("libnone", {}, "none")
-    monkeypatch.setitem(video_file._ENCODERS, "av1", encoder)
+    encoder = mp4_film._Encoder("libnone", {}, "none", 4096)
+    monkeypatch.setitem(mp4_film._ENCODERS, "av1", encoder)
     with pytest.raises(
         OutputError, match=r"a\.mp4: the codec is not installed; PyAV as it is installed has no libnone"
     ):
@@ -149,3 +155,97 @@ def test_a_failure_in_the_middle_keeps_the_old_file(tmp_path, name):
         write_animation(failing(), tmp_path / name)
     assert (tmp_path / name).read_bytes() == b"the old one"
     assert os.listdir(tmp_path) == [name]
+
+
+def shown_in(path):
+    with av.open(str(path)) as film:
+        return [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+
+
+@pytest.mark.parametrize(("codec", "name"), [("h264-rgb", "h264"), ("vp9-rgb", "vp9")])
+def test_native_pixels_come_back_code_for_code(tmp_path, codec, name):
+    """Odd sizes too, and pure blue, which lossless 4:4:4 shows as 243."""
+    rng = np.random.default_rng(1)
+    made = [rng.integers(0, 256, (63, 49, 3), dtype=np.uint8) for _ in range(3)]
+    made[1][:20] = (0, 0, 255)
+    video_file.write_codes(made, tmp_path / "native.mp4", codec=codec)
+    with av.open(str(tmp_path / "native.mp4")) as film:
+        context = film.streams.video[0].codec_context
+        assert (context.codec.canonical_name, context.pix_fmt) == (name, "gbrp")
+    for shown, codes in zip(shown_in(tmp_path / "native.mp4"), made, strict=True):
+        np.testing.assert_array_equal(shown, codes)
+
+
+def test_a_long_side_is_coded_as_hevc_and_a_quilt_s_views_stay_whole(tmp_path):
+    """7 views of 857 pixels: 5999 is odd, 7 x 856 is 5992."""
+    frame = np.zeros((7 * 41, 5999, 3), np.uint8)
+    video_file.write_codes([frame, frame], tmp_path / "a_qs7x7a1.77778.mp4", quilt=QuiltLayout(7, 7, 1.77778))
+    with av.open(str(tmp_path / "a_qs7x7a1.77778.mp4")) as film:
+        stream = film.streams.video[0]
+        assert (stream.codec_context.codec.canonical_name, stream.width, stream.height) == ("hevc", 5992, 280)
+
+
+@pytest.mark.parametrize(
+    ("size", "codec", "exact", "message"),
+    [
+        ((5992, 5992), "h264", False, "a film of 5992 x 5992 pixels; h264 takes sides of at most 4096"),
+        ((8192, 8194), None, False, "a film of 8192 x 8194 pixels; hevc takes sides of at most 8192"),
+        ((16386, 64), None, True, "h264-rgb takes sides of at most 16384"),
+        ((64, 64), "hevc", True, "hevc halves the resolution of colours; behind lenses each pixel counts"),
+    ],
+)
+def test_sizes_that_no_encoder_takes_are_refused_beforehand(size, codec, exact, message):
+    with pytest.raises((OutputError, UsageError), match=message):
+        video_file.codec_of_film(Path("film.mp4"), size, codec, exact=exact)
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.png"])
+def test_frames_are_taken_as_they_come(tmp_path, name):
+    """No more than three frames exist at a time, however many there are: in the making, waiting, and being coded."""
+    alive = set()
+
+    def made():
+        for number in range(12):
+            frame = np.full((64, 64, 3), 20 * number, np.uint8)
+            alive.add(number)
+            weakref.finalize(frame, alive.discard, number)
+            yield frame
+            del frame
+            assert len(alive) <= 3
+
+    video_file.write_codes(made(), tmp_path / name)
+    assert len(shown_in(tmp_path / name)) == 12
+
+
+def test_a_frame_is_made_while_another_is_written(tmp_path, monkeypatch):
+    """Neither waits for the other: each tells that it has begun, and waits until the other says so of a later frame."""
+    begun = [threading.Event() for _ in range(5)]
+
+    def written(frames, path, frames_per_second):
+        for number, _ in enumerate(frames):
+            assert begun[number + 1].wait(20)  # the next is in the making
+        path.write_bytes(b"film")
+
+    def made():
+        for number in range(4):
+            begun[number].set()
+            yield np.zeros((8, 8, 3), np.uint8)
+        begun[4].set()
+
+    monkeypatch.setattr("lippmann.codecs.apng.write_apng", written)
+    video_file.write_codes(made(), tmp_path / "a.png")
+    assert (tmp_path / "a.png").read_bytes() == b"film"
+
+
+def test_a_writer_that_fails_ends_the_making(tmp_path, monkeypatch):
+    def full(frames, path, frames_per_second):
+        next(frames)
+        raise OSError(28, "No space left on device")
+
+    made = []
+    monkeypatch.setattr("lippmann.codecs.apng.write_apng", full)
+    frames = (made.append(k) or np.zeros((8, 8, 3), np.uint8) for k in range(100))
+    with pytest.raises(OutputError, match=r"a\.png: cannot be written: no space is left"):
+        video_file.write_codes(frames, tmp_path / "a.png")
+    assert len(made) < 100
+    assert os.listdir(tmp_path) == []

@@ -96,15 +96,15 @@ def encode_png(
     encoded = bytes(imagecodecs.png_encode(np.ascontiguousarray(codes), level=_LEVEL))
     extra = b""
     if icc:
-        extra += _chunk(b"iCCP", b"profile\0\0" + zlib.compress(icc))  # name, method deflate
+        extra += chunk(b"iCCP", b"profile\0\0" + zlib.compress(icc))  # name, method deflate
     elif srgb:
-        extra += _chunk(b"sRGB", b"\0")  # perceptual intent
+        extra += chunk(b"sRGB", b"\0")  # perceptual intent
     if pixel_pitch is not None:
         per_metre = max(1, round(1000 / pixel_pitch))
-        extra += _chunk(b"pHYs", struct.pack(">IIB", per_metre, per_metre, 1))
+        extra += chunk(b"pHYs", struct.pack(">IIB", per_metre, per_metre, 1))
     for keyword, value in text.items():
         # keyword, no compression, no language, no translated keyword
-        extra += _chunk(b"iTXt", keyword.encode("latin-1") + b"\0\0\0\0\0" + value.encode("utf-8"))
+        extra += chunk(b"iTXt", keyword.encode("latin-1") + b"\0\0\0\0\0" + value.encode("utf-8"))
     after_header = len(SIGNATURE) + 12 + 13
     return encoded[:after_header] + extra + encoded[after_header:]
 
@@ -126,7 +126,7 @@ def png_header(file: BinaryIO, path: Path) -> PngHeader:
     header: tuple[int, int, int, int] | None = None
     text: dict[str, str] = {}
     found: dict[bytes, bytes] = {}
-    for kind, body in _chunks(file, path):
+    for kind, body in chunks(file, path):
         if kind == b"IHDR" and len(body) == 13:
             width, height, bits, color_type = struct.unpack(">IIBB", body[:10])
             header = width, height, bits, _CHANNELS.get(color_type, 0)
@@ -165,7 +165,7 @@ def decode_png(file: BinaryIO, header: PngHeader, path: Path) -> Pixels:
 
     # libpng reports a wrong check sum of most chunks on standard error and goes on; so all are looked at first.
     file.seek(0)
-    for _ in _chunks(file, path, all_bodies=True):
+    for _ in chunks(file, path, all_bodies=True):
         pass
     file.seek(0)
     try:
@@ -176,11 +176,12 @@ def decode_png(file: BinaryIO, header: PngHeader, path: Path) -> Pixels:
     return orientations.upright(codes, header.orientation)
 
 
-def _chunk(kind: bytes, body: bytes) -> bytes:
+def chunk(kind: bytes, body: bytes) -> bytes:
+    """A chunk with its length and check sum."""
     return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
 
 
-def _chunks(file: BinaryIO, path: Path, *, all_bodies: bool = False) -> Iterator[tuple[bytes, bytes]]:
+def chunks(file: BinaryIO, path: Path, *, all_bodies: bool = False) -> Iterator[tuple[bytes, bytes]]:
     """Kind and checked body of every chunk up to ``IEND``; bodies of no interest are empty, unless ``all_bodies``."""
     if file.read(len(SIGNATURE)) != SIGNATURE:
         raise PictureError("is no PNG", where=str(path))

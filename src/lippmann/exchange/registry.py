@@ -93,7 +93,6 @@ class Film(Export):
 
 _CODES: Mapping[int, Stored] = {8: "uint8", 16: "uint16"}
 _FLOATS: Mapping[int, Stored] = {**_CODES, 32: "float32"}
-_FILMS = "lippmann.viewing.video_file"
 
 
 def _layout(module: str, name: str, **fields: object) -> Layout:
@@ -119,8 +118,8 @@ EXPORTS = Door(
         "views": _layout(
             "view_folder", "view_folder", bits=_FLOATS, write_options=("progress",), read_options=("grid", "progress")
         ),
-        "apng": Film((".png", ".apng"), f"{_FILMS}:write_apng"),
-        "mp4": Film((".mp4",), f"{_FILMS}:write_mp4", ("codec", "quilt", "place")),
+        "apng": Film((".png", ".apng"), "lippmann.codecs.apng:write_apng"),
+        "mp4": Film((".mp4",), "lippmann.viewing.mp4_film:write_mp4", ("codec", "quilt", "place")),
     },
 )
 

@@ -7,6 +7,9 @@ from typing import Literal
 
 from lippmann.options.option import Options, option
 
+#: What a film shows of each frame.
+Shows = Literal["eye", "native", "rgbd", "rgbd-half", "hololuminescent"]
+
 _frames = partial(option, default=None, group="Animation")
 _cluster = partial(option, default=None, group="Cluster")
 
@@ -47,8 +50,15 @@ class SequenceOptions(Options):
         help="Where the film's eye is: X,Y,Z in mm, z toward the viewer; central. Of quilts also 'sweep': the eye goes "
         "to and fro across their views."
     )
-    codec: Literal["h264", "hevc", "av1"] | None = _frames(
-        help="How an .mp4 is coded: h264 plays everywhere, hevc and av1 make smaller files. Default: h264."
+    shows: Shows = option(
+        "eye",
+        "What the film shows: what an eye sees; the panel's native pixels, each code kept; colour beside depth (rgbd; "
+        "near is white; needs --layers); or what the player of a Hololuminescent display takes.",
+        group="Animation",
+    )
+    codec: Literal["h264", "hevc", "vp9", "av1", "h264-rgb", "vp9-rgb"] | None = _frames(
+        help="How an .mp4 is coded: h264 plays everywhere up to 4096 pixels; hevc, vp9 and av1 up to 8192; h264-rgb "
+        "and vp9-rgb keep each code. Default: h264, or hevc where a side is longer."
     )
 
 

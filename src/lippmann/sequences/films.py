@@ -1,4 +1,4 @@
-"""Films of sequences, from the frames in their files: what an eye sees of integral images, or views of quilts."""
+"""Films of sequences, from the frames in their files: what an eye sees, native pixels, colour and depth, or quilts."""
 
 from __future__ import annotations
 
@@ -8,11 +8,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, NamedTuple, TypeAlias
 
-from lippmann.color.transfer import Transfer
+import numpy as np
+
+from lippmann.codecs.types import Pixels
+from lippmann.color.transfer import quantize
 from lippmann.display import Display
 from lippmann.errors import OutputError, UsageError
-from lippmann.image.stored_values import FloatArray
+from lippmann.image.encoding import mirrored_in_file
 from lippmann.options.choices import REUSING
+from lippmann.options.outputs import Shows
 from lippmann.progress import silent
 from lippmann.quilts.quilt import DeviceQuilt, Quilt, QuiltLayout, ending_of_name, layout_of_name, names_layout
 from lippmann.rendering.request.render_request import RenderRequest
@@ -21,7 +25,11 @@ from lippmann.sequences.files import SavedFrame
 from lippmann.sequences.forms import INTEGRAL, QuiltForm
 from lippmann.sequences.frames import Stand, find_stand, hold_exposure, of_frame
 from lippmann.sequences.motion import Motion
-from lippmann.viewing.replay import Eye, default_size
+from lippmann.viewing.color_and_depth import RgbdForm, rgbd_codes
+from lippmann.viewing.hololuminescent import HEIGHT, WIDTH, for_hololuminescent
+from lippmann.viewing.mp4_film import Codec, codec_for, most_pixels
+from lippmann.viewing.replay import Eye, default_eye, default_size
+from lippmann.viewing.video_file import codec_of_film
 from lippmann.viewing.video_frames import (
     WIDEST_QUILT,
     layout_of_video,
@@ -38,19 +46,34 @@ _MOST_PIXELS = 1 << 21
 FilmEye: TypeAlias = "Eye | Literal['sweep'] | None"
 
 
-class Shot(NamedTuple):
-    """A frame of a film: ``(height, width, 3)`` linear RGB, and the transfer function of its codes."""
+class Filming(NamedTuple):
+    """How a film is made of the frames of a sequence.
 
-    pixels: FloatArray
-    transfer: Transfer
+    Attributes
+    ----------
+    codes:
+        Codes ``(H, W, 3)`` of 8 bits of a frame in its file.
+    codec:
+        Of the film; None where its format has none.
+    quilt:
+        The layout of a film of quilts.
+    """
+
+    codes: Callable[[SavedFrame], Pixels]
+    codec: Codec | None
+    quilt: QuiltLayout | None = None
 
 
-#: Makes a film's frame of a sequence's.
-Filming: TypeAlias = "Callable[[SavedFrame], Shot]"
-
-
-def film_of_pictures(video: Path, motion: Motion, display: Display, request: RenderRequest, eye: Eye | None) -> Filming:
-    """A film of integral images: what an eye sees of each, by replay.
+def film_of_pictures(
+    video: Path,
+    motion: Motion,
+    display: Display,
+    request: RenderRequest,
+    eye: Eye | None,
+    shows: Shows = "eye",
+    codec: Codec | None = None,
+) -> Filming:
+    """A film of integral images: what an eye sees of each by replay, their native pixels, or colour beside depth.
 
     A name with a quilt's layout asks for quilts. Those of a lenticular display are rendered by the quilt's own cameras,
     with the request and the placement of the sequence; those of other displays are replays.
@@ -58,32 +81,69 @@ def film_of_pictures(video: Path, motion: Motion, display: Display, request: Ren
     Raises
     ------
     OutputError, PictureError
-        As :func:`lippmann.viewing.video_frames.layout_of_video`.
+        As :func:`lippmann.viewing.video_frames.layout_of_video`, or no encoder takes the size.
     UsageError
-        An eye is given beside cameras that have places of their own.
+        An eye is given beside cameras that have places of their own, or beside native pixels; a film of depth is asked
+        for, and the frames have none.
     """
     layout = layout_of_video(video)
-    if layout is not None and display.lens_array.layout == "lenticular":
-        if eye is not None:
-            raise UsageError(
-                "a quilt's cameras have places of their own",
-                parameter="eye",
-                rule="they stand across the display's view cone",
-                fix="leave it out",
+    panel, size = display.panel, default_size(display)
+    if layout is not None:
+        _check_quilts(shows)
+        if display.lens_array.layout == "lenticular":
+            if eye is not None:
+                raise UsageError(
+                    "a quilt's cameras have places of their own",
+                    parameter="eye",
+                    rule="they stand across the display's view cone",
+                    fix="leave it out",
+                )
+            cameras = QuiltCameras(motion, display, request, layout)
+            size = (WIDEST_QUILT, WIDEST_QUILT)
+            return Filming(
+                lambda frame: quilt_of_video(cameras(frame.number)), codec_of_film(video, size, codec), layout
             )
-        cameras = QuiltCameras(motion, display, request, layout)
-        return lambda frame: _shot(cameras(frame.number), quilt_of_video)
+    if shows == "native":
+        if eye is not None:
+            raise UsageError("native pixels are what no eye sees", parameter="eye", fix="leave it out")
+        chosen = codec_of_film(video, (panel.width, panel.height), codec, exact=True)
+        return Filming(lambda frame: _native(frame.path, display), chosen)
+    if shows in ("rgbd", "rgbd-half"):
+        if not request.layers:
+            raise UsageError(
+                "the frames have no depth",
+                parameter="shows",
+                rule="that is a layer, which OpenEXR keeps",
+                fix="add --layers, and name the frames %04d.exr",
+            )
+        form = RgbdForm(half=shows == "rgbd-half")
+        place = find_stand(motion, display, options_of_sequence(request.placement))(0)
+        z = default_eye(display)[2] if eye is None else eye[2]
+        # The same in all frames: what the motion ever fills, as far as it lies in front of the eye.
+        back, front = (min(edge, 0.9 * z) for edge in place.depth_range)
+        chosen = codec_of_film(video, (size[0] * (1 if form.half else 2), size[1]), codec)
+        return Filming(
+            lambda frame: rgbd_codes(INTEGRAL.read(frame.path), form, eye, between=(z - front, z - back)), chosen
+        )
     projection = projection_of(video, eye)
 
-    def film(frame: SavedFrame) -> Shot:
+    def see(frame: SavedFrame) -> Pixels:
         # The film shows what the files hold, whether they were rendered now or before an interruption.
         image = INTEGRAL.read(frame.path)
-        return Shot(projection(image), image.provenance.transfer)
+        return quantize(projection(image), 8, image.provenance.transfer)
 
-    return film
+    return _seen(video, see, size if layout is None else (WIDEST_QUILT, WIDEST_QUILT), shows, codec, layout)
 
 
-def film_of_quilts(video: Path, display: Display, form: QuiltForm, eye: FilmEye, count: int) -> Filming:
+def film_of_quilts(
+    video: Path,
+    display: Display,
+    form: QuiltForm,
+    eye: FilmEye,
+    count: int,
+    shows: Shows = "eye",
+    codec: Codec | None = None,
+) -> Filming:
     """A film of quilts, of the pixels that their cameras rendered: one view of each, or with a quilt's name all views.
 
     Parameters
@@ -93,13 +153,15 @@ def film_of_quilts(video: Path, display: Display, form: QuiltForm, eye: FilmEye,
         to the right, to the left and back in so many frames as there are.
     count:
         How many frames there are.
+    shows:
+        ``eye`` or ``hololuminescent``.
 
     Raises
     ------
     OutputError
-        The name has no ending of an animation, or the layout of another quilt.
+        The name has no ending of an animation, or the layout of another quilt; no encoder takes the size.
     UsageError
-        An eye is given beside a film of all views.
+        An eye is given beside a film of all views; quilts have no native pixels and no depth.
     """
     views = form.quilt.layout.views
     layout = layout_of_name(video) if form.quilt.pair and names_layout(video) else layout_of_video(video)
@@ -109,24 +171,54 @@ def film_of_quilts(video: Path, display: Display, form: QuiltForm, eye: FilmEye,
             raise OutputError("the name says another quilt", where=str(video), rule=rule)
         if eye is not None:
             raise UsageError("a film of quilts shows all views", parameter="eye", fix="leave it out")
-        return lambda frame: _shot(form.read(frame.path), quilt_of_video)
+        _check_quilts(shows)
+        size = form.quilt.width, form.quilt.height
+        widest = most_pixels(codec_for(size, codec))
+        chosen = codec_of_film(video, (min(size[0], widest), min(size[1], widest)), codec)
+        return Filming(lambda frame: quilt_of_video(form.read(frame.path), widest), chosen, layout)
+    if shows not in ("eye", "hololuminescent"):
+        rule = "quilts have neither native pixels nor depth"
+        raise UsageError(f"'{shows}' of quilts", parameter="shows", rule=rule, fix="use lippmann render")
     middle = view_toward(display, views, None if eye == "sweep" else eye)
     shown = 0
 
-    def film(frame: SavedFrame) -> Shot:
+    def see(frame: SavedFrame) -> Pixels:
         nonlocal shown
         number = middle
         if eye == "sweep":
             number = math.floor((1.0 + math.sin(2.0 * math.pi * shown / count)) / 2.0 * views)
             number = min(number, views - 1)
         shown += 1
-        return _shot(form.read(frame.path), lambda quilt: view_of_quilt(quilt, number))
+        quilt = form.read(frame.path)
+        return quantize(view_of_quilt(quilt, number), 8, quilt.provenance.transfer)
 
-    return film
+    return _seen(video, see, default_size(display), shows, codec)
 
 
-def _shot(quilt: Quilt, show: Callable[[Quilt], FloatArray]) -> Shot:
-    return Shot(show(quilt), quilt.provenance.transfer)
+def _seen(
+    video: Path,
+    see: Callable[[SavedFrame], Pixels],
+    size: tuple[int, int],
+    shows: Shows,
+    codec: Codec | None,
+    layout: QuiltLayout | None = None,
+) -> Filming:
+    """A film of what an eye sees, as it is or framed for a Hololuminescent display."""
+    if shows == "hololuminescent":
+        chosen = codec_of_film(video, (HEIGHT, WIDTH), codec or "hevc")
+        return Filming(lambda frame: for_hololuminescent(see(frame)), chosen)
+    return Filming(see, codec_of_film(video, size, codec), layout)
+
+
+def _native(path: Path, display: Display) -> Pixels:
+    image = INTEGRAL.read(path)
+    return np.ascontiguousarray(mirrored_in_file(image.srgb(), display))
+
+
+def _check_quilts(shows: Shows) -> None:
+    """Raise :class:`UsageError` if a film whose name says quilts is to show anything else."""
+    if shows != "eye":
+        raise UsageError(f"'{shows}' beside a name that says quilts", parameter="shows", fix="choose another name")
 
 
 @dataclass

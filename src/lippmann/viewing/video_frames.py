@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lippmann.codecs.types import Pixels
+from lippmann.color.transfer import quantize
 from lippmann.display import Display
 from lippmann.display.view_cone import cone_tangent
 from lippmann.errors import OutputError
@@ -17,7 +19,7 @@ from lippmann.quilts.quilt import Quilt, QuiltLayout, layout_of_name
 from lippmann.viewing.replay import DEFAULT_WIDTH, Eye, default_eye, default_size, replay
 from lippmann.viewing.video_file import check_animation_path
 
-#: Limit on the width of a quilt in a video, in pixels: that of players and of common H.264 levels.
+#: Limit on the width of a quilt that is made for a video alone, in pixels: that of players of H.264.
 WIDEST_QUILT = 4096
 
 Projection = Callable[[IntegralImage], FloatArray]
@@ -92,16 +94,18 @@ def view_of_quilt(quilt: Quilt, number: int) -> FloatArray:
     return _resized(quilt.view(number), max(1, round(shown)), max(1, round(shown / aspect)))
 
 
-def quilt_of_video(quilt: Quilt) -> FloatArray:
-    """The views of a quilt side by side, in linear light, at most :data:`WIDEST_QUILT` pixels wide and high."""
+def quilt_of_video(quilt: Quilt, widest: int = WIDEST_QUILT) -> Pixels:
+    """Codes of the views of a quilt side by side, at most ``widest`` pixels wide and high, of 8 bits."""
     width, height = quilt.view_size
     columns, rows = quilt.layout[:2]
-    shrink = min(1.0, WIDEST_QUILT / (columns * width), WIDEST_QUILT / (rows * height))
+    shrink = min(1.0, widest / (columns * width), widest / (rows * height))
+    if shrink == 1.0 and quilt.values.dtype == np.uint8:
+        return quilt.values[quilt.size[1] - rows * height :, : columns * width].astype(np.uint8, copy=False)
     size = max(1, int(width * shrink)), max(1, int(height * shrink))
-    small = Quilt(np.empty((size[1] * rows, size[0] * columns, 3), dtype=np.float32), quilt.layout)
+    small = Quilt(np.empty((size[1] * rows, size[0] * columns, 3), dtype=np.uint8), quilt.layout)
     for number in range(quilt.layout.views):
-        small.view_values(number)[...] = _resized(quilt.view(number), *size)
-    return small.pixels
+        small.view_values(number)[...] = quantize(_resized(quilt.view(number), *size), 8, quilt.provenance.transfer)
+    return small.values.astype(np.uint8, copy=False)
 
 
 def _resized(pixels: FloatArray, width: int, height: int) -> FloatArray:

@@ -120,7 +120,8 @@ def render(
     moving = sequence.Wanted.part_of(in_frames)
     path = output or Path(f"{Path(scene).stem}{'' if moving else '.png'}")
     moving, file = sequence.with_film(moving, path)
-    if moving.video is not None and moving.eye is None and (file != path or wanted.pair):
+    shows_all = moving.eye is None and moving.shows == "eye"
+    if moving.video is not None and shows_all and (file != path or wanted.pair):
         moving = replace(moving, video=_named(moving.video, wanted.ending))
     if file == path and (not moving or (path.suffix and not path.is_dir())):
         file = _named(path, wanted.ending)

@@ -7,7 +7,6 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,8 +60,8 @@ class Wanted(SequenceOptions):
             return True
         if self.frames is not None:
             return True
-        for option in ("fps", "animation", "camera_path", "fixed_noise", "video", "eye", "codec"):
-            if getattr(self, option):
+        for option in ("fps", "animation", "camera_path", "fixed_noise", "video", "eye", "codec", "shows"):
+            if getattr(self, option) not in (None, False, "", "eye"):
                 name = f"--{option.replace('_', '-')}"
                 raise UsageError(
                     "has no meaning for a single picture", where=name, fix="add --frames 0:48, or --turntable 48"
@@ -115,8 +114,8 @@ def render_frames(
     from lippmann.sequences.files import saved_sequence
     from lippmann.sequences.forms import INTEGRAL, QuiltForm
     from lippmann.sequences.motion import FRAMES_PER_SECOND
-    from lippmann.viewing.video_file import check_animation_path, write_animation
-    from lippmann.viewing.video_frames import layout_of_video
+    from lippmann.viewing.hololuminescent import RATES
+    from lippmann.viewing.video_file import check_animation_path, write_codes
 
     if (wanted.camera_path is not None or wanted.turns) and wanted.fps is not None and wanted.video is None:
         what = "a turn" if wanted.turns else "a camera path"
@@ -127,8 +126,17 @@ def render_frames(
         raise UsageError("nobody looks", where="--eye", fix="add --video FILE.mp4, or leave it out")
     if wanted.video is not None:
         check_animation_path(wanted.video, wanted.codec)
-    elif wanted.codec is not None:
-        raise UsageError("there is no film", where="--codec", fix="add --video FILE.mp4, or leave it out")
+    else:
+        for option, given in (("--codec", wanted.codec is not None), ("--shows", wanted.shows != "eye")):
+            if given:
+                raise UsageError("there is no film", where=option, fix="add --video FILE.mp4, or leave it out")
+    if wanted.shows == "hololuminescent" and wanted.fps not in RATES:
+        raise UsageError(
+            f"{wanted.fps or FRAMES_PER_SECOND:g} frames per second",
+            where="--fps",
+            rule="the player of Hololuminescent displays takes 30 or 60",
+            fix="add --fps 30",
+        )
     request = replace(request, fixed_noise=wanted.fixed_noise)
     chosen = frame_range(wanted.frames or ":")
     output = files.output
@@ -186,15 +194,12 @@ def render_frames(
             deque(noted_frames, maxlen=0)
         else:
             sweep_beside(wanted.video)
-            shots = map(filming, noted_frames)
-            first = next(shots)
-            write_animation(
-                (shot.pixels for shot in chain([first], shots)),
+            write_codes(
+                map(filming.codes, noted_frames),
                 wanted.video,
                 frames_per_second=wanted.fps or FRAMES_PER_SECOND,
-                transfer=first.transfer,
-                codec=wanted.codec,
-                quilt=layout_of_video(wanted.video),
+                codec=filming.codec,
+                quilt=filming.quilt,
             )
     for alike in notes.values():
         where = next(iter(alike))
@@ -249,9 +254,9 @@ def _filming(
     from lippmann.sequences.forms import QuiltForm
 
     if isinstance(form, QuiltForm):
-        return film_of_quilts(wanted.video, display, form, _eye(wanted.eye), count)
+        return film_of_quilts(wanted.video, display, form, _eye(wanted.eye), count, wanted.shows, wanted.codec)
     eye = None if wanted.eye is None else triple(wanted.eye, "--eye")
-    return film_of_pictures(wanted.video, motion, display, request, eye)
+    return film_of_pictures(wanted.video, motion, display, request, eye, wanted.shows, wanted.codec)
 
 
 def _eye(text: str | None) -> FilmEye:

@@ -1,0 +1,124 @@
+"""Colour and depth side by side (RGB-D), and depth maps, of what an eye sees of a picture with the layer ``depth``.
+
+Depth is the distance from the eye along the axis of the display. Its grey codes are linear in inverse depth: by their
+difference neighbouring views differ, and pictures with such depth are read as photographs (:mod:`depth_photo`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.codecs.types import Pixels
+from lippmann.color.transfer import quantize
+from lippmann.errors import UsageError
+from lippmann.image.integral_image import IntegralImage
+from lippmann.image.stored_values import FloatArray
+from lippmann.viewing.replay import Eye, default_eye, default_size, replay
+
+#: What is white: near or far.
+White = Literal["near", "far"]
+
+
+@dataclass(frozen=True)
+class RgbdForm:
+    """How colour and depth become one picture.
+
+    Parameters
+    ----------
+    half:
+        Whether each is halved in width, so that both together have the width of one.
+    white:
+        Whether near or far is white.
+    """
+
+    half: bool = False
+    white: White = "near"
+
+    @property
+    def ending(self) -> str:
+        """The ending of a file's stem that says this form; ``_rgbd`` alone is what the maker's player takes."""
+        return f"_rgbd{'-half' if self.half else ''}{'-far' if self.white == 'far' else ''}"
+
+
+def distance_seen(image: IntegralImage, eye: Eye | None = None, size: tuple[int, int] | None = None) -> FloatArray:
+    """Distance ``(h, w)`` in mm from the eye along the display's axis; infinite where nothing is hit.
+
+    Raises
+    ------
+    UsageError
+        The picture has no depth.
+    """
+    depth = image.maps.get("depth")
+    if depth is None:
+        raise UsageError(
+            "the picture has no depth", rule="that is the layer of --layers", fix="render it with --layers"
+        )
+    eye = default_eye(image.display) if eye is None else eye
+    is_hit = np.isfinite(depth)
+    # A line of sight that misses the panel is black: no hit there.
+    parts = np.stack([np.where(is_hit, depth, 0.0), is_hit, is_hit], axis=-1)
+    height, hit, _ = np.moveaxis(replay(image.with_pixels(parts, maps={}), eye, size=size, subpixels=False), -1, 0)
+    return np.where(hit > 0.0, np.float32(eye[2]) - height, np.inf).astype(np.float32)
+
+
+def range_of(distance: FloatArray) -> tuple[float, float]:
+    """Nearest and farthest finite distance.
+
+    Raises
+    ------
+    UsageError
+        Nothing is seen.
+    """
+    finite = distance[np.isfinite(distance)]
+    if not len(finite):
+        raise UsageError("nothing is seen", rule="depth lies between something near and something far")
+    return float(finite.min()), float(finite.max())
+
+
+def depth_codes(distance: FloatArray, near: float, far: float, bits: int, white: White) -> Pixels:
+    """Codes ``(h, w)`` of distances, linear in inverse depth from ``near`` to ``far``."""
+    span = 1.0 / near - 1.0 / far
+    share = (1.0 / distance.astype(np.float64) - 1.0 / far) / span if span else np.ones(distance.shape)
+    share = np.clip(share, 0.0, 1.0)
+    values: FloatArray = (share if white == "near" else 1.0 - share).astype(np.float32)
+    return quantize(values, bits, "linear")
+
+
+def rgbd_codes(
+    image: IntegralImage,
+    form: RgbdForm,
+    eye: Eye | None = None,
+    *,
+    between: tuple[float, float] | None = None,
+    bits: int = 8,
+    size: tuple[int, int] | None = None,
+) -> Pixels:
+    """Colour on the left and depth on the right, as codes of 8 or 16 bits.
+
+    Parameters
+    ----------
+    between:
+        Nearest and farthest distance in mm; None for those that are seen.
+    size:
+        Of the colour picture at full width.
+    """
+    width, height = default_size(image.display) if size is None else size
+    width += width % 2  # so that halves are whole columns
+    color = quantize(replay(image, eye, size=(width, height)), bits, image.provenance.transfer)
+    distance = distance_seen(image, eye, (width, height))
+    near, far = range_of(distance) if between is None else between
+    depth = depth_codes(distance, near, far, bits, form.white)
+    if form.half:
+        color = _halved(color)
+        depth = depth[:, ::2]  # a mean of two depths is that of no surface
+    gray: NDArray[np.generic] = np.repeat(depth[..., None], 3, axis=2)
+    return np.ascontiguousarray(np.concatenate([color, gray], axis=1))
+
+
+def _halved(codes: Pixels) -> Pixels:
+    pair = codes[:, 0::2].astype(np.uint32) + codes[:, 1::2]
+    return ((pair + 1) // 2).astype(codes.dtype)

@@ -1,0 +1,202 @@
+"""MP4 films: which encoders there are, the sizes that they and their players take, and the writing itself."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from lippmann.codecs.types import Pixels
+from lippmann.errors import OutputError, UsageError
+from lippmann.quilts.quilt import QuiltLayout
+from lippmann.quilts.quilt_metadata import layout_text
+from lippmann.runtime.thread_policy import kept_policy
+
+#: How the frames of an MP4 file are coded; docs/reference/films.md says who plays which.
+Codec = Literal["h264", "hevc", "vp9", "av1", "h264-rgb", "vp9-rgb"]
+
+
+@dataclass(frozen=True)
+class _Encoder:
+    """An encoder of FFmpeg.
+
+    Attributes
+    ----------
+    name, options:
+        Of the encoder.
+    tag:
+        The sample entry that names the codec in the file.
+    widest:
+        Most pixels of a side. Of lossy codecs, what the panels' players decode; of lossless ones, the encoder's limit.
+    pixels:
+        The order of its colours: halved colours, or red, green and blue as they are.
+    """
+
+    name: str
+    options: dict[str, str]
+    tag: str
+    widest: int
+    pixels: str = "yuv420p"
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether each code comes back as it was."""
+        return self.pixels != "yuv420p"
+
+
+#: libx265 prints on standard error.
+_QUIET = "log-level=error"
+#: Encoders look one frame ahead at most and keep one for reference: each takes 17 MB of a quilt of 3360 x 3360 pixels,
+#: 100 MB of one of 8192 x 8192, several times over. libx265 has no B-frames: of a film of two frames it gave decoding
+#: times that it never set.
+_LEAN = {"rc-lookahead": "1", "refs": "1", "bf": "1", "thread_type": "slice"}
+_LEAN_HEVC = f"{_QUIET}:rc-lookahead=1:ref=1:bframes=0:frame-threads=1"
+_LEAN_VP9 = {"deadline": "good", "row-mt": "1", "lag-in-frames": "0"}
+#: Constant rate factors near the one that is considered visually lossless (18 in H.264); lower is better. Apple's
+#: players take HEVC as ``hvc1`` alone.
+_ENCODERS: dict[Codec, _Encoder] = {
+    "h264": _Encoder("libx264", {"crf": "16", **_LEAN}, "avc1", 4096),
+    "hevc": _Encoder("libx265", {"crf": "18", "x265-params": _LEAN_HEVC}, "hvc1", 8192),
+    "vp9": _Encoder("libvpx-vp9", {"crf": "20", "b": "0", "cpu-used": "4", **_LEAN_VP9}, "vp09", 8192),
+    "av1": _Encoder("libsvtav1", {"crf": "20", "preset": "8"}, "av01", 8192),
+    "h264-rgb": _Encoder("libx264rgb", {"qp": "0", "preset": "veryfast", **_LEAN}, "avc1", 16384, "rgb24"),
+    "vp9-rgb": _Encoder("libvpx-vp9", {"lossless": "1", "cpu-used": "5", **_LEAN_VP9}, "vp09", 16384, "gbrp"),
+}
+
+#: sRGB and BT.709 in the numbering of ITU-T H.273; RGB as it is has the matrix 0 and the full range.
+_BT709, _SRGB_TRANSFER, _LIMITED = 1, 13, 1
+_IDENTITY, _FULL = 0, 2
+
+
+def codec_for(size: tuple[int, int], codec: Codec | None, *, exact: bool = False) -> Codec:
+    """The codec asked for; without one H.264, or HEVC where a side is longer than H.264's players take."""
+    if codec is not None:
+        return codec
+    if exact:
+        return "h264-rgb"
+    return "h264" if max(size) <= _ENCODERS["h264"].widest else "hevc"
+
+
+def most_pixels(codec: Codec) -> int:
+    """The longest side of a film."""
+    return _ENCODERS[codec].widest
+
+
+def check_film(place: Path, size: tuple[int, int], codec: Codec, *, exact: bool = False) -> None:
+    """Check before the first frame that a film of this size can be coded.
+
+    Parameters
+    ----------
+    exact:
+        Whether each pixel counts, as on a panel under lenses.
+
+    Raises
+    ------
+    OutputError
+        The encoder is not built in; or takes no such size.
+    UsageError
+        Each pixel counts, and the codec mixes colours of neighbours.
+    """
+    import av
+
+    encoder = _ENCODERS[codec]
+    if exact and not encoder.is_exact:
+        raise UsageError(
+            f"{codec} halves the resolution of colours",
+            parameter="codec",
+            rule="behind lenses each pixel counts",
+            fix="take h264-rgb or vp9-rgb",
+        )
+    try:
+        av.codec.Codec(encoder.name, "w")
+    except av.codec.codec.UnknownCodecError:
+        rule = f"PyAV as it is installed has no {encoder.name}"
+        raise OutputError("the codec is not installed", where=str(place), rule=rule, fix="write H.264") from None
+    if max(size) > encoder.widest:
+        raise OutputError(
+            f"a film of {size[0]} x {size[1]} pixels",
+            where=str(place),
+            rule=f"{codec} takes sides of at most {encoder.widest}",
+            fix="choose another codec, or make the frames smaller",
+        )
+
+
+def write_mp4(
+    frames: Iterator[Pixels],
+    path: Path,
+    frames_per_second: float,
+    *,
+    place: Path,
+    codec: Codec | None,
+    quilt: QuiltLayout | None,
+) -> None:
+    """Write 8-bit frames as MP4; the file will be called ``place``."""
+    from fractions import Fraction
+
+    import av
+
+    # SVT-AV1 prints its settings on standard error, unless told to print errors alone before it is first used.
+    os.environ.setdefault("SVT_LOG", "1")
+
+    rate = Fraction(frames_per_second).limit_denominator(1001)
+    try:
+        with av.open(str(path), "w", format="mp4") as container:
+            container.metadata["title"] = place.stem
+            if quilt is not None:
+                container.metadata["comment"] = layout_text(quilt)
+            for number, codes in enumerate(frames):
+                if number == 0:
+                    size = codes.shape[1], codes.shape[0]
+                    codec = codec_for(size, codec)
+                    check_film(place, size, codec)
+                    encoder = _ENCODERS[codec]
+                    stream = container.add_stream(encoder.name, rate=rate, options=encoder.options)
+                    frame = _frame(codes, encoder, quilt)
+                    _open(stream.codec_context, encoder, (frame.width, frame.height))
+                else:
+                    frame = _frame(codes, encoder, quilt)
+                frame.pts, frame.time_base = number, 1 / rate
+                container.mux(stream.encode(frame))
+                del frame, codes  # while the next is waited for
+            container.mux(stream.encode())
+    except (av.error.FFmpegError, ValueError) as error:
+        if isinstance(error, OSError):  # such as a full disk
+            raise
+        raise OutputError(f"cannot be written as MP4 ({error})", where=str(place)) from error
+
+
+def _open(context: Any, encoder: _Encoder, size: tuple[int, int]) -> None:
+    """Open an encoder for frames of this size."""
+    context.codec_tag = encoder.tag
+    context.width, context.height = size
+    context.pix_fmt = encoder.pixels
+    context.color_primaries, context.color_trc = _BT709, _SRGB_TRANSFER
+    context.colorspace, context.color_range = (_IDENTITY, _FULL) if encoder.is_exact else (_BT709, _LIMITED)
+    with kept_policy():
+        context.open()
+
+
+def _frame(codes: Pixels, encoder: _Encoder, quilt: QuiltLayout | None) -> Any:
+    """A frame as the encoder takes it."""
+    import av
+
+    if encoder.is_exact:
+        return av.VideoFrame.from_ndarray(codes, format="rgb24").reformat(format=encoder.pixels)
+    frame = av.VideoFrame.from_ndarray(_even(codes, quilt), format="rgb24")
+    return frame.reformat(format=encoder.pixels, dst_colorspace="ITU709", dst_color_range="MPEG")
+
+
+def _even(codes: Pixels, quilt: QuiltLayout | None) -> Pixels:
+    """A frame of even sides."""
+    height, width = codes.shape[:2]
+    if not (width % 2 or height % 2):
+        return codes
+    if quilt is None or width % quilt.columns or height % quilt.rows:
+        return np.pad(codes, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+    views = codes.reshape(quilt.rows, height // quilt.rows, quilt.columns, width // quilt.columns, 3)
+    whole = views[:, : views.shape[1] - height % 2, :, : views.shape[3] - width % 2]
+    return np.ascontiguousarray(whole).reshape(height - height % 2 * quilt.rows, width - width % 2 * quilt.columns, 3)
