@@ -63,7 +63,7 @@ def test_the_first_help_shows_what_most_need_and_the_other_all(lippmann, name):
     options = [each.opts for each in commands()[name].params if each.param_type_name == "option"]
     assert all(named[1] & set(spellings) for spellings in options if any(each.startswith("--") for each in spellings))
     assert {"--display", "--effort", "--turn", "--help-all"} <= named[0]
-    assert len(named[0]) <= 32
+    assert len(named[0]) <= 29
 
 
 @pytest.mark.slow

@@ -20,6 +20,7 @@ from lippmann.options.light import LightOptions
 from lippmann.options.option import default_of, kinds_of, options_of
 from lippmann.options.outputs import AccessOptions
 from lippmann.options.placement import PlacementOptions
+from lippmann.options.prints import PrintOptions
 from lippmann.options.quality import MachineKeywords, MachineOptions, QualityOptions, RenderKeywords
 from lippmann.options.scene import LoadKeywords, SceneOptions
 from lippmann.options.texts import from_plain, settings_of, to_plain, toml_of
@@ -71,7 +72,7 @@ class Asked(Exception):  # noqa: N818
 
 @pytest.fixture
 def asked_by(monkeypatch):
-    """What a call asks for: scene options, light, access, and the request; nothing is loaded or rendered."""
+    """What a call asks for: scene options, light, access, display, request; nothing is loaded or rendered."""
     from lippmann.rendering import picture
     from lippmann.scene.readers import load
 
@@ -83,7 +84,7 @@ def asked_by(monkeypatch):
         return scene
 
     def render_picture(scene, display, request, progress):
-        raise Asked(request)
+        raise Asked(display, request)
 
     monkeypatch.setattr(load, "read_scene", read_scene)
     monkeypatch.setattr(picture, "render_picture", render_picture)
@@ -92,7 +93,7 @@ def asked_by(monkeypatch):
         seen.clear()
         with pytest.raises(Asked) as caught:
             call()
-        return *seen[0], caught.value.args[0]
+        return *seen[0], *caught.value.args
 
     return ask
 
@@ -116,6 +117,46 @@ def test_both_doors_ask_for_the_same(kind, each, its, asked_by, tmp_path, monkey
     by_command, by_call = asked_by(command), asked_by(lambda: call(given))
     assert by_command == by_call
     assert by_command != asked_by(lambda: call({home: {} for home in CLASSES}))
+
+
+#: Two values of each option of a print.
+PRINT = {
+    "lpi": ("75", "60"),
+    "print_lpi": ("60.1", "60.2"),
+    "ppi": ("720", "600"),
+    "size": ("80x50mm", "60x45mm"),
+    "viewing_distance": ("700mm", "600mm"),
+    "thickness": ("0.7mm", "0.8mm"),
+    "index": ("1.5", "1.6"),
+    "field": ("40", "41"),
+}
+
+
+@pytest.mark.parametrize("name", [each.name for each, _ in options_of(PrintOptions)])
+def test_both_doors_ask_for_the_same_print(name, asked_by, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    value, other = PRINT[name]
+    asked = {"lpi": "60", "ppi": "600", "size": "60x45mm", name: value}
+    if name == "print_lpi":
+        del asked["lpi"]
+    if name == "index":
+        asked["thickness"] = "0.7mm"
+    flags = [word for key, value in asked.items() for word in (f"--{key.replace('_', '-')}", value)]
+    words = ["render", "teapot", "-d", "print", *flags, "--bleed", "3mm", "--threads", "2"]
+
+    def command():
+        from lippmann.cli import app
+
+        app.app_of(words)(words, prog_name="lippmann", standalone_mode=False)
+
+    def by_call(**changes):
+        short = ",".join(f"{key.replace('_', '-')}={value}" for key, value in (asked | changes).items())
+        display = lippmann.load_display(f"print:{short}")
+        return asked_by(lambda: lippmann.render("teapot", display, bleed=3.0, threads=2))[1:]
+
+    by_command = asked_by(command)[1:]
+    assert by_command == by_call()
+    assert by_command != by_call(**{name: other})
 
 
 def call(given):

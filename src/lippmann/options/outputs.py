@@ -43,8 +43,7 @@ class SequenceOptions(Options):
     )
     video: Path | None = _frames(
         help="Write a film (.mp4, .png) of what an eye sees of the frames, or with a name such as "
-        "film_qs8x6a0.75.mp4 of their quilts.",
-        first=True,
+        "film_qs8x6a0.75.mp4 of their quilts."
     )
     eye: str | None = _frames(
         help="Where the film's eye is: X,Y,Z in mm, z toward the viewer; central. Of quilts also 'sweep': the eye goes "

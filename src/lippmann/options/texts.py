@@ -1,4 +1,8 @@
-"""Options in words: values as JSON and TOML have them, and words of the command line as values."""
+"""Options in words: values as JSON and TOML have them, and words of the command line as values.
+
+``tomli-w`` does not take the place of :func:`toml_of`: it spreads lists over lines and makes sections of tables, and a
+setting is one line, in the studio's files and in a picture's metadata.
+"""
 
 from __future__ import annotations
 

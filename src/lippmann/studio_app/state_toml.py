@@ -8,7 +8,8 @@ Names have ``_`` for ``-``, and several numbers are a list::
     light_turn = [20.0, 0.0]
     exposure = 0.5
 
-What a file does not say is as in a new studio. Files that a state names are found beside it.
+What a file does not say is as in a new studio. Files that a state names are found beside it. ``tomli-w`` would write a
+setting over several lines, see :mod:`lippmann.options.texts`.
 """
 
 from __future__ import annotations
