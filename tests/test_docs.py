@@ -264,3 +264,8 @@ def test_the_glossary_explains_what_users_search_for(word):
     rows = (ROOT / "docs" / "reference" / "glossary.md").read_text(encoding="utf-8").splitlines()
     entries = [row.split("|")[1] for row in rows if row.startswith("| ")]
     assert any(word in entry for entry in entries)
+
+
+def test_the_research_notes_list_each_finding():
+    listed = re.findall(r"^\| `(\w+\.sh)` \|", (ROOT / "docs/research/index.md").read_text(encoding="utf-8"), re.M)
+    assert sorted(listed) == sorted(file.name for file in (ROOT / "findings").glob("*.sh"))
