@@ -163,6 +163,16 @@ def cut_display(tmp_path):
     return cut
 
 
+@pytest.fixture
+def fake_bridge(monkeypatch):
+    """A stand-in for Looking Glass Bridge, with one panel; see :class:`fake_bridge.FakeBridge`."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    from fake_bridge import running
+
+    with running(monkeypatch) as fake:
+        yield fake
+
+
 @pytest.fixture(scope="session")
 def moving_ball(tmp_path_factory) -> Path:
     """A glTF file of one second: a ball rises and comes down again 1 to the right, and a camera goes along."""

@@ -63,7 +63,7 @@ def cheaper(words: list[str]) -> list[str]:
 
 
 @pytest.fixture
-def workplace(tmp_path, monkeypatch, moving_ball):
+def workplace(tmp_path, monkeypatch, moving_ball, fake_bridge):
     """A folder with the files that the pages speak of."""
     import trimesh
 

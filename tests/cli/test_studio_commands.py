@@ -13,6 +13,7 @@ from urllib.error import HTTPError
 
 import numpy as np
 import pytest
+from PIL import Image
 from websockets.sync.client import connect
 
 from lippmann.display import Display, LensArray, Panel
@@ -102,7 +103,13 @@ def test_show_serves_the_picture_until_it_is_ended(tmp_path, number):
     IntegralImage(pixels, DISPLAY).save(tmp_path / "shot.png")
     with serving("show", "shot.png", folder=tmp_path) as (process, address):
         assert b"panel_window.js" in fetch(address)
-        assert json.loads(fetch(f"{address}panel.json")) == {"width": 32, "height": 24, "name": "d", "live": None}
+        assert json.loads(fetch(f"{address}panel.json")) == {
+            "width": 32,
+            "height": 24,
+            "name": "d",
+            "live": None,
+            "corner": None,
+        }
         assert len(fetch(f"{address}pictures/0/tiles/picture/0_0")) == 3 * 32 * 24
         code, err = interrupted(process, number)
     assert (code, err.strip()) == (130, "Ctrl-C ends it")
@@ -124,3 +131,19 @@ def test_mistakes_are_said_before_a_page_opens(lippmann, tmp_path):
         assert outcome.code in (1, 2), outcome
         assert len(outcome.err.strip().splitlines()) == 1
         assert named in outcome.err
+
+
+def test_a_quilt_goes_through_bridge(lippmann, tmp_path, fake_bridge):
+    quilt = tmp_path / "seen_qs4x2a0.75.png"
+    Image.fromarray(np.zeros((256, 320, 3), np.uint8)).save(quilt)
+    done = lippmann("show", quilt, "--json")
+    assert done.json == {"picture": str(quilt), "panels": ["LKG-P00001"]}
+    assert fake_bridge.asked[-1][0] == "play_playlist"
+    fake_bridge.devices = []
+    assert "finds no panel" in lippmann("show", quilt).err
+    for words in (("--port", 8000), ("--no-browser",), ("--display", "portrait")):
+        done = lippmann("show", quilt, *words)
+        assert done.code == 2
+        assert f"{words[0]}: a quilt goes through Bridge" in done.err
+    pair = quilt.rename(tmp_path / "seen_2x1.png")
+    assert "this is a stereo pair" in lippmann("show", pair).err

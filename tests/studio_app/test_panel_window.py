@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -113,7 +115,7 @@ CHECK = """async (changed) => {
   const { complaint } = await import('studio/native_check.js');
   const panel = { width: 1338, height: 642, name: 'wall' };
   const screen = [1338, 642];
-  const right = { panel, box: screen, ratio: 1, screen, zoom: 1, inside: screen, isFull: true };
+  const right = { panel, box: screen, ratio: 1, screen, zoom: 1, inside: screen, isFull: true, turn: 0 };
   return complaint({ ...right, ...changed });
 }"""
 
@@ -127,6 +129,9 @@ CAUSES = [
     ({"ratio": 1.25}, "This screen has 1673 x 803 pixels"),
     ({"screen": [1920, 1080]}, "This screen has 1920 x 1080"),
     ({"inside": [1338, 600]}, "does not give the whole screen"),
+    ({"turn": 90}, None),
+    ({"turn": 180}, "upside down"),
+    ({"screen": [642, 1338], "turn": 90}, "shows this screen turned, 642 x 1338 pixels for 1338 x 642"),
 ]
 
 
@@ -167,3 +172,62 @@ def test_quantized_values_are_what_the_file_holds(picture):
     values = np.random.default_rng(3).random((SIZE[1], SIZE[0], 3), np.float32)
     with Image.open(picture) as file:
         np.testing.assert_array_equal(np.asarray(file.convert("RGB")), quantize(values, 8, "srgb"))
+
+
+#: Screens of a computer: a laptop's, one that is scaled, and two panels alike.
+SCREENS = [
+    {"left": 0, "top": 0, "width": 1920, "height": 1080, "devicePixelRatio": 1, "label": "Laptop"},
+    {"left": 1920, "top": 0, "width": 892, "height": 428, "devicePixelRatio": 1.5, "label": "LKG"},
+    {"left": 2812, "top": 0, "width": 1536, "height": 2048, "devicePixelRatio": 1, "label": ""},
+    {"left": 4348, "top": 0, "width": 1536, "height": 2048, "devicePixelRatio": 1, "label": "Second"},
+]
+PLACES = [
+    ({"width": 1338, "height": 642}, 1, "Found on the screen LKG."),
+    (
+        {"width": 1536, "height": 2048},
+        None,
+        "No single screen has 1536 x 2048 pixels (they have 1920 x 1080, ",
+    ),
+    ({"width": 1536, "height": 2048, "corner": [2812, 0]}, 2, "Found on the screen at 2812, 0."),
+    ({"width": 1920, "height": 1080, "corner": [5, 5]}, 0, "Found on the screen Laptop."),
+    ({"width": 1440, "height": 2560}, None, "put this window on the display yourself"),
+]
+FIND = """async ([screens, panel]) => {
+  const { screenOf, placeInWords } = await import('studio/screens.js');
+  return [screens.indexOf(screenOf(screens, panel)), placeInWords(screens, panel)];
+}"""
+#: A browser that grants the Window Management API, as far as a page can tell.
+GRANT = """(screens) => {
+  Object.defineProperty(window.screen, 'isExtended', { value: true });
+  window.getScreenDetails = async () => ({ screens });
+  document.documentElement.requestFullscreen = async (asked) => { window.asked = asked; };
+}"""
+
+
+@pytest.mark.slow
+def test_the_display_is_found_among_the_screens(open_tab, address):
+    tab = opened(open_tab, address)
+    for panel, number, words in PLACES:
+        found, said = tab.evaluate(FIND, [SCREENS, panel])
+        assert found == (-1 if number is None else number), panel
+        assert words in said
+    tab.evaluate(GRANT, SCREENS)
+    tab.page.keyboard.press("f")
+    assert tab.wait_for("window.asked?.screen?.label") == "LKG"
+    tab.wait_for("document.querySelector('output').textContent === 'Found on the screen LKG.'")
+
+
+@pytest.mark.slow
+def test_full_screen_without_the_right_to_see_all_screens(open_tab, address):
+    tab = opened(open_tab, address)
+    tab.evaluate(GRANT, SCREENS)
+    tab.evaluate("() => { window.getScreenDetails = () => Promise.reject(new Error('not granted')); }")
+    tab.page.keyboard.press("f")
+    assert tab.wait_for("JSON.stringify(window.asked)") == '{"navigationUI":"hide"}'
+
+
+def test_the_page_is_told_where_bridge_has_the_panel(picture, fake_bridge):
+    asked = Request("/panel.json", {})
+    assert json.loads(PanelSite(PictureFile(picture)).get(asked).body)["corner"] is None
+    fake_bridge.connect("LKG-E00002", (1920, 7), SIZE)
+    assert json.loads(PanelSite(PictureFile(picture)).get(asked).body)["corner"] == [1920, 7]

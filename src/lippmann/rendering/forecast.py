@@ -112,7 +112,6 @@ class Forecast:
         width, height = self.size
         of_frames = f", {self.frames} frames" if self.frames > 1 else ""
         of_subpixels = ", a ray for every sub-pixel" if self.subpixels else ""
-        back, front = self.blur
         stages = ", ".join(f"{stage} {duration_in_words(s)}" for stage, s in self.seconds.items() if stage != "total")
         proof = {} if self.proof is None else self.proof.in_words()
         return {
@@ -121,7 +120,7 @@ class Forecast:
             "resolved": f"{depths_in_words(*self.resolvable_range)}, {cone_in_words(self.view_cone, self.fused_gain)}",
             **({"comfort": self.comfort} if self.comfort else {}),
             "blur": f"{100 * self.blurred_share:.0f} % of the pixels see what lies beyond; "
-            f"a pixel's light spreads over {back:.1f} lenses at the back, {front:.1f} at the front",
+            f"a pixel's light spreads over {self.blur[0]:.1f} lenses at the back, {self.blur[1]:.1f} at the front",
             **{name: proof[name] for name in ("crosstalk", "advice") if name in proof},
             "rays": f"{self.rays['primary'] / 1e6:.1f} M from pixels ({samples_in_words(self.spp, 'each')}), "
             f"about {(self.rays['shadow'] + self.rays['secondary']) / 1e6:.1f} M more",

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from http import HTTPStatus
 
+from lippmann.display.formats.bridge import corner_of_screen, panels_or_none
 from lippmann.studio_app.pages import static_files
 from lippmann.viewer.responses import RefusedError, Request, Response, json_response
 from lippmann.viewer.served_picture import PictureFile
@@ -21,6 +22,7 @@ class PanelSite:
 
     def __init__(self, picture: PictureFile) -> None:
         self._picture = picture
+        self._panels = panels_or_none()
         self._viewer = ViewerSite([picture])
         self._static = {f"/{name}": found for name, found in static_files().items() if name not in ("", "panel")}
         self._static["/"] = static_files()["panel"]
@@ -42,4 +44,6 @@ class PanelSite:
         manifest = self._picture.current().manifest
         tiles = manifest["tiles"]
         assert isinstance(tiles, dict)
-        return {"width": tiles["width"], "height": tiles["height"], "name": manifest["display"], "live": None}
+        width, height = tiles["width"], tiles["height"]
+        corner = corner_of_screen(self._panels, width, height)
+        return {"width": width, "height": height, "name": manifest["display"], "live": None, "corner": corner}

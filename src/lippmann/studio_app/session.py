@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lippmann.display import Display, list_displays
+from lippmann.display.formats.bridge import NAME as BRIDGE
+from lippmann.display.formats.bridge import panels_or_none
 from lippmann.display.formats.load import is_short_form
 from lippmann.errors import LippmannError, UsageError
 from lippmann.options.scene import SceneOptions
@@ -71,6 +73,8 @@ class StudioSession:
         self._held, self._held_name = held, state.scene
         self._displays: dict[str, Display] = {}
         self._presets = {display.name: display for display in list_displays()}
+        self.panels = panels_or_none()
+        self._presets |= {f"{BRIDGE}:{panel.display.name}": panel.display for panel in self.panels}
         self._files = {name for name in (getattr(state, each) for each in FILES) if name is not None}
         self._titles: dict[str, str] = {}
         self.uploads = uploads
@@ -162,10 +166,12 @@ class StudioSession:
 
     def display_names(self) -> list[tuple[str, list[tuple[str, str]]]]:
         """Presets for a list: groups of names and titles."""
-        groups: dict[str, list[tuple[str, str]]] = {"Panels and lens arrays": [], "Looking Glass": [], "Prints": []}
+        kinds = ("Panels and lens arrays", "Looking Glass", "Eye-tracked monitors", "Prints")
+        groups: dict[str, list[tuple[str, str]]] = {kind: [] for kind in kinds}
         for name, display in self._presets.items():
-            kind = "Looking Glass" if name.startswith("looking") else "Prints" if "print" in name else None
-            groups[kind or "Panels and lens arrays"].append((name, display.title or name))
+            kind = kinds[2] if display.stereo else kinds[3] if "print" in name else kinds[0]
+            kind = kinds[1] if name.startswith(("looking", BRIDGE)) else kind
+            groups[kind].append((name, display.title or name))
         return list(groups.items())
 
     def wanted(self, number: int, state: StudioState, view: LiveView) -> Wanted:

@@ -23,6 +23,7 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import BaseRoute, Route, Router, WebSocketRoute
 from starlette.websockets import WebSocket
 
+from lippmann.display.formats.bridge import corner_of_screen
 from lippmann.errors import LippmannError, PictureError
 from lippmann.studio_app.live_socket import LiveSocket
 from lippmann.studio_app.pages import static_files
@@ -89,7 +90,8 @@ class StudioSite:
         display = self._session.display(self._session.state)
         panel = display.panel
         size = {"width": panel.width, "height": panel.height, "name": display.title or display.name}
-        return _as_response(json_response({**size, "live": "live-panel"}))
+        corner = corner_of_screen(self._session.panels, panel.width, panel.height)
+        return _as_response(json_response({**size, "live": "live-panel", "corner": corner}))
 
     async def _picture(self, request: ServerRequest) -> Response:
         number, rest = request.path_params["number"], request.path_params["rest"]

@@ -43,6 +43,8 @@ from typing import ClassVar, Literal
 
 from lippmann.display import validation
 from lippmann.display.display import INFINITE, Display, check_tables
+from lippmann.display.formats.bridge import NAME as BRIDGE
+from lippmann.display.formats.bridge import display_of_bridge
 from lippmann.display.formats.lens_tables import aperture_of_table, monitor_display, with_profile
 from lippmann.display.formats.looking_glass import display_of_calibration, is_calibration
 from lippmann.display.formats.monitor_toml import TABLE as MONITOR
@@ -214,6 +216,7 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
 
     A Looking Glass preset goes by the end of its name, too, such as ``portrait`` or
     ``lkg-portrait``, and by what its device is called, such as ``Looking Glass Go`` or ``27 inch landscape``.
+    ``bridge`` is the panel that Looking Glass Bridge finds on this machine, ``bridge:SERIAL`` one of several.
 
     Raises
     ------
@@ -236,6 +239,8 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
         return _from_preset(name, presets)
     if is_short_form(name):
         return display_of_short_form(name)
+    if name.partition(":")[0] == BRIDGE:
+        return display_of_bridge(name)
     path = Path(name)
     if path.suffix in own.suffixes:
         return _read_file(path)

@@ -13,14 +13,20 @@ const ROUNDING = 1.5;
  * @param zoom of the fingers
  * @param inside size of the page in CSS pixels
  * @param isFull whether the page fills the screen
+ * @param turn by which the system turns the screen, in degrees
  */
-export function complaint({ panel, box, ratio, screen, zoom, inside, isFull }) {
+export function complaint({ panel, box, ratio, screen, zoom, inside, isFull, turn }) {
   if (Math.abs(zoom - 1) > 1e-3) return "The page is zoomed by fingers: pinch it back to its own size.";
   if (box !== null && (box[0] !== panel.width || box[1] !== panel.height)) {
     return `The browser scales: ${panel.width} x ${panel.height} pixels become ${box[0]} x ${box[1]}. Set its zoom to 100 % (Ctrl + 0), and the scaling of the system to 100 %.`;
   }
   const native = screen.map((side) => side * ratio);
   const isThere = Math.abs(native[0] - panel.width) < ROUNDING && Math.abs(native[1] - panel.height) < ROUNDING;
+  const isTurned = Math.abs(native[0] - panel.height) < ROUNDING && Math.abs(native[1] - panel.width) < ROUNDING;
+  if (!isThere && isTurned) {
+    return `The system shows this screen turned, ${Math.round(native[0])} x ${Math.round(native[1])} pixels for ${panel.width} x ${panel.height}: set its orientation so that it is not turned.`;
+  }
+  if (isThere && turn === 180) return "The system shows this screen upside down: turn its orientation back.";
   if (!isThere) {
     return `This screen has ${Math.round(native[0])} x ${Math.round(native[1])} pixels, ${panel.name} has ${panel.width} x ${panel.height}: move the window to the display, and set that to its own resolution.`;
   }

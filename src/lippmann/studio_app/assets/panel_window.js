@@ -8,6 +8,7 @@ import { serverSource } from "lippmann/source.js";
 import { Connection } from "studio/connection.js";
 import { drawPattern } from "studio/pattern.js";
 import { complaint } from "studio/native_check.js";
+import { askScreens, placeInWords, screenOf } from "studio/screens.js";
 
 const asked = new URLSearchParams(location.search);
 const main = document.querySelector("main");
@@ -60,6 +61,7 @@ function fit() {
     screen: [screen.width, screen.height],
     zoom: visualViewport?.scale ?? 1,
     inside: [innerWidth, innerHeight],
+    turn: screen.orientation?.angle ?? 0,
     isFull: document.fullscreenElement !== null,
   });
   alertLine.textContent = line ?? "";
@@ -131,9 +133,17 @@ async function drawTile(context, tiles, data, left, top) {
   context.putImageData(pixels, left, top);
 }
 
+/** Goes full screen on the display itself, where the browser may find it among the screens; else on this one. */
 async function goFull() {
-  await document.documentElement.requestFullscreen({ navigationUI: "hide" });
-  setBar(false);
+  const screens = await askScreens();
+  const found = screens && screenOf(screens, panel);
+  if (screens !== null) state.textContent = placeInWords(screens, panel);
+  try {
+    await document.documentElement.requestFullscreen({ navigationUI: "hide", ...(found && { screen: found }) });
+    setBar(false);
+  } catch {
+    state.textContent = "The browser did not go full screen: press F once more.";
+  }
 }
 
 function togglePattern() {
