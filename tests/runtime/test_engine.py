@@ -22,7 +22,7 @@ NOTHING_FOUND = (
     "llvm.listed_files = lambda: iter(()); llvm.search_folders = lambda: []\n"
 )
 
-BY_FILE_NAME = "llvm.elf_name = lambda path: path.name\n"
+BY_FILE_NAME = "llvm.elf_head = lambda: llvm.kind_of(b'its name is all that is looked at')\n"
 
 
 def python(code: str, **environment: str) -> subprocess.CompletedProcess[str]:

@@ -1,7 +1,4 @@
-"""What a shared library of Linux calls itself, read from its ELF file without loading it; and where LLVM may lie.
-
-Source of the format: System V ABI, "Object Files" and "Dynamic Linking".
-"""
+"""Where LLVM's libraries may lie, and what the head and the name of such a file say."""
 
 from __future__ import annotations
 
@@ -9,81 +6,22 @@ import functools
 import os
 import platform
 import re
-import struct
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-# ELF: kinds of segments (PT_LOAD, PT_DYNAMIC) and of entries of the dynamic section (DT_STRTAB, DT_SONAME).
-_LOADED_SEGMENT, _DYNAMIC_SEGMENT = 1, 2
-_STRINGS_ENTRY, _NAME_ENTRY = 5, 14
-
-_Read = Callable[[int, int], bytes]
-
-
-def elf_name(path: Path, python: Path | None = None) -> str:
-    """The name that the linker gave a library (``SONAME``), else that of its file.
-
-    Parameters
-    ----------
-    path:
-        The file.
-    python:
-        The program that is to load the library; by default the running one.
-
-    Raises
-    ------
-    ValueError, struct.error
-        If the file is no 64-bit shared library for this processor, or a damaged one.
-    OSError
-        If a file cannot be read.
-    """
-    python = Path(sys.executable) if python is None else python
-    with path.open("rb") as file:
-        length = os.fstat(file.fileno()).st_size
-
-        def read(offset: int, size: int) -> bytes:
-            if offset + size > length:
-                raise ValueError("the file is cut off")
-            file.seek(offset)
-            return file.read(size)
-
-        return _elf_name(read, path, length, python)
-
-
-def _elf_name(read: _Read, path: Path, length: int, python: Path) -> str:
-    head = read(0, 64)
-    if head[:6] != b"\x7fELF\x02\x01" or head[18:20] != elf_machine(python):
-        raise ValueError("not a 64-bit little-endian library for this processor")
-    table, size, count = *struct.unpack_from("<Q", head, 32), *struct.unpack_from("<HH", head, 54)
-    segments = [struct.unpack("<IIQQQQQQ", read(table + size * i, 56)) for i in range(count)]
-    dynamic = next((s for s in segments if s[0] == _DYNAMIC_SEGMENT), None)
-    if dynamic is None:
-        raise ValueError("not a shared library")
-    entries = dict(reversed(list(struct.iter_unpack("<QQ", read(dynamic[2], dynamic[5])))))  # the first one counts
-    if _NAME_ENTRY not in entries:
-        return path.name
-    address = entries.get(_STRINGS_ENTRY, 0) + entries[_NAME_ENTRY]
-    load = next((s for s in segments if s[0] == _LOADED_SEGMENT and s[3] <= address < s[3] + s[5]), None)
-    if load is None:
-        raise ValueError("the name lies outside the file")
-    start = address - load[3] + load[2]
-    return _text(read(start, min(256, length - start)))
-
-
-def _text(data: bytes) -> str:
-    name, end, _ = data.partition(b"\0")
-    if not end:
-        raise ValueError("the name is cut off")
-    return name.decode("ascii")
-
 
 @functools.cache
-def elf_machine(python: Path) -> bytes:
-    """Two bytes: the machine code of a program's processor in ELF files."""
-    with python.open("rb") as file:
-        return file.read(20)[18:]
+def elf_head(program: Path = Path(sys.executable)) -> tuple[bytes, bytes]:
+    """Of a program of Linux, and of all libraries that go with it: kind of the ELF file, and code of the processor."""
+    with program.open("rb") as file:
+        return kind_of(file.read(20))
+
+
+def kind_of(head: bytes) -> tuple[bytes, bytes]:
+    """Kind and processor in the first 20 bytes of an ELF file."""
+    return head[:6], head[18:20]
 
 
 #: Version in the name of a library: libLLVM-19.so, libLLVM.so.19.1, libLLVM.19.1.dylib.

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import functools
 import os
-import struct
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
@@ -18,7 +17,7 @@ from pathlib import Path
 
 from lippmann.errors import EngineError
 from lippmann.runtime.child_python import python_command
-from lippmann.runtime.library_file import VERSION_IN_NAME, Host, elf_name
+from lippmann.runtime.library_file import VERSION_IN_NAME, Host, elf_head, kind_of
 from lippmann.runtime.llvm_install import remedy
 
 #: Environment variable with the path of Dr.Jit's library; users may set it to force one.
@@ -97,15 +96,16 @@ def inspect(path: Path) -> Library:
     if path.is_dir():
         return Library(path, problem="is a folder, not a library")
     try:
-        # A system without ELF files: what their names do not say is asked of the libraries.
-        name = path.name if sys.platform in ("darwin", "win32") else elf_name(path)
+        with path.open("rb") as file:
+            kind = kind_of(file.read(20))
     except FileNotFoundError:
         return Library(path, problem="not found")
     except OSError as error:
         return Library(path, problem=f"cannot be read ({error.strerror})")
-    except (ValueError, struct.error):
-        return Library(path, problem="is not a shared library, or a damaged one")
-    match = VERSION_IN_NAME.match(name)
+    if sys.platform.startswith("linux") and kind != elf_head():
+        return Library(path, problem="is not a shared library for this processor")
+    # What its name does not say is asked of the library.
+    match = VERSION_IN_NAME.match(path.name)
     version = tuple(int(part) for part in match[1].split(".")) if match else _ask(path)
     if not version:
         return Library(path, problem="is not an LLVM library, or cannot be loaded")
