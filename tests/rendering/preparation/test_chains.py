@@ -57,9 +57,9 @@ def test_denoised_pictures_of_sharp_surfaces_have_them(engine):
     sky = np.zeros((64, 128, 3), np.float32)
     sky[:, np.arange(128) % 16 < 8] = 4.0
 
-    def picture(roughness, **options):
+    def picture(roughness, brightness=1.0, **options):
         materials = [Material("ball", metallic=1.0, roughness=roughness)]
-        environment = Environment(sky)
+        environment = Environment(sky * np.float32(brightness))
         scene = SceneDescription("ball", [mesh], materials, [Instance(0, np.eye(4))], environment=environment)
         return rendered(lippmann.load_scene(scene), **options)
 
@@ -67,6 +67,9 @@ def test_denoised_pictures_of_sharp_surfaces_have_them(engine):
     assert chains(picture(0.02, spp=1)) > 0
     assert chains(picture(0.02, spp=None, quality=12.0)) > 0
     assert chains(picture(0.8)) == 0
+    # What is mirrored is brighter than white, or is once it is exposed.
+    assert chains(picture(0.02, brightness=0.2, spp=1)) == 0
+    assert chains(picture(0.02, brightness=0.2, spp=1, exposure=1.0)) > 0
     # Where all the noise is left in, samples bring more; rays through the centre of a pixel are all the same.
     assert chains(picture(0.02, denoise="none")) == 0
     assert chains(picture(0.02, pixel_filter="point")) == 0

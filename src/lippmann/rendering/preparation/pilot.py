@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
 from lippmann.device.syntax import syntax
-from lippmann.device.types import Bool, Float, MitsubaScene, Point3f, Ray3f, UInt32
+from lippmann.device.types import Bool, Float, MitsubaScene, Point2f, Point3f, Ray3f, UInt32
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler, WeightedLightSampler
 from lippmann.rendering.transport.path import PathIntegrator
-from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.rendering.transport.ray_source import PixelRays, RaySource
+from lippmann.rendering.transport.seen_light import seen_light
 from lippmann.rendering.transport.sharp_events import sharp_lobe
 
 #: Dimensions of the sample stream at one surface.
@@ -76,11 +77,8 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
     paths = max(TUNING.pilot_paths // emitters, TUNING.pilot_paths_of_emitter)
     lane = dr.arange(mi.UInt32, paths * emitters)
     emitter, path = divide(lane, dr.opaque(mi.UInt32, paths))
-    stream = SampleStream.of_pixels(mi.UInt32(0), path, dr.opaque(mi.UInt32, _SEED))
-    place = stream.next_2d(PIXEL_DIMENSION)
-    x, y = place.x * dr.opaque(mi.Float, source.width), place.y * dr.opaque(mi.Float, source.height)
-    column, row = mi.UInt32(x), mi.UInt32(y)
-    jitter = mi.Point2f(x - mi.Float(column), y - mi.Float(row))
+    stream = _stream_of(path)
+    column, row, jitter = _place_of(stream, source)
     ray = source.rays(column, row, mi.UInt32(0), jitter)
     traced = _contributions(integrator, ray, stream, emitter, dr.opaque(mi.Float, emitters))
     dr.eval(traced)
@@ -91,6 +89,29 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
     placed = _has_place(lights) if emitters == count else np.zeros(emitters, bool)
     indirect = np.nan_to_num(indirect[placed]).sum(axis=0)
     return Pilot(moments, indirect, int(placed.sum()), _region_about(point.T[hit != 0].astype(np.float64)))
+
+
+def brightest_seen_light(integrator: PathIntegrator, source: RaySource) -> float:
+    """Largest mean of the components of the light that a chain of sharp events shows, exposed; chains are spread over
+    the picture of ``source``. Invalid values count as none."""
+    stream = _stream_of(dr.arange(mi.UInt32, TUNING.pilot_chains))
+    column, row, _ = _place_of(stream, source)
+    pixel = PixelRays(source, column, row, mi.UInt32(0), box_filter=True)
+    light, _, _ = seen_light(integrator, pixel, stream, dr.opaque(mi.UInt32, 1), mi.Bool(True))
+    return float(dr.max(dr.mean(integrator.exposed(light)))[0])
+
+
+def _stream_of(path: UInt32) -> SampleStream:
+    """Samples of each pilot path by its number."""
+    return SampleStream.of_pixels(mi.UInt32(0), path, dr.opaque(mi.UInt32, _SEED))
+
+
+def _place_of(stream: SampleStream, source: RaySource) -> tuple[UInt32, UInt32, Point2f]:
+    """Column and row of the pixel of each pilot path, and its place in it."""
+    place = stream.next_2d(PIXEL_DIMENSION)
+    x, y = place.x * dr.opaque(mi.Float, source.width), place.y * dr.opaque(mi.Float, source.height)
+    column, row = mi.UInt32(x), mi.UInt32(y)
+    return column, row, mi.Point2f(x - mi.Float(column), y - mi.Float(row))
 
 
 def make_light_sampler(scene: MitsubaScene, pilot: Pilot) -> LightSampler:

@@ -7,12 +7,11 @@ from dataclasses import replace
 import drjit as dr
 import mitsuba as mi
 
-from lippmann.device.types import MitsubaScene
 from lippmann.options.choices import REUSING
 from lippmann.rendering.film.memory_model import LIGHT_VERTEX
 from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
 from lippmann.rendering.preparation.photons import shoot_photons
-from lippmann.rendering.preparation.pilot import Pilot, make_light_sampler, trace_pilot
+from lippmann.rendering.preparation.pilot import Pilot, brightest_seen_light, make_light_sampler, trace_pilot
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import has_sharp_surfaces
@@ -87,7 +86,7 @@ def prepare_light(
         choices["light_vertices"] = TRANSPORT.light_vertices
     if request.clamp_indirect is not None:
         light = replace(light, most_indirect=mi.Float(request.clamp_indirect / gain))
-    chains = count_chains(paths.scene, request) if stands_alone else 0
+    chains = count_chains(paths.lit_by(light), request, source) if stands_alone else 0
     if chains:
         light = replace(light, chains=dr.opaque(mi.UInt32, chains))
         choices["seen_chains"] = chains
@@ -123,12 +122,14 @@ def trace_light_vertices(
     return None if passes.are_none else passes
 
 
-def count_chains(scene: MitsubaScene, request: RenderRequest) -> int:
+def count_chains(integrator: PathIntegrator, request: RenderRequest, source: RaySource) -> int:
     """Chains of sharp events of each path (:mod:`~lippmann.rendering.transport.seen_light`): a fixed number, or none.
 
-    A denoiser takes highlights for noise, so a denoised picture shows seen light by chains wherever the scene has
-    mirrors, clear glass or smooth gloss (docs/research/seen-light.md). None where all rays of a pixel are one, or its
-    points are taken from others: further chains show nothing then.
+    A denoiser takes highlights for noise, so a denoised picture shows seen light by chains if one of the pilot's chains
+    meets light brighter than white (docs/research/seen-light.md). None where all rays of a pixel are one, or its points
+    are taken from others: further chains show nothing then.
     """
     is_denoised = request.denoise != "none" and request.box_filter and request.method not in REUSING
-    return TUNING.chains if is_denoised and has_sharp_surfaces(scene) else 0
+    if not is_denoised or not has_sharp_surfaces(integrator.scene):
+        return 0
+    return TUNING.chains if brightest_seen_light(integrator, source) > 1 else 0

@@ -17,6 +17,8 @@ class PreparationTuning:
         (docs/research/seen-light.md).
     pilot_paths, pilot_paths_of_emitter:
         Paths of the pilot, in all, and of each emitter at least.
+    pilot_chains:
+        Chains of the pilot: bright spots of a 20 000th of the picture are met 19 times of 20 (0.1 s).
     pilot_surfaces:
         Surfaces along such a path at which emitters are sampled.
     most_weighed_emitters:
@@ -45,6 +47,7 @@ class PreparationTuning:
     chains: int = 4
     pilot_paths: int = 1 << 14
     pilot_paths_of_emitter: int = 1 << 8
+    pilot_chains: int = 1 << 16
     pilot_surfaces: int = 3
     most_weighed_emitters: int = 1 << 10
     uniform_share: float = 0.2
