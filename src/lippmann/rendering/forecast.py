@@ -363,7 +363,7 @@ def _working_bytes(source: DisplayRays | WindowRays, session: Session) -> int:
         left = limit - pixels * (memory_model.PICTURE + memory_model.ERROR_MAPS)
         kept = min(pixels * memory_model.batches(memory_model.MOST_BATCHES), max(0, left) // 2)
     if request.denoises:
-        kept += min(pixels * memory_model.DENOISER, memory_model.DENOISER_MOST)
+        kept += min(pixels * memory_model.DENOISER, memory_model.NETWORK_MOST + pixels * 2 * memory_model.LAYERS)
     return min(kept + wave, limit)
 
 

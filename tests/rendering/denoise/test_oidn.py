@@ -9,6 +9,7 @@ import pytest
 
 from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import UsageError
+from lippmann.rendering.denoise import oidn
 from lippmann.rendering.denoise.oidn import denoise
 
 STRAIGHT = Display("straight", Panel(8 * 64, 96, 0.25), LensArray("lenticular", 2.0), 6.8)
@@ -48,6 +49,14 @@ def test_noise_falls_and_guides_help():
     assert error(denoise(seen, albedo, normal, clean_guides=True), color) < error(plain, color) / 1.5
     assert guided.dtype == np.float32
     assert guided.shape == color.shape
+
+
+def test_little_memory_gives_the_same_picture(monkeypatch):
+    color, guide = np.random.default_rng(4).random((2, 640, 512, 3), np.float32)
+    pictures = [denoise(color, guide, effort="fast")]
+    monkeypatch.setattr(oidn, "NETWORK_MOST", 1 << 20)
+    pictures.append(denoise(color, guide, effort="fast"))
+    assert np.array_equal(*pictures)
 
 
 def test_means_are_kept():
@@ -124,7 +133,6 @@ def test_any_array_of_the_right_shape_will_do(layout):
         (np.zeros((4, 5)), None, None, r"color has the shape \(4, 5\)"),
         (np.zeros((0, 5, 3)), None, None, "shape"),
         (np.zeros((4, 5, 3)), np.zeros((4, 6, 3)), None, r"albedo has the shape \(4, 6, 3\).*\(4, 5, 3\)"),
-        (np.zeros((4, 5, 3)), None, np.zeros((4, 5, 3)), "normal without an albedo"),
         (np.full((4, 5, 3), np.nan), None, None, "not finite"),
     ],
 )

@@ -187,7 +187,7 @@ def clean_light(noisy: Floats, seen: Floats | None, denoise: Denoise, samples: i
     """
     limit = np.float32(TUNING.far_beyond_white)
     past = np.float32(0) if seen is None else np.where(seen > limit, np.maximum(noisy - limit, seen), seen)
-    rest = noisy - past
+    rest = noisy if seen is None else noisy - past
     clean = denoise(np.minimum(rest, limit), samples, turned) + past
     if (rest > limit).any():
         clean += np.where(clean - past >= np.float32(0.75) * limit, np.maximum(rest - limit, 0), np.float32(0))

@@ -230,16 +230,9 @@ def denoise_seen(
     result = np.array(color, dtype=np.float32)
     if surfaces is not None:
         place = surfaces.place
+        shown = color[place], albedo[place], normal[place]
         # The guides follow mirrors and glass without chance, so what noise they have lies along edges alone.
-        cleaned = denoise(
-            color[place],
-            albedo[place],
-            normal[place],
-            clean_guides=True,
-            effort=effort,
-            turned=turned,
-            threads=threads,
-        )
+        cleaned = denoise(*shown, clean_guides=True, effort=effort, turned=turned, threads=threads)
         np.copyto(result[place], cleaned, where=surfaces.near)
     return result
 

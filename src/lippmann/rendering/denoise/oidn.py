@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import ModuleType
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import EngineError, UsageError
+from lippmann.rendering.film.memory_model import NETWORK_MOST
 from lippmann.runtime import engine, machine
 from lippmann.runtime.engine_lock import exclusive
 
@@ -76,12 +77,6 @@ def denoise(
     EngineError
         Open Image Denoise fails.
     """
-    if albedo is None and normal is not None:
-        raise UsageError(
-            "a normal without an albedo is no guide", parameter="denoise", fix="give both, or the albedo alone"
-        )
-    if effort not in get_args(Effort):
-        raise UsageError.unknown("effort", effort, get_args(Effort), parameter="effort")
     images = {"color": _picture(color, "color")}
     for name, guide in (("albedo", albedo), ("normal", normal)):
         if guide is not None:
@@ -97,6 +92,7 @@ def denoise(
             work.set_bool(name, value)
         # White is 1, in every part of a picture and however bright it is.
         work.set_float("inputScale", 1.0)
+        work.set_int("maxMemoryMB", NETWORK_MOST >> 20)
         work.set_quality(getattr(pyoidn, _QUALITY[effort]))
 
     shown = {name: _turned(image) for name, image in images.items()} if turned else images

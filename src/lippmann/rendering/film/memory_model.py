@@ -35,8 +35,9 @@ POINT_IMAGE = 32
 #: Depth, normal, albedo, shape and position, and the copies that a file writer makes of them; or albedo, normal, height
 #: and coverage for the denoiser, and what a tile adds to them.
 LAYERS = 88
-#: Open Image Denoise with its feature buffers, up to the most that the library lets itself have, in bytes.
-DENOISER, DENOISER_MOST = 600, 3 << 30
+#: Open Image Denoise with its feature buffers; and the bytes that the network may take beside these. It works in parts
+#: then, which does not change a bit: 0.6 GB take a tenth longer than 1.5 GB, 0.2 GB twice as long.
+DENOISER, NETWORK_MOST = 600, 600 << 20
 
 
 def batches(number: int) -> int:

@@ -77,8 +77,7 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
     paths = max(TUNING.pilot_paths // emitters, TUNING.pilot_paths_of_emitter)
     lane = dr.arange(mi.UInt32, paths * emitters)
     emitter, path = divide(lane, dr.opaque(mi.UInt32, paths))
-    stream = _stream_of(path)
-    column, row, jitter = _place_of(stream, source)
+    stream, column, row, jitter = _place_of(path, source)
     ray = source.rays(column, row, mi.UInt32(0), jitter)
     traced = _contributions(integrator, ray, stream, emitter, dr.opaque(mi.Float, emitters))
     dr.eval(traced)
@@ -92,26 +91,20 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
 
 
 def brightest_seen_light(integrator: PathIntegrator, source: RaySource) -> float:
-    """Largest mean of the components of the light that a chain of sharp events shows, exposed; chains are spread over
-    the picture of ``source``. Invalid values count as none."""
-    stream = _stream_of(dr.arange(mi.UInt32, TUNING.pilot_chains))
-    column, row, _ = _place_of(stream, source)
-    pixel = PixelRays(source, column, row, mi.UInt32(0), box_filter=True)
+    """Largest radiance, exposed, the mean of its components, that a chain of sharp events shows in the picture."""
+    stream, column, row, _ = _place_of(dr.arange(mi.UInt32, TUNING.pilot_chains), source)
+    pixel = PixelRays(source, column, row, mi.UInt32(0))
     light, _, _ = seen_light(integrator, pixel, stream, dr.opaque(mi.UInt32, 1), mi.Bool(True))
     return float(dr.max(dr.mean(integrator.exposed(light)))[0])
 
 
-def _stream_of(path: UInt32) -> SampleStream:
-    """Samples of each pilot path by its number."""
-    return SampleStream.of_pixels(mi.UInt32(0), path, dr.opaque(mi.UInt32, _SEED))
-
-
-def _place_of(stream: SampleStream, source: RaySource) -> tuple[UInt32, UInt32, Point2f]:
-    """Column and row of the pixel of each pilot path, and its place in it."""
+def _place_of(path: UInt32, source: RaySource) -> tuple[SampleStream, UInt32, UInt32, Point2f]:
+    """Samples of each path by its number; column and row of its pixel, and its place in it."""
+    stream = SampleStream.of_pixels(mi.UInt32(0), path, dr.opaque(mi.UInt32, _SEED))
     place = stream.next_2d(PIXEL_DIMENSION)
     x, y = place.x * dr.opaque(mi.Float, source.width), place.y * dr.opaque(mi.Float, source.height)
     column, row = mi.UInt32(x), mi.UInt32(y)
-    return column, row, mi.Point2f(x - mi.Float(column), y - mi.Float(row))
+    return stream, column, row, mi.Point2f(x - mi.Float(column), y - mi.Float(row))
 
 
 def make_light_sampler(scene: MitsubaScene, pilot: Pilot) -> LightSampler:

@@ -112,22 +112,16 @@ def trace_light_vertices(
         return None
     if pilot.bright_indirect(gain) < TUNING.bright_indirect or pilot.placed > TRANSPORT.most_vertex_emitters:
         return None
-    passes = LightVertexPasses(
-        integrator.scene,
-        integrator.light_sampler,
-        TUNING.pass_samples,
-        request.seed,
-        pilot.region,
-    )
+    sampler, scene = integrator.light_sampler, integrator.scene
+    passes = LightVertexPasses(scene, sampler, TUNING.pass_samples, request.seed, pilot.region)
     return None if passes.are_none else passes
 
 
 def count_chains(integrator: PathIntegrator, request: RenderRequest, source: RaySource) -> int:
     """Chains of sharp events of each path (:mod:`~lippmann.rendering.transport.seen_light`): a fixed number, or none.
 
-    A denoiser takes highlights for noise, so a denoised picture shows seen light by chains if one of the pilot's chains
-    meets light brighter than white (docs/research/seen-light.md). None where all rays of a pixel are one, or its points
-    are taken from others: further chains show nothing then.
+    A denoiser takes highlights for noise, so a denoised picture shows seen light by chains if one of the pilot's meets
+    light brighter than white. None where all rays of a pixel are one, or its points are taken from others.
     """
     is_denoised = request.denoise != "none" and request.box_filter and request.method not in REUSING
     if not is_denoised or not has_sharp_surfaces(integrator.scene):

@@ -99,7 +99,7 @@ PILOT_REASONS = {
     "camera_exposure": "the camera's own, from the scene",
     "caustics": "an emitter shines on mirrors, glass or smooth gloss, and photons of it land in the picture",
     "light_vertices": "the pilot met indirect light brighter than white, as of a small emitter beside a surface",
-    "seen_chains": "chains of seen light with each path: the pilot met light brighter than white in mirrors, glass or smooth gloss",
+    "seen_chains": "of each path: the pilot met light brighter than white in mirrors, glass or smooth gloss",
 }
 
 
