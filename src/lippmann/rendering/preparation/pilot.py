@@ -93,9 +93,9 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
 def brightest_seen_light(integrator: PathIntegrator, source: RaySource) -> float:
     """Largest radiance, exposed, the mean of its components, that a chain of sharp events shows in the picture."""
     stream, column, row, _ = _place_of(dr.arange(mi.UInt32, TUNING.pilot_chains), source)
-    pixel = PixelRays(source, column, row, mi.UInt32(0))
-    light, _, _ = seen_light(integrator, pixel, stream, dr.opaque(mi.UInt32, 1), mi.Bool(True))
-    return float(dr.max(dr.mean(integrator.exposed(light)))[0])
+    pixel, number = PixelRays(source, column, row, mi.UInt32(0)), dr.opaque(mi.UInt32, 1)
+    light = integrator.exposed(seen_light(integrator, pixel, stream, number, mi.Bool(True))[0])
+    return float(dr.max(dr.mean(light))[0])
 
 
 def _place_of(path: UInt32, source: RaySource) -> tuple[SampleStream, UInt32, UInt32, Point2f]:

@@ -14,10 +14,9 @@ class PreparationTuning:
     chains:
         Chains of seen light with each path of a denoised picture. With 3, pictures of 16 samples lose up to 0.2 dB, and
         1.0 dB of primitives; with 2 up to 0.5 dB, and primitives 1 dB (docs/research/seen-light.md).
-    pilot_paths, pilot_paths_of_emitter:
-        Paths of the pilot, in all, and of each emitter at least.
-    pilot_chains:
-        Chains of the pilot, of which one meets a spot of a 20 000th of the picture in 19 cases of 20 (0.1 s).
+    pilot_paths, pilot_paths_of_emitter, pilot_chains:
+        Paths of the pilot, in all, and of each emitter at least; and its chains (0.1 s), of which one meets a spot of a
+        20 000th of the picture in 19 cases of 20.
     pilot_surfaces:
         Surfaces along such a path at which emitters are sampled.
     most_weighed_emitters:
