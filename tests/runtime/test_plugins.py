@@ -10,9 +10,11 @@ import pytest
 import lippmann
 from lippmann.cli import run
 from lippmann.errors import DisplayError, OutputError, SceneError, UsageError
+from lippmann.options.scene import SceneOptions
 from lippmann.plugins import doors, installed
 from lippmann.runtime.plugins import function_of
 from lippmann.scene.readers.load import load_scene
+from lippmann.sequences.motion import open_motion
 
 SOUND = """
 import numpy as np
@@ -99,6 +101,29 @@ def test_a_reader_has_options_of_its_own(install, save, capsys):
             load_scene(source, reader_options={"scale": "2"})
     assert run(["doctor"]) in (0, 1)
     assert "(lippmann.readers): .tri; options: scale=1.0, count=2, smooth=False, tint=red\n" in capsys.readouterr().out
+
+
+def test_a_file_that_moves_has_the_options_of_its_reader_and_no_others(install, save):
+    code = """
+class Moving:
+    duration = 1.0
+    def __init__(self, path, animation=None, grow=1.0):
+        self.path, self.grow, self.content = path, grow, (str(path), grow)
+    def at(self, seconds):
+        scene = read(self.path)
+        scene.meshes[0].positions[:] *= 1 + self.grow * seconds
+        return scene
+
+READER = Reader(('.tri',), read, up='y', moving=Moving, settings={'grow': 1.0})
+"""
+    install("sound", SOUND + code)
+    asked = SceneOptions(reader_options={"grow": "3"})
+    motion = open_motion(save("a.tri"), fps=2, asked=asked)
+    assert [motion.scene(frame).bounds[1][0] for frame in range(3)] == [1.0, 2.5, 4.0]
+    with pytest.raises(UsageError, match=r"variants: a\.tri has no variants"):
+        open_motion(save("a.tri"), asked=SceneOptions(variants={"a": "b"}))
+    with pytest.raises(UsageError, match=r"reader_options: unknown option of the reader of a\.tri 'size'"):
+        open_motion(save("a.tri"), asked=SceneOptions(reader_options={"size": "2"}))
 
 
 @pytest.mark.parametrize(
