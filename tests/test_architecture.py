@@ -68,6 +68,7 @@ ORDER = (
     "rendering.reprojection",
     "rendering",
     "rendering.live",
+    "corrected",
     "viewing",
     "tiles",
     "cluster",

@@ -16,10 +16,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from lippmann.display import Display, load_display
 from lippmann.display.sheet_layout import with_bleed
+from lippmann.errors import UsageError
+from lippmann.options.choices import Correction
 from lippmann.options.forms import LEFT_OUT
 from lippmann.options.light import LightOptions
 from lippmann.options.option import takes
@@ -51,6 +53,7 @@ def render(
     *,
     placement: PlacementOptions | Placement | Mapping[str, object] | None = None,
     bleed: float = 0.0,
+    correct: Correction = "none",
     progress: ProgressCallback | None = None,
     **options: Unpack[RenderKeywords],
 ) -> IntegralImage:
@@ -72,6 +75,9 @@ def render(
     bleed:
         Of a print, millimetres to go on beyond every edge, which are cut off; 0 to 100. The scene stands where it
         stands without. Default 0.
+    correct:
+        ``lens``: the pixels whose light through the display's real lenses comes nearest to what rays meet, of which
+        there are more than pixels. Default ``none``.
     progress:
         Called with :class:`~lippmann.progress.Progress` as the work goes on. By default a bar in terminals and
         notebooks, and nothing elsewhere.
@@ -96,11 +102,16 @@ def render(
     >>> image.pixels.shape
     (8, 16, 3)
     """
-    from lippmann.rendering.picture import render_picture
+    if correct not in get_args(Correction):
+        raise UsageError.unknown("correction", correct, get_args(Correction), parameter="correct")
+    if correct == "lens":
+        from lippmann.corrected import render_corrected as rendered
+    else:
+        from lippmann.rendering.picture import render_picture as rendered
 
     request = _request(placement, options)
     with shown(progress) as told:
-        return render_picture(_scene(scene), with_bleed(_display(display), bleed), request, told)
+        return rendered(_scene(scene), with_bleed(_display(display), bleed), request, told)
 
 
 @takes(QualityOptions, MachineOptions, without=LEFT_OUT["tiles"])

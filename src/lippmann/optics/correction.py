@@ -34,10 +34,19 @@ _STEPS = 15
 TOLERANCE = 0.03
 
 
-def parts_beside(subpixels: bool = False) -> tuple[float, ...]:
-    """Middles of the parts of a (sub-)pixel, in pixels to the right of its own."""
-    width = 1.0 / 3.0 if subpixels else 1.0
-    return tuple(((part + 0.5) / PARTS - 0.5) * width for part in range(PARTS))
+#: Rows about the middle of a picture by which its correction is judged.
+_ROWS_TOLD = 64
+
+
+def parts_beside() -> tuple[float, ...]:
+    """Middles of the parts of a pixel, in pixels to the right of the middle of its (sub-)pixel."""
+    return tuple((part + 0.5) / PARTS - 0.5 for part in range(PARTS))
+
+
+def rows_told(height: int) -> slice:
+    """The rows of a picture by which its correction is judged."""
+    first = max(0, (height - _ROWS_TOLD) // 2)
+    return slice(first, min(height, first + _ROWS_TOLD))
 
 
 _NO_LIMITS = (0.0, np.inf)
@@ -148,7 +157,7 @@ class LensCorrection:
 
     def _shares(self, display: Display, channel: int) -> PixelShares:
         own, offset, panel = self.display, self._offset(channel), self.display.panel
-        beside = np.array(parts_beside(self.subpixels)) + offset
+        beside = np.array(parts_beside()) + offset
         u = (np.arange(panel.width)[:, None] + 0.5 + beside).ravel()
         x, y = own.panel_point(u, np.full_like(u, 0.5 * panel.height))
         lens, _ = own.lens_of(x, y)

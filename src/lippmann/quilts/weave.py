@@ -40,9 +40,6 @@ ViewChoice = Literal["nearest", "linear"]
 #: Pixels per block, with some 50 arrays of this length; and pixels of the views that are made linear for a block.
 _BLOCK, _VIEW_BLOCK = 1 << 18, 1 << 24
 
-#: Rows about the middle of a picture by which its correction is judged.
-_ROWS_TOLD = 64
-
 #: Tolerance of aspect ratios: relative error that rounding in names and panel sizes causes.
 ASPECT_TOLERANCE = 0.02
 
@@ -192,9 +189,10 @@ class Weaving:
         """What a file says of the correction, and lines for people: of the rows about the middle."""
         if self._correction is None:
             return {}, ()
-        height = self.display.panel.height
-        first = max(0, (height - _ROWS_TOLD) // 2)
-        parts = self._parts(first, min(height, first + _ROWS_TOLD))
+        from lippmann.optics.correction import rows_told
+
+        rows = rows_told(self.display.panel.height)
+        parts = self._parts(rows.start, rows.stop)
         options, note = self._correction.told(self._correction.rows(parts), parts)
         return options, (note,)
 
@@ -203,7 +201,7 @@ class Weaving:
 
         return [
             weave_window(self.quilt, self.display, self.choice, (first, last), None, beside)
-            for beside in parts_beside(subpixels=self._has_subpixels)
+            for beside in parts_beside()
         ]
 
     @property

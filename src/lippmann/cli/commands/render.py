@@ -64,6 +64,7 @@ def render(
     bits: options.Bits = None,
     maps: Maps = None,
     resume: Resume = False,
+    correct: options.Correct = "none",
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     *,
@@ -99,6 +100,13 @@ def render(
     )
     source = SceneSource(scene, asked, light, access)
     on_cluster = clusters.Cluster(on)
+    rendered, traced = render_picture, target
+    if correct == "lens":
+        from lippmann.corrected import finer_display, render_corrected
+
+        if wanted or maps is not None:
+            _refuse_correction("frames" if wanted else "--maps", "leave one of them out")
+        rendered, traced = render_corrected, finer_display(target)
     if wanted:
         files = sequence.Files(output, bits, maps, resume)
         with on_cluster.runner(console, machine.threads) as runner:
@@ -108,7 +116,10 @@ def render(
         return
     name, stored = format_for(output, bits)
     _check_layers(how.layers, name, output)
-    if on_cluster or is_tiled(output, bits, target, request, resume=resume):
+    if on_cluster or is_tiled(output, bits, traced, request, resume=resume):
+        if correct == "lens":
+            fix = "render a quilt with 'lippmann quilt', then 'lippmann weave --correct lens'"
+            _refuse_correction("tiles, as a cluster, --resume, Zarr and pictures beyond the memory have them", fix)
         if maps is not None:
             fix = "leave it out: a file that ends in .exr holds each pixel's error and samples itself"
             rule = "with --resume, to Zarr and beyond the memory pictures are rendered in tiles"
@@ -128,7 +139,7 @@ def render(
         started = time.perf_counter()
         loaded = source.load()
         load_seconds = time.perf_counter() - started
-        image = render_picture(loaded, target, request, progress)
+        image = rendered(loaded, target, request, progress)
         progress(Progress("write", 0, 1))
         writing = time.perf_counter()
         image = _with_seconds(image, load=load_seconds)
@@ -160,6 +171,11 @@ def _readable(image: IntegralImage, stored: str, output: Path) -> tuple[Integral
     beside = output.with_name(f"{output.stem}-legend.png")
     write_plain_picture(legend(shades, (low, high)), beside, bits=8, transfer="linear")
     return shades, f"depth from {low:.1f} mm (dark) to {high:.1f} mm (white), see {beside.name}; .exr keeps millimetres"
+
+
+def _refuse_correction(beside: str, fix: str) -> None:
+    rule = "a scene is corrected in one piece, a single picture"
+    raise UsageError(f"given beside {beside}", where="--correct", rule=rule, fix=fix)
 
 
 def _check_layers(layers: bool, name: str, output: Path) -> None:

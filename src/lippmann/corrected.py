@@ -1,0 +1,88 @@
+"""Scenes rendered for the lens that is there: pixels whose light through it comes nearest to what rays meet.
+
+What is meant is the light in more directions than the display has pixels: the picture of one with pixels half as wide.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+from lippmann.display import Display
+from lippmann.errors import UsageError
+from lippmann.image import IntegralImage
+from lippmann.image.stored_values import FloatArray
+from lippmann.optics.correction import PARTS, LensCorrection, rows_told
+from lippmann.options.choices import PROPERTIES
+from lippmann.progress import ProgressCallback, silent
+from lippmann.rendering.picture import render_picture
+from lippmann.rendering.request.plan import resolve
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.session import open_session
+from lippmann.runtime.engine_lock import exclusive
+from lippmann.scene.scene import Scene
+
+
+@exclusive()
+def render_corrected(
+    scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback = silent
+) -> IntegralImage:
+    """Render ``scene`` in one piece, corrected for the lenses of ``display``.
+
+    Raises
+    ------
+    DisplayError
+        The display gives no lens, or one for which pictures are not corrected.
+    UsageError, SceneError, MemoryLimitError, EngineError
+        As :func:`lippmann.rendering.picture.render_picture`.
+    """
+    resolved = resolve(request, scene, display)
+    if request.layers or resolved.integrator in PROPERTIES:
+        what = "layers" if request.layers else f"integrator {resolved.integrator}"
+        rule = "light is corrected for a lens, nothing else"
+        raise UsageError(f"beside {what}", parameter="correct", rule=rule, fix="leave one of them out")
+    correction = LensCorrection(display, bool(resolved.subpixels))
+    request = replace(request, began=request.began or time.perf_counter())
+    # The display stands where its own depth budget has it.
+    session = open_session(scene, resolved, (display.panel.width, display.panel.height), progress=progress)
+    asked = replace(
+        request,
+        placement=session.place(display),
+        subpixels=bool(resolved.subpixels),
+        spp=None if request.spp is None else -(-request.spp // PARTS**2),
+    )
+    del session
+    finer = render_picture(scene, finer_display(display), asked, progress)
+    parts = parts_of(finer.pixels)
+    pixels = correction.rows(parts)
+    told = rows_told(display.panel.height)
+    options, note = correction.told(pixels[told], [part[told] for part in parts])
+    provenance = replace(
+        finer.provenance,
+        options={**finer.provenance.options, **options},
+        notes=(*finer.provenance.notes, note),
+        spp=PARTS**2 * (finer.provenance.spp or 0),
+        estimate=None,
+    )
+    return IntegralImage(pixels, display, finer.world_from_display, provenance)
+
+
+def finer_display(display: Display) -> Display:
+    """The same lenses before pixels half as wide and high; the middles of its sub-pixels lie where they lay."""
+    panel = display.panel
+    red, green, blue = ((PARTS * right, PARTS * down) for right, down in panel.subpixel_offsets)
+    finer = replace(
+        panel,
+        width=PARTS * panel.width,
+        height=PARTS * panel.height,
+        pixel_pitch=panel.pixel_pitch / PARTS,
+        subpixel_offsets=(red, green, blue),
+    )
+    return replace(display, panel=finer, sheet=None, pixel=None)
+
+
+def parts_of(pixels: FloatArray) -> list[FloatArray]:
+    """The parts of each pixel, from left to right, of a picture on a :func:`finer_display`."""
+    height, width = (side // PARTS for side in pixels.shape[:2])
+    rows = pixels.reshape(height, PARTS, width, PARTS, 3).mean(axis=1)
+    return [rows[:, :, part] for part in range(PARTS)]

@@ -1,0 +1,72 @@
+"""Scenes rendered for the lens that is there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import lippmann
+from lippmann.corrected import finer_display, parts_of
+from lippmann.display import load_display
+from lippmann.errors import DisplayError, UsageError
+from lippmann.optics.correction import LensCorrection, parts_beside
+from lippmann.scene.placement import Placement
+
+PRINT = "print:lpi=60,ppi=720,size=4x2mm,thickness=26mil,radius=0.2877mm"
+
+
+@pytest.mark.parametrize("name", [PRINT, "looking-glass-portrait"])
+@pytest.mark.parametrize("channel", [0, 1, 2])
+def test_parts_lie_beside_the_middles_of_subpixels(name, channel):
+    display = load_display(name)
+    finer = finer_display(display)
+    assert finer.lens_grid == display.lens_grid
+    u, v = np.arange(6) + 0.5, np.full(6, 3.5)
+    fine = np.arange(12) + 0.5
+    x, _ = finer.subpixel_point(fine, np.full(12, 7.0), channel)
+    for part, beside in enumerate(parts_beside()):
+        own, _ = display.subpixel_point(u, v, channel)
+        np.testing.assert_allclose(x[part::2], own + beside * display.panel.pixel_pitch, atol=1e-12)
+
+
+def test_parts_are_means_of_what_lies_within_a_pixel():
+    pixels = np.arange(2 * 4 * 3, dtype=np.float32).reshape(2, 4, 3)
+    left, right = parts_of(pixels)
+    np.testing.assert_array_equal(left, pixels.mean(axis=0)[None, 0::2])
+    np.testing.assert_array_equal(right, pixels.mean(axis=0)[None, 1::2])
+
+
+@pytest.mark.slow
+def test_an_eye_sees_the_corrected_picture_nearer_to_what_rays_meet(engine):
+    options = {"integrator": "direct", "method": "full", "denoise": "none", "threads": 1}
+    image = lippmann.render("teapot", PRINT, correct="lens", spp=16, **options)
+    plain = lippmann.render("teapot", PRINT, spp=16, **options)
+    assert image.pixels.shape == plain.pixels.shape
+    assert image.provenance.options["correct"] == "lens"
+    # The display stands where its own depth budget has it, not where that of finer pixels would.
+    np.testing.assert_array_equal(image.world_from_display, plain.world_from_display)
+    judge = lippmann.render("teapot", finer_display(image.display), spp=16, seed=1, **options, placement=placed(image))
+    gain = [LensCorrection(image.display).seen_error(each.pixels, parts_of(judge.pixels)) for each in (plain, image)]
+    assert 10.0 * np.log10(gain[0] / gain[1]) > 0.2
+
+
+def placed(image):
+    return Placement(image.world_from_display, (0.0, 0.0), (0.0, 0.0), "given")
+
+
+@pytest.mark.parametrize(
+    ("display", "options", "error", "what"),
+    [
+        ("seed-lenticular", {}, DisplayError, "gives no lens"),
+        (PRINT, {"integrator": "depth"}, UsageError, "beside integrator depth"),
+        (PRINT, {"layers": True}, UsageError, "beside layers"),
+    ],
+)
+def test_what_cannot_be_corrected_is_refused(display, options, error, what):
+    with pytest.raises(error, match=what):
+        lippmann.render("teapot", display, correct="lens", **options)
+
+
+def test_an_unknown_correction_is_named():
+    with pytest.raises(UsageError, match="lens"):
+        lippmann.render("teapot", PRINT, correct="lense")
