@@ -142,11 +142,11 @@ class GuidedDenoiser:
         """Seconds that a picture of so many samples takes, cleaned by halves, guides included, by a small one."""
         side = 128
         small = np.zeros((side, side, 3), dtype=np.float32)
-        denoise(small, small, small, clean_guides=True, effort="fast", threads=self._threads)  # starts its threads
+        effort = effort_of(self._kind, samples)
+        denoise(small, small, small, clean_guides=True, effort=effort, threads=self._threads)  # starts its threads
         started = time.perf_counter()
-        denoise(small, small, small, clean_guides=True, effort="fast", threads=self._threads)
-        runs = TUNING.high_runs if effort_of(self._kind, samples) == "high" else TUNING.fast_runs
-        return runs * (time.perf_counter() - started) * self._source.width * self._source.height / side**2
+        denoise(small, small, small, clean_guides=True, effort=effort, threads=self._threads)
+        return TUNING.runs * (time.perf_counter() - started) * self._source.width * self._source.height / side**2
 
     def _cleaned(self, pixels: Floats, guides: Guides, turned: bool) -> Floats:
         source = self._source

@@ -14,8 +14,8 @@ class DenoiseTuning:
     high_from:
         Samples per pixel from which on a picture is worth the high effort: a run then takes the time of 12 rays per
         pixel more than a fast one, for 0.7 dB on the average (docs/background/denoising.md).
-    fast_runs, high_runs:
-        Times of a fast run that a picture of two halves takes by either effort, guides included.
+    runs:
+        Times of a run of the network that a picture of two halves takes, guides and shared light included.
     guide_samples:
         Samples of a pixel for the guides; 16 gain 0.1 dB.
     far_beyond_white:
@@ -35,8 +35,7 @@ class DenoiseTuning:
     """
 
     high_from: int = 16
-    fast_runs: float = 3.0
-    high_runs: float = 12.0
+    runs: float = 3.0
     guide_samples: int = 8
     far_beyond_white: float = 8.0
     reaches: tuple[int, int] = (2, 8)

@@ -27,9 +27,9 @@ from lippmann.rendering.transport.tuning import TUNING
 
 #: Emissions of the pilot for each emitter and caster, at most and at least.
 MOST_OF_PAIR, FEWEST_OF_PAIR = 4096, 64
-#: Samples of a picture to an emission of each half at least, emissions over the two-thirds power of the samples at
-#: most, and emissions at most. An emission may take as long as two paths (``benchmarks/photon_share.py``).
-SAMPLES_OF_EMISSION, OF_POWER, MOST = 8, 6, 1 << 21
+#: Emissions of each half over the two-thirds power of the samples. An emission may take as long as two paths
+#: (``benchmarks/photon_share.py``).
+OF_POWER = 6
 #: Photons within the radius of a look-up, as a rule, over the root of the emissions.
 NEIGHBOURS_OF_ROOT = 0.12
 #: Photons by which the radius is found.
@@ -44,7 +44,7 @@ def no_photons() -> PhotonMap:
 
 def emissions(samples: int) -> int:
     """Emissions of each half for so many samples in all: noise and blur of caustics fall with the cost of paths."""
-    return max(1, min(samples // SAMPLES_OF_EMISSION, round(OF_POWER * math.pow(samples, 2 / 3)), MOST))
+    return round(OF_POWER * math.pow(samples, 2 / 3))
 
 
 class CausticPhotons:

@@ -280,7 +280,7 @@ class LightVertexPasses:
         if senders == 0:
             return None
         even = np.full(senders, 1 / senders)
-        chosen, chances = _dealt(even, min(TUNING.vertex_pilot_of_emitter * senders, TUNING.light_vertices))
+        chosen, chances = _dealt(even, TUNING.light_vertices)
         points, met = self._rays.meet(chosen, chances, named_seed("pilot of light vertices", self._seed))
         seen = are_inside(points.position, region)
         if not seen.any():

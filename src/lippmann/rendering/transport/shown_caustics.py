@@ -17,11 +17,10 @@ from lippmann.rendering.transport.sharp_events import (
     lambertian,
     sharp_lobe,
 )
-from lippmann.rendering.transport.tuning import TUNING
 
 
 class ShownBlur:
-    """Radiance, of either sign, that look-ups of a wider radius add to the caustics that rays of ``integrator`` show.
+    """Radiance, of either sign, that look-ups of twice the radius add to the caustics that rays of ``integrator`` show.
 
     It is that of Lambertian lobes; the gloss of the same surfaces is taken to be blurred no more.
     """
@@ -29,7 +28,7 @@ class ShownBlur:
     # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(self, integrator: PathIntegrator, photons: PhotonMap) -> None:
         self._paths = integrator
-        self._usual, self._wide = photons, PhotonMap(photons.halves, TUNING.wider_look_up * photons.radius)
+        self._usual, self._wide = photons, PhotonMap(photons.halves, 2 * photons.radius)
 
     @syntax
     def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> Spectrum:

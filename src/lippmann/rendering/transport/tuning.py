@@ -34,12 +34,8 @@ class TransportTuning:
     photons_of_cell:
         Photons of a cell that one look-up meets at most: in the focus of a lens there are thousands. Successive samples
         of a pixel meet others (``kernel_profile.py``).
-    wider_look_up:
-        Radius of a wider look-up over that of the picture's, by which blur is told.
     light_vertices:
-        Points of each half of a picture, before those are left out that scatter nothing.
-    vertex_pilot_of_emitter:
-        Rays of their pilot for each emitter; no more in all than there are light vertices.
+        Points of each half of a picture, before those are left out that scatter nothing; and rays of their pilot.
     uniform_share:
         Share of emissions and of rays from emitters that goes to all alike, whatever the pilot met.
     most_vertex_emitters:
@@ -58,9 +54,7 @@ class TransportTuning:
     farthest_from_plane: float = 0.4
     steepest: float = 4.0
     photons_of_cell: int = 8
-    wider_look_up: float = 2.0
     light_vertices: int = 1 << 16
-    vertex_pilot_of_emitter: int = 1 << 12
     uniform_share: float = 0.1
     most_vertex_emitters: int = 1 << 6
 
