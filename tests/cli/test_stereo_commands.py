@@ -87,3 +87,37 @@ def test_what_makes_no_sense_is_refused_in_one_line(lippmann, picture, tmp_path,
     assert said in done.err
     assert done.err.count("\n") == 1 or "'wide'" in said
     assert not (tmp_path / "pair.png").exists()
+
+
+def test_colour_beside_depth(lippmann, picture, tmp_path):
+    image = read_picture(picture)
+    depth = np.full(image.pixels.shape[:2], -5.0, np.float32)
+    depth[:, : depth.shape[1] // 2] = 8.0
+    image.with_pixels(image.pixels, maps={"depth": depth}).save(tmp_path / "deep.exr")
+    done = lippmann(
+        "replay", tmp_path / "deep.exr", "--rgbd", "half", "--white", "far", "-o", tmp_path / "a.png", "--json"
+    )
+    assert done.code == 0, done.err
+    assert done.json["output"] == str(tmp_path / "a_rgbd-half-far.png")
+    codes = pixels(tmp_path / "a_rgbd-half-far.png")
+    middle = codes[len(codes) // 2, codes.shape[1] // 2 :, 0]
+    assert (middle[2], middle[-3]) == (0, 255)  # nearer on the left
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--rgbd", "full", "--sweep"), "--sweep: does not apply to --rgbd"),
+        (("--white", "far"), "--white: applies to --rgbd only"),
+        (("--rgbd", "full"), "the picture has no depth; that is the layer of --layers"),
+        (("--rgbd", "full", "-o", "a.exr"), "unknown ending '.exr'; known are .png, .tif, .tiff"),
+        (("--rgbd", "depth", "--white", "far"), "--white: cannot be; depth alone is distance"),
+        (("--rgbd", "half", "-o", "a_rgbd.png"), "the name says another form; this one's ends in _rgbd-half"),
+    ],
+)
+def test_depth_that_cannot_be(lippmann, picture, tmp_path, monkeypatch, words, message):
+    monkeypatch.chdir(tmp_path)
+    done = lippmann("replay", picture, *words)
+    assert done.code == 2
+    assert message in done.err
+    assert done.err.count("\n") == 1

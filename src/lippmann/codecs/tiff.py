@@ -57,7 +57,7 @@ _LIBRARY_ERRORS = (
 def write_tiff(
     path: Path, values: Pixels, *, description: str, pixel_pitch: float | None = None, icc: bytes = b""
 ) -> None:
-    """Write ``(H, W, 3)`` uint8, uint16 or float32 values, losslessly compressed (deflate with predictor).
+    """Write ``(H, W, 3)`` or grey ``(H, W)`` uint8, uint16 or float32 values, losslessly (deflate with predictor).
 
     ``description`` (ASCII) becomes ``ImageDescription``; ``pixel_pitch`` (mm) becomes the resolution in dots per inch;
     ``icc`` is the profile of the values, empty without.
@@ -68,7 +68,7 @@ def write_tiff(
     tifffile.imwrite(
         path,
         np.ascontiguousarray(values),
-        photometric="rgb",
+        photometric="rgb" if values.ndim == 3 else "minisblack",
         compression="zlib",
         predictor=True,
         description=description,

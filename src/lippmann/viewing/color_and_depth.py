@@ -7,20 +7,26 @@ difference neighbouring views differ, and pictures with such depth are read as p
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.codecs.exr import write_exr
+from lippmann.codecs.pfm import write_pfm
+from lippmann.codecs.png import encode_png
+from lippmann.codecs.rgbd_names import White, ending_of_rgbd, rgbd_of_name
+from lippmann.codecs.tiff import write_tiff
 from lippmann.codecs.types import Pixels
 from lippmann.color.transfer import quantize
-from lippmann.errors import UsageError
+from lippmann.errors import OutputError, UsageError
 from lippmann.image.integral_image import IntegralImage
 from lippmann.image.stored_values import FloatArray
+from lippmann.runtime.atomic_write import check_writable, replacing
 from lippmann.viewing.replay import Eye, default_eye, default_size, replay
 
-#: What is white: near or far.
-White = Literal["near", "far"]
+#: Endings of the files that hold colour beside depth, and depth alone.
+RGBD_FILES, DEPTH_FILES = (".png", ".tif", ".tiff"), (".exr", ".tif", ".tiff", ".png", ".pfm")
 
 
 @dataclass(frozen=True)
@@ -41,7 +47,7 @@ class RgbdForm:
     @property
     def ending(self) -> str:
         """The ending of a file's stem that says this form; ``_rgbd`` alone is what the maker's player takes."""
-        return f"_rgbd{'-half' if self.half else ''}{'-far' if self.white == 'far' else ''}"
+        return ending_of_rgbd(self.half, self.white)
 
 
 def distance_seen(image: IntegralImage, eye: Eye | None = None, size: tuple[int, int] | None = None) -> FloatArray:
@@ -122,3 +128,54 @@ def rgbd_codes(
 def _halved(codes: Pixels) -> Pixels:
     pair = codes[:, 0::2].astype(np.uint32) + codes[:, 1::2]
     return ((pair + 1) // 2).astype(codes.dtype)
+
+
+def named(path: Path, form: RgbdForm) -> Path:
+    """``path`` with the ending of its form.
+
+    Raises
+    ------
+    OutputError
+        The name says another form.
+    """
+    said = rgbd_of_name(path)
+    if said is None:
+        return path.with_name(f"{path.stem}{form.ending}{path.suffix}")
+    if RgbdForm(*said) != form:
+        raise OutputError("the name says another form", where=str(path), rule=f"this one's ends in {form.ending}")
+    return path
+
+
+def write_rgbd(codes: Pixels, path: Path) -> None:
+    """Write colour beside depth as PNG or TIFF."""
+    with replacing(path) as temporary:
+        if path.suffix.lower() == ".png":
+            temporary.write_bytes(encode_png(codes, text={}))
+        else:
+            write_tiff(temporary, codes, description="")
+
+
+def write_depth(distance: FloatArray, path: Path) -> None:
+    """Write distances as a depth map: OpenEXR (channel ``Z``), TIFF and PFM in mm, PNG in 65534 steps of the farthest.
+
+    Where nothing is hit, depth is infinite; in a PNG 65535.
+    """
+    with replacing(path) as temporary:
+        match path.suffix.lower():
+            case ".exr":
+                write_exr(temporary, {"Z": distance}, text={})
+            case ".pfm":
+                write_pfm(temporary, distance)
+            case ".png":
+                steps = distance * np.float32(65534.0 / range_of(distance)[1])
+                codes = np.where(np.isfinite(distance), np.rint(steps), 65535).astype(np.uint16)
+                temporary.write_bytes(encode_png(codes, text={}, srgb=False))
+            case _:
+                write_tiff(temporary, distance, description="depth in mm")
+
+
+def check_depth_path(path: Path, ours: tuple[str, ...]) -> None:
+    """Raise :class:`OutputError` unless the file's ending is one of ``ours``, and it can be written."""
+    if path.suffix.lower() not in ours:
+        raise OutputError.unknown("ending", path.suffix, ours, where=str(path))
+    check_writable(path)

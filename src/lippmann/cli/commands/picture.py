@@ -153,6 +153,17 @@ def replay(
     ] = None,
     anaglyph: Annotated[bool, typer.Option("--anaglyph", help="Two eyes in one picture for red-cyan glasses.")] = False,
     eyes: Annotated[float | None, typer.Option("--eyes", help="Distance between the two eyes in mm; 63.")] = None,
+    rgbd: Annotated[
+        Literal["full", "half", "depth"] | None,
+        typer.Option(
+            "--rgbd",
+            help="Colour with its depth on the right, at full or half width, or the depth alone, of a picture with "
+            "--layers.",
+        ),
+    ] = None,
+    white: Annotated[
+        Literal["near", "far"], typer.Option("--white", help="Whether near or far is white beside the colours.")
+    ] = "near",
     optics: Annotated[
         bool,
         typer.Option(
@@ -183,6 +194,15 @@ def replay(
     from lippmann.viewing.video_file import check_animation_path, write_animation
 
     console = Console(quiet, as_json)
+    if rgbd is not None:
+        others = {"sweep": sweep, "path": path, "sbs": sbs, "anaglyph": anaglyph, "optics": optics, "codec": film.codec}
+        for name, value in others.items():
+            if value:
+                raise UsageError("does not apply to --rgbd", where=f"--{name}", fix="leave one of them out")
+        _replay_depth(picture, output, eye, rgbd, white, size, bits, parse.display(display), console)
+        return
+    if white != "near":
+        raise UsageError("applies to --rgbd only", where="--white", fix="add --rgbd full")
     stereo = _stereo(sbs, anaglyph, eyes)
     if path is not None and (sweep or eye is not None):
         raise UsageError("the path says where the eye is", where="--path", fix="leave out --sweep and --eye")
@@ -242,6 +262,43 @@ def replay(
     start, stop = places[0], places[-1]
     result |= {"frames": len(places), "start": list(start), "stop": list(stop)}
     console.result(result, f"{output}: {len(places)} frames, seen{by} from {_position(start)} to {_position(stop)}")
+
+
+def _replay_depth(
+    picture: Path,
+    output: Path | None,
+    eye: str | None,
+    form: Literal["full", "half", "depth"],
+    white: Literal["near", "far"],
+    size: str | None,
+    bits: int | None,
+    display: Display | None,
+    console: Console,
+) -> None:
+    """``lippmann replay --rgbd``."""
+    from lippmann.image.read import read_picture
+    from lippmann.viewing import color_and_depth as rgbd
+
+    how = rgbd.RgbdForm(half=form == "half", white=white)
+    path = output_of(output, picture, "_depth.exr" if form == "depth" else ".png")
+    path = path if form == "depth" else rgbd.named(path, how)
+    rgbd.check_depth_path(path, rgbd.DEPTH_FILES if form == "depth" else rgbd.RGBD_FILES)
+    if bits not in (None, 8, 16) or (form == "depth" and (bits or white != "near")):
+        what = "--white" if form == "depth" and not bits else "--bits"
+        rule = "depth alone is distance, of the bits that its file has; beside colours codes have 8 or 16"
+        raise UsageError("cannot be", where=what, rule=rule)
+    image = read_picture(picture, display=display)
+    position = None if eye is None else triple(eye, "--eye")
+    pixels = None if size is None else parse.size(size, "--size")
+    distance = rgbd.distance_seen(image, position, pixels)
+    near, far = rgbd.range_of(distance)
+    if form == "depth":
+        rgbd.write_depth(distance, path)
+    else:
+        codes = rgbd.rgbd_codes(image, how, position, between=(near, far), bits=bits or 8, size=pixels)
+        rgbd.write_rgbd(codes, path)
+    result = {"output": str(path), "rgbd": form, "white": white, "near": near, "far": far}
+    console.result(result, f"{path}: depth from {near:.1f} to {far:.1f} mm before the eye")
 
 
 def refocus(

@@ -20,6 +20,7 @@ from lippmann.codecs.exr import read_exr, read_exr_header
 from lippmann.codecs.orientation import of_picture, upright
 from lippmann.codecs.pfm import read_pfm
 from lippmann.codecs.pillow_formats import RULE, open_picture
+from lippmann.codecs.rgbd_names import White
 from lippmann.errors import MemoryLimitError, PictureError, SceneError
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import read_bytes
@@ -191,6 +192,22 @@ def _luminance(values: NDArray[np.generic], where: str) -> tuple[NDArray[np.gene
         _check_grey(np.asarray(values[..., :3], np.uint8), where)
         return np.rint(values[..., :3] @ np.array([0.299, 0.587, 0.114])).astype(np.uint8), False
     return values[..., 0], values.dtype.kind in "iu" and values.dtype.itemsize > 1
+
+
+def of_nearness(codes: NDArray[np.generic], white: White, where: str) -> DepthMap:
+    """Depth map of a grey picture ``(h, w, 3)`` that is linear in inverse depth, of 8 bits or floats.
+
+    Raises
+    ------
+    SceneError
+        It is in colours.
+    """
+    if codes.dtype == np.uint8:
+        _check_grey(np.asarray(codes, np.uint8), where)
+        levels = without_stairs(codes[..., 1])
+    else:
+        levels = codes[..., 1].astype(np.float32)
+    return DepthMap(levels if white == "near" else -levels)
 
 
 def embedded_depth(data: bytes, where: str, turn: int = 1) -> DepthMap | None:

@@ -15,11 +15,12 @@ from PIL import Image as Pillow
 
 from lippmann.codecs.orientation import lies
 from lippmann.codecs.photograph import open_photograph
+from lippmann.codecs.rgbd_names import White, rgbd_of_name
 from lippmann.errors import SceneError
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import decoding, read_bytes, texels_of_codes
 from lippmann.scene.readers.depth_layers import Layers, split_layers
-from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map
+from lippmann.scene.readers.depth_map import DepthMap, embedded_depth, of_nearness, read_depth_map
 from lippmann.scene.values.description import Image, Instance, Material, Mesh, SceneDescription, Texture
 
 #: Endings of HEIF pictures.
@@ -48,7 +49,8 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
     Parameters
     ----------
     depth_map:
-        A depth map; None for one within the picture (Dynamic Depth or XMP GDepth in JPEG files, an auxiliary picture in
+        A depth map; None for one beside the colours, where the name ends in ``_rgbd`` (:func:`rgbd_of_name`), one
+        within the picture (Dynamic Depth or XMP GDepth in JPEG files, an auxiliary picture in
         HEIF files), or one beside it (:func:`depth_beside`).
 
     Raises
@@ -66,7 +68,13 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
         with decoding("the photograph", path.name), open_photograph(io.BytesIO(data), path) as photograph:
             image = Image(path.name, texels_of_codes(photograph.srgb_codes()))
             turn, notes = photograph.orientation, photograph.notes
-        own = None if depth_map is not None else embedded_depth(data, path.name, turn)
+        form = rgbd_of_name(path)
+        if depth_map is not None:
+            own = None
+        elif form is None:
+            own = embedded_depth(data, path.name, turn)
+        else:
+            image, own = _color_and_depth(image, *form)
     if depth_map is None and own is None:
         depth_map = depth_beside(path)
         if depth_map is None:
@@ -95,6 +103,19 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
     layers = split_layers(inverse, _colors_at(image, u, v), path.name)
     description = _description(path.stem, image, layers, u, v)
     return replace(description, notes=[*notes, *description.notes])
+
+
+def _color_and_depth(image: Image, half: bool, white: White) -> tuple[Image, DepthMap]:
+    """The two halves of a picture whose name says that it has depth beside colour."""
+    width = image.pixels.shape[1]
+    if width % 2 or image.pixels.shape[2] < 3:
+        rule = "colour and depth have one width, in red, green and blue"
+        raise SceneError(f"is {width} pixels wide", where=image.name, rule=rule)
+    color, depth = np.split(image.pixels[..., :3], 2, axis=1)
+    if half:
+        color = np.repeat(color, 2, axis=1)
+        depth = np.repeat(depth, 2, axis=1)
+    return Image(image.name, np.ascontiguousarray(color)), of_nearness(depth, white, image.name)
 
 
 def depth_beside(photograph: Path) -> Path | None:

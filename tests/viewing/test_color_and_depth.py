@@ -1,0 +1,128 @@
+"""Colour beside depth and depth maps: codes by hand, files read by Pillow, tifffile and OpenEXR, and read back."""
+
+from __future__ import annotations
+
+import numpy as np
+import OpenEXR
+import pytest
+import tifffile
+from PIL import Image
+
+from lippmann.codecs.png import read_png
+from lippmann.display import load_display
+from lippmann.errors import OutputError, SceneError, UsageError
+from lippmann.image import IntegralImage
+from lippmann.scene.readers import depth_photo
+from lippmann.scene.readers.depth_layers import split_layers
+from lippmann.scene.readers.depth_map import read_depth_map
+from lippmann.scene.readers.depth_photo import read_depth_photo
+from lippmann.viewing.color_and_depth import (
+    RgbdForm,
+    depth_codes,
+    distance_seen,
+    named,
+    range_of,
+    rgbd_codes,
+    write_depth,
+    write_rgbd,
+)
+
+EYE = (0.0, 0.0, 600.0)
+
+
+@pytest.fixture(scope="module")
+def slope():
+    """A plane that leans from 30 mm behind the lens plane to 20 mm in front of it; nothing is hit above."""
+    display = load_display("seed-lenticular")
+    shape = display.panel.height, display.panel.width
+    depth = np.broadcast_to(np.linspace(-30, 20, shape[1], dtype=np.float32), shape).copy()
+    depth[:100] = -np.inf
+    pixels = np.full((*shape, 3), (0.9, 0.2, 0.1), np.float32)
+    return IntegralImage(pixels, display, maps={"depth": depth})
+
+
+def test_codes_are_linear_in_inverse_depth():
+    distance = np.array([[500.0, 600.0, 750.0, 1000.0, np.inf]], np.float32)
+    # 1/500 is white, 1/1000 black: 1/600 lies two thirds of the way, 1/750 one third.
+    assert depth_codes(distance, 500, 1000, 8, "near").tolist() == [[255, 170, 85, 0, 0]]
+    assert depth_codes(distance, 500, 1000, 8, "far").tolist() == [[0, 85, 170, 255, 255]]
+    assert depth_codes(distance, 500, 1000, 16, "near").tolist() == [[65535, 43690, 21845, 0, 0]]
+
+
+def test_distance_is_from_the_eye_and_infinite_where_nothing_is_hit(slope):
+    distance = distance_seen(slope, EYE, (64, 64))
+    assert np.isinf(distance[:10]).all()
+    middle = distance[40]
+    assert middle[32] == pytest.approx(605.0, abs=1.5)
+    assert middle[-1] < 590 < 620 < middle[0]
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize("form", [RgbdForm(), RgbdForm(half=True), RgbdForm(white="far"), RgbdForm(True, "far")])
+@pytest.mark.parametrize("kind", [".png", ".tif"])
+def test_pictures_are_read_back_within_a_code(tmp_path, monkeypatch, slope, bits, form, kind):
+    path = named(tmp_path / f"photo{kind}", form)
+    codes = rgbd_codes(slope, form, EYE, bits=bits, size=(64, 64))
+    write_rgbd(codes, path)
+    if kind == ".png" and bits == 8:
+        with Image.open(path) as picture:
+            read = np.asarray(picture)
+    else:
+        read = tifffile.imread(path) if kind == ".tif" else read_png(path)
+    np.testing.assert_array_equal(read, codes)
+    assert read.shape == (64, 64 if form.half else 128, 3)
+    color, depth = np.split(read, 2, axis=1)
+    assert (color[40, 5] > color[40, 5][::-1]).tolist() == [True, False, False]
+    right, left = int(depth[40, -2, 0]), int(depth[40, 1, 0])
+    assert (right > left) == (form.white == "near")
+    if kind == ".png":
+        seen = []
+
+        def watched(inverse, *rest):
+            seen.append(inverse)
+            return split_layers(inverse, *rest)
+
+        monkeypatch.setattr(depth_photo, "split_layers", watched)
+        assert len(depth_photo.read_depth_photo(path).meshes) >= 1
+        shares = seen[0] * (1.0 if bits == 8 else 65535.0)
+        shares = shares if form.white == "near" else shares + 2**bits - 1
+        distance = distance_seen(slope, EYE, (64, 64))
+        expected = depth_codes(distance, *range_of(distance), bits, "near")
+        expected = np.repeat(expected[:, ::2], 2, axis=1) if form.half else expected
+        assert np.abs(shares - expected).max() <= 1.0
+
+
+@pytest.mark.parametrize("kind", [".exr", ".tif", ".pfm", ".png"])
+def test_depth_maps_are_read_back(tmp_path, slope, kind):
+    distance = distance_seen(slope, EYE, (64, 48))
+    path = tmp_path / f"photo_depth{kind}"
+    write_depth(distance, path)
+    if kind == ".exr":
+        np.testing.assert_array_equal(OpenEXR.File(str(path)).channels()["Z"].pixels, distance)
+    elif kind == ".tif":
+        np.testing.assert_array_equal(tifffile.imread(path), distance)
+    elif kind == ".png":
+        with Image.open(path) as picture:
+            codes = np.asarray(picture).astype(int)
+        far = distance[np.isfinite(distance)].max()
+        assert (codes[np.isinf(distance)] == 65535).all()
+        assert np.abs(codes - distance / far * 65534)[np.isfinite(distance)].max() <= 0.51
+    inverse = read_depth_map(path).inverse
+    hit = np.isfinite(distance)
+    ratio = inverse[hit] * distance[hit]
+    assert ratio == pytest.approx(ratio.mean(), rel=2e-5)
+
+
+def test_what_cannot_be(tmp_path, slope):
+    with pytest.raises(UsageError, match="the picture has no depth; that is the layer of --layers"):
+        distance_seen(slope.with_pixels(slope.pixels, maps={}))
+    with pytest.raises(OutputError, match="the name says another form; this one's ends in _rgbd-far"):
+        named(tmp_path / "a_rgbd.png", RgbdForm(white="far"))
+    Image.fromarray(np.zeros((8, 9, 3), np.uint8)).save(tmp_path / "odd_rgbd.png")
+    with pytest.raises(SceneError, match=r"odd_rgbd\.png: is 9 pixels wide"):
+        read_depth_photo(tmp_path / "odd_rgbd.png")
+    tinted = np.zeros((8, 16, 3), np.uint8)
+    tinted[:, 8:, 0] = 200
+    Image.fromarray(tinted).save(tmp_path / "tinted_rgbd.png")
+    with pytest.raises(SceneError, match="is a picture in colours; depth is grey"):
+        read_depth_photo(tmp_path / "tinted_rgbd.png")
