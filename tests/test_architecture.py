@@ -310,7 +310,7 @@ def test_only_the_modules_that_render_use_the_engine():
 #: Readers are named in the registry, and so loaded when a file of theirs is read.
 HEAVY: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "scene.readers.blend": (("bpy", "mathutils"), ()),
-    "scene.readers.heif": (("pillow_heif",), ("scene.readers.depth_photo",)),
+    "scene.readers.heif": (("pillow_heif",), ("scene.readers.depth_photo", "quilts.photos")),
     "scene.readers.molecules": (("gemmi",), ()),
     "scene.readers.usd": (("pxr",), ()),
     "scene.readers.volumes": (("nibabel", "pydicom", "openvdb", "pyopenvdb"), ()),

@@ -121,3 +121,40 @@ def test_depth_that_cannot_be(lippmann, picture, tmp_path, monkeypatch, words, m
     assert done.code == 2
     assert message in done.err
     assert done.err.count("\n") == 1
+
+
+def test_a_pair_goes_out_and_comes_back_in(lippmann, picture, tmp_path):
+    """JPS and MPO of what two eyes see hold the same, and are two photographs of a print."""
+    words = ("replay", picture, "--sbs", "full", "--eyes", 60, "--size", "40x40")
+    assert lippmann(*words, "-o", tmp_path / "plain.png").code == 0
+    left, right = np.split(pixels(tmp_path / "plain.png").astype(int), 2, axis=1)
+    for name in ("pair.jps", "pair.mpo"):
+        done = lippmann(*words, "-o", tmp_path / name)
+        assert done.code == 0, done.err
+    crossed = pixels(tmp_path / "pair.jps").astype(int)
+    assert np.abs(crossed - np.concatenate([right, left], axis=1)).mean() < 3
+    assert np.abs(pixels(tmp_path / "pair.mpo") - left).mean() < 3
+    for name in ("pair.jps", "pair.mpo"):
+        words = ("interlace", tmp_path / name, "--display", "seed-lenticular", "-o", tmp_path / f"{name}.png")
+        done = lippmann(*words)
+        assert done.code == 0, done.err
+        assert "2 photographs" in done.out
+    one, other = (pixels(tmp_path / f"pair.{kind}.png").astype(int) for kind in ("jps", "mpo"))
+    assert np.abs(one - other).mean() < 3
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("-o", "a.jps"), "a.jps: is for two eyes"),
+        (("--anaglyph", "-o", "a.mpo"), "'anaglyph' as .mpo; MPO files hold two whole pictures"),
+        (("--sbs", "half", "-o", "a.mpo"), "'half' as .mpo; MPO files hold two whole pictures"),
+    ],
+)
+def test_pairs_that_cannot_be(lippmann, picture, tmp_path, monkeypatch, words, message):
+    monkeypatch.chdir(tmp_path)
+    done = lippmann("replay", picture, "--size", "40x40", *words)
+    assert done.code == 2
+    assert message in done.err
+    assert done.err.count("\n") == 1
+    assert not list(tmp_path.iterdir())

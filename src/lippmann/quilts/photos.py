@@ -19,6 +19,7 @@ from lippmann.codecs.icc import Profile, convert_picture
 from lippmann.codecs.photograph import Photograph, open_photograph
 from lippmann.codecs.picture_notes import FileNotes
 from lippmann.codecs.pillow_formats import RULE
+from lippmann.codecs.stereo_pairs import HEIF, PAIRS, read_pair
 from lippmann.codecs.types import Pixels
 from lippmann.color.transfer import quantize
 from lippmann.errors import PictureError, UsageError
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 Fit = Literal["cover", "contain", "stretch"]
 
 #: Endings of the pictures in a folder of photographs.
-ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".avif", ".bmp")
+ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".avif", ".bmp", *PAIRS)
 
 #: The code of white paper.
 _PAPER = 255
@@ -106,7 +107,7 @@ def read_photos(
     Parameters
     ----------
     paths:
-        The photographs, at least 2, in the order of the views.
+        The photographs, at least 2, in the order of the views; a file of a stereo pair (JPS, MPO, HEIF) is two.
     size:
         Largest width and height of a view in pixels.
     paper:
@@ -134,35 +135,60 @@ def read_photos(
         If a file is missing, damaged or no picture, a profile cannot be used, or photographs differ in size and no fit
         is given.
     """
-    if len(paths) < 2:
-        raise UsageError(f"{len(paths)} photographs are given", rule="at least 2 are interlaced")
+    sources = [source for path in paths for source in _views_in(path)]
+    if len(sources) < 2:
+        raise UsageError(f"{len(sources)} photographs are given", rule="at least 2 are interlaced")
     if fit is not None and fit not in get_args(Fit):
         raise UsageError.unknown("fit", fit, get_args(Fit), parameter="fit")
-    headers = [_header(path) for path in paths]
+    headers = [_header(source) for source in sources]
     sizes = [header.size[::-1] if turned else header.size for header in headers]
-    for path, header in zip(paths, headers, strict=True):
+    for source, header in zip(sources, headers, strict=True):
         if fit is None and header.size != headers[0].size:
-            rule = f"{paths[0].name} has {headers[0].size[0]} x {headers[0].size[1]}"
+            rule = f"{sources[0].path.name} has {headers[0].size[0]} x {headers[0].size[1]}"
             what = f"has {header.size[0]} x {header.size[1]} pixels"
-            raise PictureError(what, where=str(path), rule=rule, fix='say fit="cover" to fit each by itself')
-    windows = [fit_window(size, paper, number, len(paths), fit or "cover", shift) for number, size in enumerate(sizes)]
+            raise PictureError(what, where=str(source.path), rule=rule, fix='say fit="cover" to fit each by itself')
+    windows = [
+        fit_window(size, paper, number, len(sources), fit or "cover", shift) for number, size in enumerate(sizes)
+    ]
     width, height = size[0], min(size[1], max(1, max(round(window.box[3] - window.box[1]) for window in windows)))
-    if width * height * len(paths) > MOST_PIXELS:
+    if width * height * len(sources) > MOST_PIXELS:
         rule = f"together they have at most {MOST_PIXELS} pixels"
-        raise PictureError(f"{len(paths)} views of {width} x {height} pixels", rule=rule, fix="take fewer photographs")
+        raise PictureError(
+            f"{len(sources)} views of {width} x {height} pixels", rule=rule, fix="take fewer photographs"
+        )
     target, notes = _common_profile(headers, profile, keeps_profile)
-    values = np.empty((height, width * len(paths), 3), dtype=np.uint8)
-    quilt = Quilt(values, QuiltLayout(len(paths), 1, None), "uint8")
-    for number, path in enumerate(paths):
-        with _opened(path) as photograph:
-            colors = _in_profile(_on_paper(photograph.codes(), turned=turned), headers[number].icc, target, path)
+    values = np.empty((height, width * len(sources), 3), dtype=np.uint8)
+    quilt = Quilt(values, QuiltLayout(len(sources), 1, None), "uint8")
+    for number, source in enumerate(sources):
+        with _opened(source) as photograph:
+            colors = _in_profile(_on_paper(photograph.codes(), turned=turned), headers[number].icc, target, source.path)
             quilt.view_values(number)[...] = np.asarray(_fitted(colors, windows[number], (width, height)))
-        progress(Progress("read", number + 1, len(paths)))
+        progress(Progress("read", number + 1, len(sources)))
     cropped = tuple(max(window.cropped[axis] for window in windows) for axis in (0, 1))
     of_files = FileNotes()
-    for path, header in zip(paths, headers, strict=True):
-        of_files.add(path.name, header.notes)
+    for source, header in zip(sources, headers, strict=True):
+        of_files.add(source.path.name, header.notes)
     return Photos(quilt, target, (cropped[0], cropped[1]), notes + of_files.lines())
+
+
+class _Source(NamedTuple):
+    """A photograph in a file of its own, or a ``view`` of the pair in the file."""
+
+    path: Path
+    view: Photograph | None = None
+
+
+def _views_in(path: Path) -> list[_Source]:
+    """The photograph of a file; of a stereo pair both views, the left one first."""
+    check_kind(path, PictureError)
+    with _reported(path):
+        if path.suffix.lower() in HEIF:
+            from lippmann.scene.readers.heif import read_heif_pair
+
+            pair = read_heif_pair(path)
+        else:
+            pair = read_pair(path)
+    return [_Source(path)] if pair is None else [_Source(path, view) for view in pair]
 
 
 class _Header(NamedTuple):
@@ -229,14 +255,22 @@ def _fitted(picture: Image.Image, window: FitWindow, size: tuple[int, int]) -> I
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Photograph]:
+def _opened(source: _Source) -> Iterator[Photograph]:
     """An opened photograph; errors of Pillow become :class:`PictureError`."""
+    if source.view is not None:
+        yield source.view
+        return
+    path = source.path
+    with _reported(path), path.open("rb") as file, open_photograph(file, path) as photograph:
+        yield photograph
+
+
+@contextmanager
+def _reported(path: Path) -> Iterator[None]:
     from PIL import UnidentifiedImageError
 
-    check_kind(path, PictureError)
     try:
-        with path.open("rb") as file, open_photograph(file, path) as photograph:
-            yield photograph
+        yield
     except FileNotFoundError:
         raise PictureError("not found", where=str(path)) from None
     except UnidentifiedImageError:
@@ -245,8 +279,8 @@ def _opened(path: Path) -> Iterator[Photograph]:
         raise PictureError(f"cannot be read: {error}", where=str(path)) from None
 
 
-def _header(path: Path) -> _Header:
-    with _opened(path) as photograph:
+def _header(source: _Source) -> _Header:
+    with _opened(source) as photograph:
         return _Header(photograph.size, photograph.icc, photograph.notes)
 
 

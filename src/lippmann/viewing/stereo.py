@@ -14,10 +14,13 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from lippmann.codecs.stereo_pairs import encode_jps, encode_mpo
+from lippmann.color.transfer import Transfer, quantize
 from lippmann.display.stereo import EYE_DISTANCE
 from lippmann.errors import UsageError
 from lippmann.image.picture import Picture
 from lippmann.image.stored_values import FloatArray
+from lippmann.runtime.atomic_write import replacing
 from lippmann.runtime.regular_file import check_kind
 from lippmann.viewing.replay import Eye, Filter, checked_eye, default_eye, replay
 
@@ -116,6 +119,26 @@ def eyes_of(head: Eye, eyes: float = EYE_DISTANCE) -> tuple[Eye, Eye]:
         raise UsageError(f"{eyes:g} mm is out of range", parameter="eyes", rule=rule)
     x, y, z = checked_eye(head)
     return (x - eyes / 2, y, z), (x + eyes / 2, y, z)
+
+
+def write_pair(pair: FloatArray, path: Path, stereo: Stereo, transfer: Transfer) -> None:
+    """Write a :func:`stereo_pair`, the left eye's picture on its left, as JPS or MPO by the file's ending.
+
+    Raises
+    ------
+    UsageError
+        It is no pair, or halved, which MPO files cannot say.
+    OutputError
+        The file cannot be written.
+    """
+    is_jps = path.suffix.lower() == ".jps"
+    if stereo == "anaglyph" or (stereo == "half" and not is_jps):
+        rule = "MPO files hold two whole pictures, JPS files two beside each other"
+        raise UsageError(f"'{stereo}' as {path.suffix}", parameter="stereo", rule=rule, fix="take --sbs full")
+    left, right = np.split(quantize(pair, 8, transfer), 2, axis=1)
+    data = encode_jps(left, right, half=stereo == "half") if is_jps else encode_mpo(left, right)
+    with replacing(path) as temporary:
+        temporary.write_bytes(data)
 
 
 def side_by_side(left: FloatArray, right: FloatArray, *, half: bool = False) -> FloatArray:

@@ -32,7 +32,9 @@ FitOption = Annotated[
 
 @with_options
 def interlace(
-    photos: Annotated[list[Path], typer.Argument(help="Photographs or frames, in natural order; or their folder.")],
+    photos: Annotated[
+        list[Path], typer.Argument(help="Photographs or frames, in natural order, or stereo pairs; or their folder.")
+    ],
     output: Annotated[Path, typer.Option("--output", "-o", help="The .tif or .png file to write.")],
     display: Annotated[
         str | None,
@@ -126,7 +128,8 @@ def interlace(
         "correct": correct,
         "pixels_per_lens": target.pixels_per_lens[0],
     }
-    line = f"{output}: {len(paths)} photographs, {paths[0].name} to {paths[-1].name}, on {pixels[0]}x{pixels[1]} pixels"
+    count = read.quilt.layout.views
+    line = f"{output}: {count} photographs, {paths[0].name} to {paths[-1].name}, on {pixels[0]}x{pixels[1]} pixels"
     console.result(result, f"{line}, {target.pixels_per_lens[0]:.4g} a lens")
 
 

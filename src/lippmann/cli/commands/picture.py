@@ -184,13 +184,14 @@ def replay(
     film: Annotated[SequenceOptions, only("codec")],
 ) -> None:
     """Simulate what an eye in front of the display sees."""
+    from lippmann.codecs.stereo_pairs import PAIRS
     from lippmann.image.streamed import open_picture
     from lippmann.image.write import check_output, format_for, write_plain_picture
     from lippmann.runtime.atomic_write import check_writable
     from lippmann.viewing.quilt_views import quilt_display, replay_quilt
     from lippmann.viewing.replay import default_eye, path_of_eye
     from lippmann.viewing.replay import replay as replay_picture
-    from lippmann.viewing.stereo import head_path, stereo_pair
+    from lippmann.viewing.stereo import head_path, stereo_pair, write_pair
     from lippmann.viewing.video_file import check_animation_path, write_animation
 
     console = Console(quiet, as_json)
@@ -214,7 +215,12 @@ def replay(
     else:
         if film.codec is not None:
             raise UsageError("applies to an animation only", where="--codec", fix="add --sweep, or leave it out")
-        check_output(output, format_for(output, bits)[0])
+        if output.suffix.lower() in PAIRS:
+            if stereo is None or bits not in (None, 8):
+                raise UsageError("is for two eyes", where=str(output), rule="of 8 bits", fix="add --sbs full")
+            check_writable(output)
+        else:
+            check_output(output, format_for(output, bits)[0])
     if width is not None and not sweep:
         raise UsageError("applies to a sweep only", where="--sweep-width", fix="add --sweep")
     places = None if path is None else head_path(path)
@@ -251,7 +257,10 @@ def replay(
         result |= {"stereo": stereo[0], "eyes": stereo[1]}
     by = "" if stereo is None else f" by two eyes {stereo[1]:g} mm apart"
     if not moves:
-        write_plain_picture(seen_from(position), output, bits=bits, transfer=transfer)
+        if stereo is not None and output.suffix.lower() in PAIRS:
+            write_pair(seen_from(position), output, stereo[0], transfer)
+        else:
+            write_plain_picture(seen_from(position), output, bits=bits, transfer=transfer)
         console.result(result, f"{output}: seen{by} from {_position(position)}")
         return
     if places is None:

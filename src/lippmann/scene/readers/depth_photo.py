@@ -16,6 +16,7 @@ from PIL import Image as Pillow
 from lippmann.codecs.orientation import lies
 from lippmann.codecs.photograph import open_photograph
 from lippmann.codecs.rgbd_names import White, rgbd_of_name
+from lippmann.codecs.stereo_pairs import HEIF
 from lippmann.errors import SceneError
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import decoding, read_bytes, texels_of_codes
@@ -23,8 +24,6 @@ from lippmann.scene.readers.depth_layers import Layers, split_layers
 from lippmann.scene.readers.depth_map import DepthMap, embedded_depth, of_nearness, read_depth_map
 from lippmann.scene.values.description import Image, Instance, Material, Mesh, SceneDescription, Texture
 
-#: Endings of HEIF pictures.
-HEIF = (".heic", ".heif", ".hif")
 #: How the name of a depth map goes on after that of its photograph, and how it ends.
 _DEPTH = re.compile(
     r"[-_. ]?(depth|depthmap|depth[-_ ]map|disparity)(\.(png|jpe?g|webp|tiff?|exr|pfm|npy))", re.IGNORECASE

@@ -1,0 +1,50 @@
+"""The stereo pairs of HEIF files, spatial photographs; they are read alone, since libheif writes no groups."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from lippmann.codecs.photograph import Photograph
+from lippmann.codecs.types import Pixels
+from lippmann.errors import PictureError
+from lippmann.runtime.machine import check_input
+from lippmann.runtime.optional_import import check_installed
+
+#: Bytes of a pixel while it is decoded: what the decoder holds of it, and its values.
+_BYTES_PER_PIXEL = 12
+
+
+def read_heif_pair(path: Path) -> tuple[Photograph, Photograph] | None:
+    """The left and the right view, which a group ``ster`` names in this order (ISO/IEC 23008-12); None without one.
+
+    Raises
+    ------
+    PictureError
+        The file is damaged.
+    SceneError
+        ``pillow-heif`` is not installed.
+    MemoryLimitError
+        Its pixels take more than the memory that is left.
+    """
+    check_installed("pillow_heif", "heif", "HEIF pictures need it", str(path))
+    import pillow_heif
+
+    try:
+        file = pillow_heif.open_heif(path)
+        groups = [group["images"][:2] for group in file.info.get("entity_groups", ()) if group["type"] == "ster"]
+        if not groups:
+            return None
+        left, right = (file[number] for number in groups[0])
+        for each in (left, right):
+            check_input(_BYTES_PER_PIXEL * each.size[0] * each.size[1], "a view of the pair", where=str(path))
+        views = [(np.array(each), each.info.get("icc_profile") or b"") for each in (left, right)]
+    except (ValueError, RuntimeError, EOFError, KeyError, IndexError, TypeError) as error:
+        raise PictureError(f"cannot be decoded ({error})", where=str(path), rule="a HEIF picture") from None
+    (first, icc), (second, other_icc) = views
+    return _view(first, icc), _view(second, other_icc)
+
+
+def _view(codes: Pixels, icc: bytes) -> Photograph:
+    return Photograph((codes.shape[1], codes.shape[0]), icc, 1, (), lambda: codes)
