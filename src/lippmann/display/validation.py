@@ -71,15 +71,21 @@ def check_text(value: object, key: str, *, empty: bool = True) -> None:
         )
 
 
-def check_keys(values: object, kind: type, where: str) -> None:
-    """Refuse a table whose keys are not the fields of the dataclass ``kind``, or that lacks one without a default."""
-    if not isinstance(values, Mapping):
-        raise DisplayError(f"{where or 'the display'} is {values!r}", where=where, rule="it must be a table of keys")
-    fields = {field.name: field for field in dataclasses.fields(kind)}
-    refuse_unknown(values, fields, where)
-    for name, field in fields.items():
-        if field.default is dataclasses.MISSING and name not in values:
-            raise DisplayError(f"the key {name!r} is missing", where=where, rule="it has no default", fix="add it")
+def check_keys(values: object, kind: type, where: str) -> Arguments:
+    """``values`` as a table whose keys are fields of the dataclass ``kind``, with all that have no default."""
+    fields = {field.name: field.default for field in dataclasses.fields(kind)}
+    return table_of(values, where, fields, [name for name, default in fields.items() if default is dataclasses.MISSING])
+
+
+def table_of(value: object, where: str, known: Collection[str], needed: Iterable[str] = ()) -> Arguments:
+    """``value`` as a table, called ``where``, with all keys that are needed and none that is not known."""
+    if not isinstance(value, Mapping):
+        raise DisplayError(f"{where or 'the display'} is {value!r}", where=where, rule="it must be a table of keys")
+    refuse_unknown(value, known, where)
+    for key in needed:
+        if key not in value:
+            raise DisplayError(f"the key {key!r} is missing", where=where, rule="it has no default", fix="add it")
+    return value
 
 
 def refuse_unknown(given: Iterable[object], known: Collection[str], where: str = "") -> None:

@@ -31,7 +31,7 @@ from lippmann.display.formats.monitor_toml import monitor_of_tables
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_profile import LensProfile
 from lippmann.display.pixel_aperture import PixelAperture
-from lippmann.display.validation import INCH, MILLIMETRES, Arguments, check_keys, length, refuse_unknown
+from lippmann.display.validation import INCH, MILLIMETRES, Arguments, check_keys, length, table_of
 from lippmann.errors import DisplayError
 
 _LENS_KEYS = ("thickness", "index", "radius", "field", "conic", "diameter")
@@ -82,24 +82,14 @@ def profile_of_table(table: object, lenses: LensArray) -> LensProfile:
     """The profile of a table ``[lens]`` in front of these lenses."""
     from lippmann.optics.fitting import fit_profile
 
-    stated = _table(table, "lens")
-    refuse_unknown(stated, _LENS_KEYS, "lens")
-    if "thickness" not in stated:
-        raise DisplayError("the key 'thickness' is missing", where="lens", rule="it has no default", fix="add it")
+    stated = table_of(table, "lens", _LENS_KEYS, ["thickness"])
     return fit_profile(lenses, **_in_millimetres(stated, _LENS_LENGTHS, "lens", MILLIMETRES))
 
 
 def aperture_of_table(table: object, pixel_pitch: float) -> PixelAperture:
     """The aperture of a table ``[pixel]`` on a panel of such pixels."""
-    stated = _table(table, "pixel")
-    check_keys(stated, PixelAperture, "pixel")
+    stated = check_keys(table, PixelAperture, "pixel")
     return PixelAperture(**_in_millimetres(stated, _PIXEL_LENGTHS, "pixel", {**MILLIMETRES, "px": pixel_pitch}))
-
-
-def _table(value: object, name: str) -> Arguments:
-    if not isinstance(value, Mapping):
-        raise DisplayError(f"{name} is {value!r}", where=name, rule="it must be a table of keys")
-    return value
 
 
 def _in_millimetres(table: Arguments, lengths: tuple[str, ...], name: str, scales: Mapping[str, float]) -> Arguments:

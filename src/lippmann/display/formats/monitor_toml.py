@@ -37,6 +37,7 @@ from lippmann.display.validation import (
     plain_number,
     positive,
     refuse_unknown,
+    table_of,
     whole_count,
 )
 from lippmann.errors import DisplayError
@@ -74,13 +75,7 @@ def monitor_of_tables(values: Table) -> Monitor:
         If a key is missing or unknown, or a value is out of its range; ``where`` is the dotted key.
     """
     refuse_unknown(values, ("name", "title", TABLE))
-    table = values[TABLE]
-    if not isinstance(table, Mapping):
-        raise DisplayError(f"{TABLE} is {table!r}", where=TABLE, rule="it must be a table of keys")
-    refuse_unknown(table, _KEYS, TABLE)
-    for key in _NEEDED:
-        if key not in table:
-            raise DisplayError(f"the key {key!r} is missing", where=TABLE, rule="it has no default", fix="add it")
+    table = table_of(values[TABLE], TABLE, _KEYS, _NEEDED)
     try:
         return _monitor(values, table)
     except DisplayError as error:

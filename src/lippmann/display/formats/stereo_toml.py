@@ -20,13 +20,21 @@ neighbouring pixels to places one eye distance apart, at the viewing distance D.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 from lippmann.display.display import Display
 from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import RGB_STRIPE, Panel
 from lippmann.display.stereo import EYE_DISTANCE, StereoPair
-from lippmann.display.validation import MILLIMETRES, Arguments, Table, length, positive, refuse_unknown, whole_count
+from lippmann.display.validation import (
+    MILLIMETRES,
+    Arguments,
+    Table,
+    length,
+    positive,
+    refuse_unknown,
+    table_of,
+    whole_count,
+)
 from lippmann.errors import DisplayError
 
 #: The table's name.
@@ -52,14 +60,7 @@ def stereo_display(values: Table) -> Display:
         If a key is missing or unknown, or a value is out of its range; ``where`` is the dotted key.
     """
     refuse_unknown(values, ("name", "title", TABLE))
-    table = values[TABLE]
-    if not isinstance(table, Mapping):
-        raise DisplayError(f"{TABLE} is {table!r}", where=TABLE, rule="it must be a table of keys")
-    refuse_unknown(table, _KEYS, TABLE)
-    for key in _NEEDED:
-        if key not in table:
-            raise DisplayError(f"the key {key!r} is missing", where=TABLE, rule="it has no default", fix="add it")
-    return _display(values, table)
+    return _display(values, table_of(values[TABLE], TABLE, _KEYS, _NEEDED))
 
 
 def _display(values: Arguments, table: Arguments) -> Display:
