@@ -11,6 +11,7 @@ from lippmann.display import Display
 from lippmann.errors import UsageError
 from lippmann.image import Picture
 from lippmann.runtime.atomic_write import replacing
+from lippmann.viewer.lens_light import lens_light
 from lippmann.viewer.manifest import manifest, tile_size
 from lippmann.viewer.page import single_file_page
 from lippmann.viewer.tiles import Tiles
@@ -72,7 +73,8 @@ def export_page(pictures: Sequence[tuple[str, Picture]], path: Path) -> None:
 def _picture_data(name: str, image: Picture) -> dict[str, object]:
     tiles = Tiles(image, tile_size(image.display))
     description = manifest(image, tiles, name=name, tile_format="png")
-    return {"manifest": description, "tiles": {layer: _base64_tiles(tiles, layer) for layer in tiles.layers}}
+    layers = {layer: _base64_tiles(tiles, layer) for layer in tiles.layers}
+    return {"manifest": description, "tiles": layers, "light": lens_light(image.display)}
 
 
 def _base64_tiles(tiles: Tiles, layer: str) -> dict[str, str]:

@@ -16,7 +16,7 @@ from lippmann.viewer.tiles import Tiles
 
 @dataclass(frozen=True)
 class ServedPicture:
-    """Description and tiles of a picture.
+    """Description and tiles of a picture, and the display that it is made for.
 
     ``version`` identifies the version of the file: tiles belong to the manifest of the same version only.
     """
@@ -25,6 +25,7 @@ class ServedPicture:
     manifest: dict[str, object]
     tiles: Tiles
     tile_format: TileFormat
+    display: Display
 
 
 class PictureFile:
@@ -66,7 +67,7 @@ class PictureFile:
                 image = picture_of_file(file, self._display, keeps_codes=True)
                 tiles = Tiles(image, tile_size(image.display))
                 description = manifest(image, tiles, name=self.path.name, tile_format=self._tile_format)
-                self._picture = ServedPicture(version, description, tiles, self._tile_format)
+                self._picture = ServedPicture(version, description, tiles, self._tile_format, image.display)
             return self._picture
 
     def load_once(self) -> ServedPicture:

@@ -15,6 +15,7 @@ import traitlets
 
 from lippmann.runtime.machine import usable_cores
 from lippmann.viewer import page
+from lippmann.viewer.lens_light import lens_light
 from lippmann.viewer.manifest import manifest, tile_size
 from lippmann.viewer.tiles import Tiles
 
@@ -47,6 +48,7 @@ export default {
     const source = {
       manifest: async () => model.get("description"),
       tile: async (layer, column, row) => tiles[`${layer}/${column}_${row}`],
+      light: async () => model.get("light"),
     };
     el.classList.add("lippmann-cell");
     const viewer = createViewer(el, source, { compact: true });
@@ -76,6 +78,7 @@ class PictureWidget(anywidget.AnyWidget):
 
     description = traitlets.Dict().tag(sync=True)
     tiles = traitlets.Dict().tag(sync=True)
+    light = traitlets.Dict(allow_none=True).tag(sync=True)
 
     def __init__(self, image: IntegralImage) -> None:
         image_tiles = Tiles(image, tile_size(image.display))
@@ -90,4 +93,5 @@ class PictureWidget(anywidget.AnyWidget):
         with ThreadPoolExecutor(usable_cores()) as pool:
             files = list(pool.map(lambda place: image_tiles.png(*place), places))
         keys = [f"{layer}/{column}_{row}" for layer, column, row in places]
-        super().__init__(description=description, tiles=dict(zip(keys, files, strict=True)))
+        shown = dict(zip(keys, files, strict=True))
+        super().__init__(description=description, tiles=shown, light=lens_light(image.display))

@@ -19,6 +19,7 @@ export class Controls {
       { class: "controls" },
       this.#eyeGroup(),
       this.#sightGroup(),
+      this.#lensGroup(manifests),
       this.#focusGroup(),
       this.#closerGroup(),
       this.#layerGroup(manifests),
@@ -46,6 +47,7 @@ export class Controls {
     this.eyeDistance.show(view.eyeDistance);
     this.crossed.button.hidden = view.mode !== "side-by-side";
     this.crossed.show(view.isCrossed);
+    this.real?.show(view.isReal);
     this.refocus.show(view.plane !== null);
     this.plane.show(view.plane ?? 0);
     this.plane.input.disabled = view.plane === null;
@@ -103,6 +105,15 @@ export class Controls {
     });
     this.crossed = toggle("Cross-eyed", (isOn) => viewer.set({ isCrossed: isOn }));
     return group("Viewing mode", this.mode.row, this.eyeDistance.row, this.crossed.button);
+  }
+
+  #lensGroup(manifests) {
+    if (manifests.every(({ lens }) => lens === null)) return "";
+    this.real = toggle("Real lens", (isOn) => this.viewer.setReal(isOn));
+    const text =
+      "With the light of neighbouring strips, blur, moire and the edges of the view zone, for a pupil of 4 mm. " +
+      "Off: ideal lenses. Refocusing shows those always.";
+    return group("Lens", this.real.button, h("p", { class: "note" }, text));
   }
 
   #focusGroup() {

@@ -100,6 +100,7 @@ export const KEYS = [
   ["F", "refocus; < and > move the plane"],
   ["M", "magnifier; Shift + arrows move it"],
   ["O", "next layer"],
+  ["R", "real or ideal lenses, of displays that have a lens"],
   ["+ − 0", "zoom in, out, off (Ctrl + wheel)"],
   ["Shift + drag", "pan"],
 ];
@@ -125,6 +126,7 @@ function handleKey(event, viewer) {
     ">": () => viewer.stepPlane(1),
     m: () => viewer.setMagnifier(!viewer.view.glass),
     o: () => viewer.nextOverlay(),
+    r: () => viewer.setReal(!viewer.view.isReal),
     "+": () => viewer.zoomBy(1.25, 0, 0),
     "-": () => viewer.zoomBy(0.8, 0, 0),
     0: () => viewer.zoomOff(),

@@ -154,6 +154,27 @@ export function bending(optics, eye) {
   return { ...table, beside: [...across, 0, 0], moves: [cos / panel.pixel_pitch, sin / panel.pixel_pitch] };
 }
 
+/** Places of lenses and eye in mm, across and along cylinders or right and up: what the light of real lenses needs. */
+export function lensPlaces(optics, eye, frame, width, height) {
+  const { panel, lenses } = optics;
+  const [originX, originY] = lenses.origin;
+  if (lenses.layout !== "lenticular") {
+    const centerOf = [lenses.pitch, originX, -lenses.row_pitch, originY];
+    return { centerOf, alongOf: [0, 0, 0], eyeAt: [eye.x, eye.y, eye.z], axis: [0, 1] };
+  }
+  const [sin, cos] = axis(lenses);
+  const d = panel.pixel_pitch;
+  const [stepX, stepY] = [(frame.width / width) * d, (-frame.height / height) * d];
+  const left = (frame.x + (0.5 * frame.width) / width - panel.width / 2) * d;
+  const top = (panel.height / 2 - frame.y - (0.5 * frame.height) / height) * d;
+  return {
+    centerOf: [lenses.pitch, originX, 0, 0],
+    alongOf: [stepX * sin, stepY * cos, left * sin + top * cos],
+    eyeAt: [eye.x * cos - eye.y * sin, eye.x * sin + eye.y * cos, eye.z],
+    axis: [sin, cos],
+  };
+}
+
 /** Display.pinhole_offset: pixels right and down of a lens's centre at which a pinhole has the same direction. */
 function pinholeOffset(optics, right, below) {
   const { panel, lenses, distortion } = optics;

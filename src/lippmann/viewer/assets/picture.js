@@ -1,7 +1,9 @@
 /** A picture in graphics memory: its tiles, its layers, and the shader programs that draw it. */
 
+import { eyeBounds } from "lippmann/eye.js";
 import { setFixedPoint } from "lippmann/fixed.js";
-import { LAYOUTS, bending, channelPlaces, microImages, sightline } from "lippmann/optics.js";
+import { LensLight } from "lippmann/lens_light.js";
+import { LAYOUTS, bending, channelPlaces, lensPlaces, microImages, sightline } from "lippmann/optics.js";
 import { SIGHT_VERTEX, fragmentSource } from "lippmann/shaders.js";
 import { TileTexture, capacityOf, tilesOf } from "lippmann/tiles.js";
 
@@ -19,6 +21,7 @@ export class Picture {
     this.capacity = capacityOf(gl, manifest.tiles, memory);
     this.tiles = new TileTexture(gl, manifest.tiles, this.capacity);
     this.overlays = new Map();
+    this.light = null;
     this.variant = { ...variantOf(manifest.panel), ...lensesOf(manifest), tiled: this.tiles.isTiled };
     this.isReady = false;
   }
@@ -39,6 +42,15 @@ export class Picture {
     const texture = new TileTexture(this.gl, this.manifest.tiles, this.capacity);
     this.overlays.set(name, texture);
     await texture.load(this.source, name, this.#behind(frame), onTile, this.stopped.signal);
+  }
+
+  /** Fetches the light of the display's lenses, unless it is loaded or the display has none. */
+  async loadLight() {
+    if (this.light !== null || this.manifest.lens === null) return;
+    const light = await this.source.light();
+    if (this.light !== null || this.stopped.signal.aborted) return;
+    this.light = new LensLight(this.gl, this.manifest, light, eyeBounds(this.manifest).nearest);
+    this.variant = { ...this.variant, ...this.light.variant };
   }
 
   /** Largest width of a frame, 0 to 1, whose tiles fit the graphics memory. */
@@ -81,13 +93,18 @@ export class Picture {
    *
    * @param pane {x, y, width, height} in canvas pixels, y from below
    * @param overlay {name, share} or null
+   * @param isReal whether through the real lenses, where the display has them
    */
-  drawEye(eye, frame, pane, overlay) {
+  drawEye(eye, frame, pane, overlay, isReal) {
     const { gl } = this;
     const layer = overlay && this.overlays.get(overlay.name);
-    const program = this.#use(layer ? "overlaid" : "eye");
-    this.#setSightline(program, sightline(this.manifest, eye, 0, frame, pane.width, pane.height), pane);
+    const light = isReal ? this.light : null;
+    const program = this.#use(light ? "real" : layer ? "overlaid" : "eye");
+    const finer = light ? this.#finer(frame, pane) : [1, 1];
+    const size = [finer[0] * pane.width, finer[1] * pane.height];
+    this.#setSightline(program, sightline(this.manifest, eye, 0, frame, ...size), pane);
     this.#setBending(program, bending(this.manifest, eye));
+    if (light) this.#setLight(program, eye, frame, size, finer);
     if (layer) {
       gl.uniform1f(program.at("overlayShare"), overlay.share);
       layer.bind(program, 2, "overlay");
@@ -133,6 +150,7 @@ export class Picture {
   destroy() {
     this.stopped.abort();
     this.tiles.destroy();
+    this.light?.destroy();
     for (const texture of this.overlays.values()) texture.destroy();
     for (const program of this.programs.values()) this.gl.deleteProgram(program.handle);
   }
@@ -155,6 +173,29 @@ export class Picture {
   #setLensOfPoint(program, parts) {
     for (const name of ["acrossOf", "downOf"]) setFixedPoint(this.gl, program, name, parts[name]);
     this.gl.uniform4fv(program.at("gradients"), parts.gradients);
+  }
+
+  /** Points of the pane that are seen in each pixel, right and down, such that each lens has one. */
+  #finer(frame, pane) {
+    const { panel, lenses } = this.manifest;
+    const count = (pixels, shown, pitch) => Math.max(1, Math.ceil((pixels * panel.pixel_pitch) / shown / pitch - 1e-9));
+    const down = lenses.layout === "lenticular" ? 1 : count(frame.height, pane.height, lenses.row_pitch);
+    return [count(frame.width, pane.width, lenses.pitch), down];
+  }
+
+  #setLight(program, eye, frame, [width, height], finer) {
+    const { gl, manifest } = this;
+    const { centerOf, alongOf, eyeAt, axis } = lensPlaces(manifest, eye, frame, width, height);
+    this.light.bind(program, eye.z);
+    gl.uniform4fv(program.at("centerOf"), centerOf);
+    gl.uniform3fv(program.at("alongOf"), alongOf);
+    gl.uniform3fv(program.at("eyeAt"), eyeAt);
+    gl.uniform2fv(program.at("axis"), axis);
+    gl.uniform1f(program.at("pixelPitch"), manifest.panel.pixel_pitch);
+    gl.uniform2iv(program.at("finer"), finer);
+    gl.uniform1f(program.at("halfRows"), 0.5 * Math.max(1, frame.height / height));
+    gl.uniform1i(program.at("isCoded"), this.isCoded);
+    gl.uniform1f(program.at("overlayShare"), 0);
   }
 
   #setBending(program, parts) {

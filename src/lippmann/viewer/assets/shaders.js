@@ -217,10 +217,14 @@ flat in float flatSlide;
 flat in vec3 flatRight;
 flat in vec3 flatDownward;
 
-vec2 visibleLens;  // lens arrays only: index of the lens
+vec2 visibleLens;  // index of the lens
 
-void visiblePoint(out Fixed u, out Fixed v) {
-  float x = gl_FragCoord.x - flatCorner.x, y = flatCorner.y - gl_FragCoord.y;
+vec2 panePixel() {
+  return vec2(gl_FragCoord.x - flatCorner.x, flatCorner.y - gl_FragCoord.y);
+}
+
+void visiblePoint(vec2 pane, out Fixed u, out Fixed v) {
+  float x = pane.x, y = pane.y;
   uint column = uint(int(x)), row = uint(int(y));
 #if LAYOUT == LENTICULAR
 #if SLANTED
@@ -239,6 +243,7 @@ void visiblePoint(out Fixed u, out Fixed v) {
   u = fixedPoint(flatPanelU[0] * lens.whole + flatPanelU[3], uParts);
   v = fixedPoint(flatPanelV[0] * y + flatPanelV[1], flatPanelVParts[0] * row + flatPanelVParts[1]);
 #endif
+  visibleLens = vec2(lens.whole, 0.0);
 #else
   uint acrossAt = flatAcrossParts[0] * column + flatAcrossParts[2], downAt = flatDownParts[0] * row + flatDownParts[1];
   vec2 lens = lensAt(flatAcross[0] * x + flatAcross[2], acrossAt, flatDown[0] * y + flatDown[1], downAt);
@@ -251,7 +256,7 @@ void visiblePoint(out Fixed u, out Fixed v) {
 #endif
 #if BENT
 #if LAYOUT == LENTICULAR
-  vec2 shifted = bent(vec2(lens.whole, 0.0), 0.0);
+  vec2 shifted = bent(visibleLens, 0.0);
 #else
   vec2 shifted = bent(lens, shift);
 #endif
@@ -318,7 +323,7 @@ out vec4 color;
 
 void main() {
   Fixed u, v;
-  visiblePoint(u, v);
+  visiblePoint(panePixel(), u, v);
   color = vec4(sampleCode(u, v), 1.0);
 }`;
 
@@ -329,10 +334,158 @@ out vec4 color;
 
 void main() {
   Fixed u, v;
-  visiblePoint(u, v);
+  visiblePoint(panePixel(), u, v);
   vec3 code = sampleCode(u, v);
   vec2 pixel = pixelOf(u, v);
   if (isOnPanel(pixel)) code = mix(code, fetchOverlay(pixel), overlayShare);
+  color = vec4(code, 1.0);
+}`;
+
+// The light that lenses as they are made send to an eye: viewing/optical_replay.py and its kernel, with the weights of
+// lens_light.js. Coordinates in mm are across and along a cylinder, or right and up.
+const REAL = `
+uniform sampler2D weights;
+uniform sampler2D places;  // middle of the light from the lens's centre, mm
+uniform vec2 directions;  // columns and rows of slopes
+uniform float finerPlaces;  // places between two directions
+uniform float largestSlope;
+uniform vec2 tile;
+uniform vec2 perTexel;
+uniform float stepsPerPixel;
+uniform vec2 reach;  // pixels beside the middle that may send light
+uniform ivec2 lightCellCount;
+uniform vec2 lightCells[192];
+uniform vec4 centerOf;  // of a lens, per lens and at 0, across and along
+uniform vec3 alongOf;  // of a point of a cylinder: per column and row of the pane, and at (0, 0)
+uniform vec3 eyeAt;
+uniform float pixelPitch;
+uniform vec2 axis;  // sine and cosine of the slant
+uniform ivec2 finer;  // points of the pane that a pixel is the mean of
+uniform float halfRows;  // half of the panel's rows that a point of a cylinder covers
+uniform bool isCoded;
+uniform float overlayShare;  // 0 without an overlay
+out vec4 color;
+
+vec2 placeOfLight(vec2 at) {
+  at *= finerPlaces;
+  ivec2 low = ivec2(min(at, finerPlaces * (directions - 1.0) - 1.0));
+  vec2 part = at - vec2(low);
+  vec2 lower = mix(texelFetch(places, low, 0).rg, texelFetch(places, low + ivec2(1, 0), 0).rg, part.x);
+  vec2 upper = mix(texelFetch(places, low + ivec2(0, 1), 0).rg, texelFetch(places, low + 1, 0).rg, part.x);
+  return mix(lower, upper, part.y);
+}
+
+// Weight of a sub-pixel so many steps beside the middle of the light; tiles end in zeros. The corner is that of the
+// nearest direction's tile, of a cylinder the place along and across between directions.
+float weightAt(vec2 corner, vec2 beside) {
+  vec2 place = clamp(beside + 0.5 * (tile - 1.0), vec2(0.0), tile - 1.0) + 0.5;
+#if LAYOUT == LENTICULAR
+  // Between directions across the texture mixes, between those along this.
+  float row = min(floor(corner.x), directions.y - 2.0);
+  vec2 first = vec2(row * tile.x + place.x, corner.y + 0.5) * perTexel;
+  float lower = texture(weights, first).r, upper = texture(weights, first + vec2(tile.x * perTexel.x, 0.0)).r;
+  return mix(lower, upper, corner.x - row);
+#else
+  return texture(weights, (corner + place) * perTexel).r;
+#endif
+}
+
+// Weights of a pixel's colours; from is its place beside the middle of the light, in pixels right and up.
+vec3 weightsOf(vec2 pixel, vec2 corner, vec2 from) {
+#if SPLIT
+  ivec2 cell = ivec2(pixel) % lightCellCount;
+  int first = 3 * (cell.y * lightCellCount.x + cell.x);
+  vec3 found;
+  for (int c = 0; c < 3; c += 1) {
+    vec2 place = from + vec2(lightCells[first + c].x, -lightCells[first + c].y);
+    found[c] = weightAt(corner, vec2(place.x * axis.y - place.y * axis.x, place.y) * stepsPerPixel);
+  }
+  return found;
+#else
+  return vec3(weightAt(corner, vec2(from.x * axis.y - from.y * axis.x, from.y) * stepsPerPixel));
+#endif
+}
+
+bool isDark(vec3 light) {
+  return max(light.r, max(light.g, light.b)) < 1e-5;
+}
+
+vec3 fetchLight(vec2 pixel) {
+  vec3 code = fetchCode(pixel);
+  return isCoded ? decodeSrgb(code) : code;
+}
+
+vec3 lightAt(vec2 pane) {
+  Fixed u, v;
+  visiblePoint(pane, u, v);
+#if LAYOUT == LENTICULAR
+  vec2 center = vec2(centerOf.x * visibleLens.x + centerOf.y, dot(alongOf, vec3(pane, 1.0)));
+#else
+  float lensX = visibleLens.x + 0.5 * shiftOf(visibleLens.y);
+  vec2 center = vec2(centerOf.x * lensX + centerOf.y, centerOf.z * visibleLens.y + centerOf.w);
+#endif
+  vec2 slope = (eyeAt.xy - center) / eyeAt.z;
+  slope = clamp(slope / largestSlope, -1.0, 1.0);
+  vec2 at = (0.5 * slope + 0.5) * (directions - 1.0);
+#if LAYOUT == LENTICULAR
+  at.y = abs(slope.y) * (directions.y - 1.0);  // cylinders are alike both ways along
+#endif
+  vec2 place = placeOfLight(at);
+#if LAYOUT == LENTICULAR
+  vec2 corner = at.yx;
+  float begin = v.whole + v.part - halfRows, end = v.whole + v.part + halfRows;
+  float across = center.x + place.x;
+#else
+  vec2 corner = floor(at + 0.5) * tile;
+  vec2 middle = 0.5 * flatPanel + vec2(1.0, -1.0) * (center + place) / pixelPitch - 0.5;
+  float begin = middle.y - reach.y, end = middle.y + reach.y;
+#endif
+  vec3 light = vec3(0.0);
+  float firstRow = max(0.0, floor(begin)), endRow = min(flatPanel.y, ceil(end));
+#if ALIKE
+  float middle = across / pixelPitch + 0.5 * flatPanel.x - 0.5;
+  float last = min(flatPanel.x - 1.0, ceil(middle + reach.x));
+  for (float column = max(0.0, floor(middle - reach.x)); column <= last; column += 1.0) {
+    vec3 weight = weightsOf(vec2(column, 0.0), corner, vec2(column - middle, 0.0));
+    if (isDark(weight)) continue;
+    for (float row = firstRow; row < endRow; row += 1.0) {
+      float share = (min(end, row + 1.0) - max(begin, row)) / (end - begin);
+      light += share * weight * fetchLight(vec2(column, row));
+    }
+  }
+#else
+  for (float row = firstRow; row < endRow; row += 1.0) {
+#if LAYOUT == LENTICULAR
+    float share = (min(end, row + 1.0) - max(begin, row)) / (end - begin);
+    float up = (0.5 * flatPanel.y - row - 0.5) * pixelPitch;
+    vec2 middle = vec2((across + up * axis.x) / axis.y / pixelPitch + 0.5 * flatPanel.x - 0.5, row);
+#else
+    float share = 1.0;
+#endif
+    float last = min(flatPanel.x - 1.0, ceil(middle.x + reach.x));
+    for (float column = max(0.0, floor(middle.x - reach.x)); column <= last; column += 1.0) {
+      vec2 pixel = vec2(column, row);
+      vec3 weight = share * weightsOf(pixel, corner, vec2(column - middle.x, middle.y - row));
+      if (!isDark(weight)) light += weight * fetchLight(pixel);
+    }
+  }
+#endif
+  return light;
+}
+
+void main() {
+  vec3 sum = vec3(0.0);
+  for (int j = 0; j < finer.y; j += 1) {
+    for (int i = 0; i < finer.x; i += 1) sum += lightAt(panePixel() * vec2(finer) + vec2(i, j));
+  }
+  vec3 light = clamp(sum / float(finer.x * finer.y), 0.0, 1.0);
+  vec3 code = isCoded ? encodeSrgb(light) : light;
+  if (overlayShare > 0.0) {
+    Fixed u, v;
+    visiblePoint(panePixel() * vec2(finer) + vec2(finer / 2), u, v);
+    vec2 pixel = pixelOf(u, v);
+    if (isOnPanel(pixel)) code = mix(code, fetchOverlay(pixel), overlayShare);
+  }
   color = vec4(code, 1.0);
 }`;
 
@@ -343,7 +496,7 @@ out vec4 color;
 
 void main() {
   Fixed u, v;
-  visiblePoint(u, v);
+  visiblePoint(panePixel(), u, v);
   vec2 pixel = pixelOf(u, v);
   if (!isOnPanel(pixel)) discard;
 #if LAYOUT == HEXAGONAL
@@ -459,14 +612,25 @@ void main() {
  * Source of a fragment shader. Properties of the picture are compiled in: layout and slant of the lenses; the number of
  * factors of their distortion (`bent`: 0 of a pinhole); arrangement
  * of sub-pixels (`cells`: 0 all in the pixel's centre, 1 in a row, 2 any, 3 in cells of several kinds, the nearest
- * within `reach` pixels); whether the picture is one texture or an array of tiles (`tiled`).
+ * within `reach` pixels); whether the picture is one texture or an array of tiles (`tiled`); whether the colours of a
+ * pixel shine at places of their own (`split`), and whether all rows of pixels are weighed alike (`alike`).
  */
-export function fragmentSource(kind, { layout, slanted, bent, cells, reach, tiled }) {
-  const values = { LAYOUT: layout, SLANTED: slanted, BENT: bent, CELLS: cells, REACH: reach, TILED: tiled };
+export function fragmentSource(kind, { layout, slanted, bent, cells, reach, tiled, split = false, alike = false }) {
+  const values = {
+    LAYOUT: layout,
+    SLANTED: slanted,
+    BENT: bent,
+    CELLS: cells,
+    REACH: reach,
+    TILED: tiled,
+    SPLIT: split,
+    ALIKE: alike,
+  };
   const defines = Object.entries(values).map(([name, value]) => `#define ${name} ${Number(value)}\n`);
   const bodies = {
     eye: BENDING + SIGHTLINE + EYE,
     overlaid: BENDING + SIGHTLINE + OVERLAY,
+    real: SRGB + BENDING + SIGHTLINE + REAL,
     summand: SRGB + LENS_OF_POINT + BENDING + SIGHTLINE + SUMMAND,
     magnifier: LENS_OF_POINT + BENDING + MAGNIFIER,
   };

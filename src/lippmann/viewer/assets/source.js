@@ -1,11 +1,14 @@
 /**
- * Sources of pictures. A source has `manifest()`, a promise of the picture's description, and
- * `tile(layer, column, row)`, a promise of the bytes of a tile in the manifest's format.
+ * Sources of pictures. A source has `manifest()`, a promise of the picture's description,
+ * `tile(layer, column, row)`, a promise of the bytes of a tile in the manifest's format, and `light()`, a promise of
+ * the light of a display with a lens, see lens_light.py.
  */
 
 /** Source of a picture on the page's server. */
 export function serverSource(name) {
   let version = null;
+  // Tiles of a newer version of the file would not match the tiles loaded before.
+  const same = () => (version === null ? {} : { "If-Match": version });
   return {
     async manifest() {
       const response = await request(`pictures/${name}/manifest.json`, {});
@@ -13,16 +16,17 @@ export function serverSource(name) {
       return response.json();
     },
     async tile(layer, column, row) {
-      // Tiles of a newer version of the file would not match the tiles loaded before.
-      const headers = version === null ? {} : { "If-Match": version };
-      const response = await request(`pictures/${name}/tiles/${layer}/${column}_${row}`, headers);
+      const response = await request(`pictures/${name}/tiles/${layer}/${column}_${row}`, same());
       return response.arrayBuffer();
+    },
+    async light() {
+      return (await request(`pictures/${name}/light.json`, same())).json();
     },
   };
 }
 
-/** Source of a picture inside the page: `manifest`, and `tiles[layer]["column_row"]` in base 64. */
-export function embeddedSource({ manifest, tiles }) {
+/** Source of a picture inside the page: `manifest`, `light`, and `tiles[layer]["column_row"]` in base 64. */
+export function embeddedSource({ manifest, tiles, light }) {
   return {
     async manifest() {
       return manifest;
@@ -31,6 +35,9 @@ export function embeddedSource({ manifest, tiles }) {
       const text = tiles[layer]?.[`${column}_${row}`];
       if (text === undefined) throw new Error(`the tile in column ${column}, row ${row} of the picture is missing`);
       return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+    },
+    async light() {
+      return light;
     },
   };
 }

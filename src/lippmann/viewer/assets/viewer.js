@@ -52,6 +52,7 @@ class Viewer {
       glass: null,
       glassScale: 14,
       overlay: null,
+      isReal: false,
       divider: 0.5,
       isPlaying: false,
       viewsPerFrame: VIEWS_PER_FRAME,
@@ -188,6 +189,19 @@ class Viewer {
     this.invalidate();
   }
 
+  /** Shows what real lenses show, of displays that have them. Resolves once their light is loaded. */
+  async setReal(isReal) {
+    if (!this.manifests.some(({ lens }) => lens !== null)) return;
+    this.set({ isReal });
+    if (!isReal) return;
+    try {
+      await Promise.all(this.pictures.map((picture) => picture?.loadLight()));
+    } catch (error) {
+      this.#showError(error);
+    }
+    this.invalidate();
+  }
+
   setOverlayShare(share) {
     if (this.view.overlay) this.set({ overlay: { ...this.view.overlay, share } });
   }
@@ -279,6 +293,7 @@ class Viewer {
     };
     await Promise.all(this.pictures.map((picture, place) => picture.load(this.view.frame, onTile(place))));
     if (this.view.overlay) await this.setOverlay(this.view.overlay.name);
+    if (this.view.isReal) await this.setReal(true);
     if (this.isDestroyed) return;
     this.layout.showMessage(null);
     this.#draw();
