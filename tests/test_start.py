@@ -24,9 +24,9 @@ PLAIN = HELP | {"cython_runtime", "drjit", "imagecodecs", "mitsuba", "numpy", "p
 RENDER = PLAIN | {"cffi", "pycparser", "pyoidn"}
 BUDGETS = {
     "--help": (HELP, 23),
-    "preview teapot": (PLAIN, 302),
-    "render teapot": (RENDER, 340),
-    "render model.glb": (RENDER, 356),
+    "preview teapot": (PLAIN, 282),
+    "render teapot": (RENDER, 277),
+    "render model.glb": (RENDER, 294),
 }
 
 

@@ -79,13 +79,15 @@ def interlace(
     finishing: Annotated[FinishOptions, without("icc")],
 ) -> None:
     """Interlace photographs or frames for a lenticular print or display."""
+    from lippmann.calibration.finish import NO_FINISH
     from lippmann.quilts.interlace import check_interlaced_path, view_size, write_interlaced
     from lippmann.quilts.photos import natural_order, read_photos
 
     console = Console(quiet, as_json)
     check_interlaced_path(output)
     across = lenses == "across"
-    target, finish = sheet_of(_display(display, printed, turned=across), replace(finishing, icc=icc))
+    target, asked_finish = sheet_of(_display(display, printed, turned=across), replace(finishing, icc=icc))
+    finish = asked_finish or NO_FINISH
     paths = natural_order(_pictures(photos))
     if reverse:
         paths.reverse()

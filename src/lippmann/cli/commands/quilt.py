@@ -257,7 +257,7 @@ def weave(
     finishing: FinishOptions,
 ) -> None:
     """Make a display's native picture from a quilt or a folder of views."""
-    from lippmann.calibration.finish import write_finished
+    from lippmann.calibration.finish import NO_FINISH, write_finished
     from lippmann.display import load_display
     from lippmann.display.sheet_layout import trim_of
     from lippmann.image.streamed import LARGE
@@ -269,7 +269,8 @@ def weave(
     console = Console(quiet, as_json)
     name, stored = format_for(output, bits)
     check_output(output, name)
-    target, finish = sheet_of(load_display(display), finishing)
+    target, asked_finish = sheet_of(load_display(display), finishing)
+    finish = asked_finish or NO_FINISH
     finish.check_stored(stored, output)
     panel, trim = finish.display(target).panel, trim_of(target)
     width, height = panel.width, panel.height

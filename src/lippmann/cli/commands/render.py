@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lippmann.cli.commands import cluster as clusters
-from lippmann.cli.commands import sequence, view
+from lippmann.cli.commands import sequence
 from lippmann.cli.shared import options, standard_streams
 from lippmann.cli.shared.command_options import with_options
 from lippmann.cli.shared.console import Console, add_seconds, remarks, report
@@ -112,7 +112,9 @@ def render(
         with on_cluster.runner(console, machine.threads) as runner:
             sequence.render_frames(source, target, request, wanted, files, console, runner=runner)
         if opens and wanted.video is not None:
-            view.open_file(wanted.video)
+            from lippmann.cli.commands.view import open_file
+
+            open_file(wanted.video)
         return
     name, stored = format_for(output, bits)
     _check_layers(how.layers, name, output)
@@ -129,10 +131,11 @@ def render(
                 source, target, request, output, console, bits=bits, resume=resume, finish=finish, runner=runner
             )
         if opens:
-            view.view(output, quiet=quiet, as_json=as_json)
+            _open(output, quiet=quiet, as_json=as_json)
         return
     check_output(output, name)
-    finish.check_stored(stored, output)
+    if finish is not None:
+        finish.check_stored(stored, output)
     if maps is not None:
         check_folder_writable(maps)
     with console.progress() as progress:
@@ -148,8 +151,9 @@ def render(
 
             write_maps(image, maps)
         image, remark = _readable(image, stored, output)
-        image = finish.image(image)
-        image.save(output, bits=bits, icc=finish.icc)
+        if finish is not None:
+            image = finish.image(image)
+        image.save(output, bits=bits, icc=b"" if finish is None else finish.icc)
     written = _with_seconds(image, write=time.perf_counter() - writing)
     remarks(console, image.provenance)
     if remark:
@@ -157,7 +161,14 @@ def render(
     height, width = image.pixels.shape[:2]
     console.result(report(output, (width, height), written.provenance), _sentence(output, written))
     if opens:
-        view.view(output, quiet=quiet, as_json=as_json)
+        _open(output, quiet=quiet, as_json=as_json)
+
+
+def _open(output: Path, *, quiet: bool, as_json: bool) -> None:
+    """Show a picture in the browser."""
+    from lippmann.cli.commands import view
+
+    view.view(output, quiet=quiet, as_json=as_json)
 
 
 def _readable(image: IntegralImage, stored: str, output: Path) -> tuple[IntegralImage, str]:
@@ -224,10 +235,11 @@ def _render_tiled(
     *,
     bits: int | None,
     resume: bool,
-    finish: Finish,
+    finish: Finish | None,
     runner: Runner | None,
 ) -> None:
     """Render into a file tile by tile, and say what came of it."""
+    from lippmann.calibration.finish import NO_FINISH
     from lippmann.tiles.tiled_render import render_to_file
 
     started = time.perf_counter()
@@ -239,7 +251,7 @@ def _render_tiled(
             output,
             bits=bits,
             resume=resume,
-            finish=finish,
+            finish=finish or NO_FINISH,
             runner=runner,
             progress=progress,
         )

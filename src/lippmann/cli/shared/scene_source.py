@@ -83,8 +83,8 @@ def _given(printed: PrintOptions) -> dict[str, str]:
     return {key: text for key, text in vars(printed).items() if text is not None}
 
 
-def sheet_of(display: Display, finishing: FinishOptions, *, in_frames: bool = False) -> tuple[Display, Finish]:
-    """The display with its bleed, and what is done to its picture afterwards.
+def sheet_of(display: Display, finishing: FinishOptions, *, in_frames: bool = False) -> tuple[Display, Finish | None]:
+    """The display with its bleed, and what is done to its picture afterwards; None for nothing.
 
     Raises
     ------
@@ -94,20 +94,20 @@ def sheet_of(display: Display, finishing: FinishOptions, *, in_frames: bool = Fa
     PictureError
         If the profile cannot be used.
     """
-    from lippmann.calibration.finish import NO_FINISH, Finish
-    from lippmann.codecs.icc import read_profile
-    from lippmann.display.sheet_layout import with_bleed
-    from lippmann.display.validation import length
-
-    bleed, marks, icc = finishing.bleed, finishing.marks, finishing.icc
     asked = [f"--{name}" for name, value in vars(finishing).items() if value not in (None, False)]
     if not asked:
-        return display, NO_FINISH
+        return display, None
     if display.sheet is None:
         rule = f"it applies to prints only: --display {_PRINT}"
         raise UsageError(f"does not apply to the display {display.name}", where=asked[0], rule=rule)
     if in_frames:
         raise UsageError("does not apply to frames of a moving scene", where=asked[0], fix="leave it out")
+    from lippmann.calibration.finish import Finish
+    from lippmann.codecs.icc import read_profile
+    from lippmann.display.sheet_layout import with_bleed
+    from lippmann.display.validation import length
+
+    bleed, marks, icc = finishing.bleed, finishing.marks, finishing.icc
     display = with_bleed(display, 0.0 if bleed is None else length(bleed, "--bleed"))
     margin = None if marks is None else length(marks, "--marks")
     finish = Finish(margin, finishing.mirror, None if icc is None else read_profile(icc))

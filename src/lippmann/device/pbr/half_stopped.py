@@ -8,8 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.pbr import BuiltScene
-from lippmann.device.splats import compositing
-from lippmann.device.volumes import ray_march
 from lippmann.scene.matrices import transform_points
 from lippmann.scene.values.description import Matrix
 
@@ -65,7 +63,11 @@ def half_stopped_by(
 
 def _media(built: BuiltScene, threads: int) -> Iterator[Transmittance]:
     if (splats := built.splats) is not None:
+        from lippmann.device.splats import compositing
+
         yield lambda o, d, ends: compositing.composite(splats, o, d, ends, threads)[1]
     if (volume := built.volume) is not None:
+        from lippmann.device.volumes import ray_march
+
         toward_light = np.array((0.0, 0.0, 1.0))  # colours are not looked at
         yield lambda o, d, ends: ray_march.composite(volume, o, d, ends, toward_light, threads)[1]

@@ -6,7 +6,6 @@ It listens on this machine only and answers PUT requests whose bodies are JSON, 
 
 from __future__ import annotations
 
-import http.client
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -69,6 +68,8 @@ class Bridge:
 
     @staticmethod
     def _put(endpoint: str, values: JsonObject) -> Mapping[str, object]:
+        import http.client  # takes as long as all else about displays
+
         where = f"http://{HOST}:{PORT}/{endpoint}"
         connection = http.client.HTTPConnection(HOST, PORT, timeout=PATIENCE)
         try:
