@@ -99,6 +99,7 @@ def test_a_film_holds_both_eyes(lippmann, balls, tmp_path):
     ("words", "said"),
     [
         (("render", "--target", "odyssey-3d"), "--display: odyssey-3d takes no native pixels; an eye-tracked monitor"),
+        (("render", "--target", "odyssey-3d", "-o", "a.zarr"), "--display: odyssey-3d takes no native pixels"),
         (("quilt", "render", "--target", "odyssey-3d", "--size", "999x999"), "it is 999 x 999 pixels; pairs for"),
         (("quilt", "render", "--target", "odyssey-3d", "--views", "8x6"), "--views: 8x6; odyssey-3d shows one view"),
         (("quilt", "render", "--target", "oddyssey-3d"), "unknown display 'oddyssey-3d', did you mean 'odyssey-3d'?"),

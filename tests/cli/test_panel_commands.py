@@ -52,7 +52,8 @@ def test_pack_and_unpack(lippmann, views, tmp_path):
 
 def test_sizes(lippmann):
     assert "looking-glass-portrait           3360x3360  48 views  _qs8x6a0.75\n" in lippmann("quilt", "sizes").out
-    assert len(lippmann("quilt", "sizes", "--json").json["quilts"]) == 15
+    assert "odyssey-3d                       3840x2160   2 views  _half_2x1\n" in lippmann("quilt", "sizes").out
+    assert len(lippmann("quilt", "sizes", "--json").json["quilts"]) == 20
 
 
 @pytest.mark.parametrize("choice", ["nearest", "linear"])

@@ -188,6 +188,10 @@ def test_values_are_typed_and_automatic_ones_are_given_back(page):
     assert "--display mla-square" in tab.wait_for(f"{COMMAND}.includes('mla-square') && {COMMAND}")
     assert "depth scale 1 shows it whole" in tab.page.locator(".warnings").inner_text()
     assert "blur" in tab.page.locator(".depth-bars .note").inner_text()
+    # Of a monitor that follows the eyes nothing blurs.
+    sentence = "(await import('studio/depth_bars.js')).sentence([-200, 50], [-120, 86], true)"
+    said = tab.evaluate(f"async () => {sentence}")
+    assert said == "Comfortable from 120 mm behind to 86 mm in front. The farthest parts strain the eyes."
     tab.assert_clean()
 
 

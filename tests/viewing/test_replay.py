@@ -239,6 +239,7 @@ def test_a_sweep_moves_in_even_steps():
 
 
 def test_default_eye_and_size():
+    assert default_eye(load_display("odyssey-3d")) == (-31.5, 0, 600)
     assert default_eye(load_display("panel-4k"))[2] == load_display("panel-4k").viewing_distance
     x, y, z = default_eye(SHEET)
     assert (x, y) == (0, 0)

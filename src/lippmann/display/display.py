@@ -404,6 +404,13 @@ class Display:
         shows = on_panel & (owner_i == i) & (owner_j == j)
         return np.stack([i[shows], j[shows]], axis=1).astype(np.intp), np.stack([x[shows], y[shows]], axis=1)
 
+    def check_native(self) -> None:
+        """Refuse, by a :class:`DisplayError`, a display that takes no native pixels."""
+        if self.stereo is not None:
+            rule = "an eye-tracked monitor weaves the pictures of the two eyes by itself"
+            what = f"{self.name} takes no native pixels"
+            raise DisplayError(what, parameter="display", rule=rule, fix="use lippmann quilt render")
+
     # ---- Copies and plain values -----------------------------------------------------------------------------------
 
     def resized(self, width: int, height: int) -> Display:

@@ -40,6 +40,7 @@ def render_picture(
     """
     if request.began is None:
         request = replace(request, began=time.perf_counter())
+    display.check_native()
     request = resolve(request, scene, display)
     session = open_session(scene, request, (display.panel.width, display.panel.height), progress=progress)
     request = session.request

@@ -60,7 +60,11 @@ def state_of_values(values: object) -> StudioState:
 def facts_of_view(display: Display, placement: Placement, exposure: float) -> dict[str, object]:
     """What the page displays of a picture beside it: depth (mm toward the viewer), warnings, automatic values."""
     return {
-        "depth": {"scene": _pair(placement.depth_range), "sharp": _pair(placement.resolvable_range)},
+        "depth": {
+            "scene": _pair(placement.depth_range),
+            "sharp": _pair(placement.resolvable_range),
+            "strains": display.stereo is not None,
+        },
         "warnings": [_in_words(line) for line in placement.warnings],
         "depth_scale": placement.depth_scale,
         "exposure": exposure,

@@ -167,6 +167,7 @@ def make_job(
     MemoryLimitError
         If ``request.memory`` does not hold the smallest tile.
     """
+    display.check_native()
     request = resolve(request, scene, display, "tiles")
     return TileJob(scene, display, request, _best_side(display, request) if side is None else side, stored, keeps_maps)
 

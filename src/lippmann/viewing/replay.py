@@ -142,10 +142,11 @@ def path_of_eye(start: Eye, stop: Eye, frames: int) -> list[Eye]:
 def default_eye(display: Display) -> Eye:
     """Centre ``(x, y, z)`` of the viewing zone in mm: at the viewing distance, if that is finite.
 
-    For parallel views the eye is at 1.5 times the distance at which the field of view is as wide as the panel.
+    For parallel views the eye is at 1.5 times the distance at which the field of view is as wide as the panel. Of an
+    eye-tracked monitor it is the left eye: its two views meet at the centre.
     """
     if math.isfinite(display.viewing_distance):
-        return 0.0, 0.0, display.viewing_distance
+        return -0.5 * display.stereo.eyes if display.stereo else 0.0, 0.0, display.viewing_distance
     half_field = math.radians(display.field_of_view / 2)
     across = 0 if display.lens_array.layout == "lenticular" else 1
     extent = max(display.size_mm[: across + 1])

@@ -326,3 +326,15 @@ def test_a_display_or_a_scene_takes_the_place_of_another(teapot):
     assert psnr(renderer.frame(view).pixels, square) < 30
     renderer.set_scene(teapot)
     assert (renderer.frame(view).pixels == square).all()
+
+
+@pytest.mark.slow
+def test_either_eye_of_a_tracked_monitor_sees_its_own_picture(teapot):
+    """Though such a monitor takes no native pixels, the studio shows what each eye sees through its lenses."""
+    monitor = lippmann.load_display("displayxr").resized(192, 108)
+    renderer = LiveRenderer(teapot, monitor)
+    request = RenderRequest(placement=replace(PLACED, depth_scale=4.0), exposure=0.0)
+    left, again, right = (
+        renderer.frame(LiveView((x, 0, 600), SIZE, request=request)).pixels for x in (-31.5, -25, 31.5)
+    )
+    assert psnr(left, again) > 40 > psnr(left, right) + 5

@@ -217,9 +217,12 @@ def unpack(
 
 @quilt.command("sizes", cls=HelpfulCommand)
 def sizes(as_json: options.Json = False) -> None:
-    """List the quilts that devices are given."""
-    from lippmann.quilts.quilt import DEVICE_QUILTS
+    """List the quilts that devices are given, and the pairs of eye-tracked monitors."""
+    from lippmann.display import list_displays
+    from lippmann.quilts.quilt import DEVICE_QUILTS, quilt_of_display
 
+    pairs = [quilt_of_display(display) for display in list_displays() if display.stereo is not None]
+    devices = (*DEVICE_QUILTS, *pairs)
     rows = [
         {
             "display": device.display,
@@ -227,13 +230,13 @@ def sizes(as_json: options.Json = False) -> None:
             "columns": device.layout.columns,
             "rows": device.layout.rows,
             "aspect": device.layout.aspect,
-            "ending": device.layout.ending,
+            "ending": device.ending,
         }
-        for device in DEVICE_QUILTS
+        for device in devices
     ]
     lines = [
-        f"{device.display:<32} {device.width}x{device.height}  {device.layout.views:>2} views  {device.layout.ending}"
-        for device in DEVICE_QUILTS
+        f"{device.display:<32} {device.width}x{device.height}  {device.layout.views:>2} views  {device.ending}"
+        for device in devices
     ]
     Console(as_json=as_json).result({"quilts": rows}, "\n".join(lines))
 

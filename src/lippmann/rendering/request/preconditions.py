@@ -45,7 +45,7 @@ def check(request: RenderRequest, form: Form, display: Display | None) -> None:
     _refuse(
         [
             *_of_form(request, form),
-            *_of_display(request, display, form),
+            *_of_size(request, display, form),
             *_of_denoiser(request),
             *_of_caustics(request),
             *_of_reuse(request),
@@ -163,15 +163,11 @@ def _of_form(request: RenderRequest, form: Form) -> list[_Refusal]:
     ]
 
 
-def _of_display(request: RenderRequest, display: Display | None, form: Form) -> list[_Refusal]:
-    if display is None:
+def _of_size(request: RenderRequest, display: Display | None, form: Form) -> list[_Refusal]:
+    if form != "tiles" or display is None:
         return []
-    panel, weaves = display.panel, "an eye-tracked monitor weaves the pictures of the two eyes by itself"
-    weaves_itself = display.stereo is not None and form in ("picture", "tiles")
-    is_large = form == "tiles" and panel.width * panel.height * request.channels >= MOST_SUBPIXELS
+    panel = display.panel
+    is_large = panel.width * panel.height * request.channels >= MOST_SUBPIXELS
     what = f"the display {display.name} has {panel.width} x {panel.height} pixels"
     rule = f"pictures of fewer than {MOST_SUBPIXELS} (sub-)pixels are rendered"
-    return [
-        (weaves_itself, f"{display.name} takes no native pixels", "display", weaves, "use lippmann quilt render"),
-        (is_large, what, "display", rule, "render it in parts"),
-    ]
+    return [(is_large, what, "display", rule, "render it in parts")]

@@ -1,4 +1,4 @@
-/** Depth bars: how far the scene reaches out of the display and behind it, beside what the display keeps sharp. */
+/** Depth bars: how far the scene reaches out of the display and behind it, beside what is sharp, or comfortable. */
 
 import { h } from "lippmann/dom.js";
 
@@ -12,8 +12,11 @@ export function depthBars() {
   const note = h("p", { class: "note", "aria-live": "polite" });
   const element = h("div", { class: "depth-bars" }, svg, note);
 
-  /** @param depth `{ scene: [back, front], sharp: [back, front] }` in mm toward the viewer; an end may be null */
-  function show({ scene, sharp }) {
+  /**
+   * @param depth `{ scene: [back, front], sharp: [back, front], strains }` in mm toward the viewer; an end may be null;
+   *   `strains` where two eyes see all depths sharp, and those beyond `sharp` with a strain
+   */
+  function show({ scene, sharp, strains }) {
     const ends = [...scene, ...sharp].filter((value) => value !== null);
     const reach = 1.08 * Math.max(1e-3, ...ends.map(Math.abs));
     const at = (z) => WIDTH / 2 + (Math.max(-reach, Math.min(reach, z ?? Infinity)) / reach) * (WIDTH / 2 - MARGIN);
@@ -34,22 +37,24 @@ export function depthBars() {
       text(at(back), 80, `${Math.abs(back).toFixed(0)} mm`, back < -0.55 * reach ? "start" : "middle"),
       text(at(front), 80, `${Math.abs(front).toFixed(0)} mm`, front > 0.55 * reach ? "end" : "middle"),
     );
-    const words = sentence(scene, [sharpBack, sharpFront]);
+    const words = sentence(scene, [sharpBack, sharpFront], strains);
     note.textContent = words;
     svg.setAttribute("aria-label", `${words} The scene reaches from ${back.toFixed(1)} to ${front.toFixed(1)} mm.`);
   }
   return { element, show };
 }
 
-/** One sentence that says which parts blur. */
-export function sentence([back, front], [sharpBack, sharpFront]) {
+/** One sentence that says which parts blur, or strain the eyes. */
+export function sentence([back, front], [sharpBack, sharpFront], strains) {
   const isBlurredBehind = back < sharpBack - 0.05;
   const isBlurredBefore = front > sharpFront + 0.05;
-  const sharp = `Sharp from ${-sharpBack.toFixed(0)} mm behind to ${sharpFront.toFixed(0)} mm in front.`;
-  if (isBlurredBehind && isBlurredBefore) return `${sharp} The nearest and the farthest parts blur.`;
-  if (isBlurredBehind) return `${sharp} The farthest parts blur.`;
-  if (isBlurredBefore) return `${sharp} The nearest parts blur.`;
-  return "All of the scene is sharp on this display.";
+  const [good, bad] = strains ? ["comfortable", "strain the eyes"] : ["sharp", "blur"];
+  const range = `from ${-sharpBack.toFixed(0)} mm behind to ${sharpFront.toFixed(0)} mm in front.`;
+  const sharp = `${good[0].toUpperCase()}${good.slice(1)} ${range}`;
+  if (isBlurredBehind && isBlurredBefore) return `${sharp} The nearest and the farthest parts ${bad}.`;
+  if (isBlurredBehind) return `${sharp} The farthest parts ${bad}.`;
+  if (isBlurredBefore) return `${sharp} The nearest parts ${bad}.`;
+  return `All of the scene is ${good} on this display.`;
 }
 
 const bar = (from, to, y, height, name) =>
