@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import SRGB_EXPONENT, SRGB_OFFSET, SRGB_SLOPE, SRGB_THRESHOLD, Transfer
-from lippmann.device.types import Array, Bool, FloatOrColor, UInt32
+from lippmann.device.types import Array, Bool, Color3f, FloatOrColor, UInt32
 
 #: A multiple of the lanes of any processor's vectors.
 _PACKET = 64
@@ -131,14 +131,20 @@ class DeviceOps:
 DEVICE = DeviceOps()
 
 
-#: Keeps the power, which is computed for every value, from infinite slopes at 0; far below the curve's straight part.
-_LEAST = 1e-9
-
-
 def encode(linear: FloatOrColor, transfer: Transfer) -> FloatOrColor:
     """Coded values in [0, 1] of linear values, which are clipped to [0, 1]."""
     value = dr.clip(linear, 0, 1)
-    if transfer == "linear":
-        return value
-    curve = (1 + SRGB_OFFSET) * dr.power(dr.maximum(value, _LEAST), 1 / SRGB_EXPONENT) - SRGB_OFFSET
-    return dr.select(value <= SRGB_THRESHOLD, SRGB_SLOPE * value, curve)
+    return value if transfer == "linear" else linear_to_srgb(value)
+
+
+def linear_to_srgb(linear: FloatOrColor) -> FloatOrColor:
+    """sRGB codes of linear values, 0 or more: the curve goes on above 1."""
+    curve = (1 + SRGB_OFFSET) * dr.power(dr.maximum(linear, SRGB_THRESHOLD), 1 / SRGB_EXPONENT) - SRGB_OFFSET
+    return dr.select(linear <= SRGB_THRESHOLD, SRGB_SLOPE * dr.maximum(linear, 0), curve)
+
+
+def srgb_to_linear(code: Color3f) -> Color3f:
+    """The inverse of :func:`linear_to_srgb`."""
+    threshold = SRGB_SLOPE * SRGB_THRESHOLD
+    curve = dr.power((dr.maximum(code, threshold) + SRGB_OFFSET) / (1 + SRGB_OFFSET), SRGB_EXPONENT)
+    return dr.select(code <= threshold, dr.maximum(code, 0) / SRGB_SLOPE, curve)

@@ -70,9 +70,13 @@ class SampleStream:
     half: UInt32 | int = 0
 
     @staticmethod
-    def of_pixels(pixel: UInt32, index: UInt32, seed: UInt32) -> SampleStream:
-        """Streams for linear pixel numbers ``pixel`` and sample numbers ``index`` (UInt32), under one ``seed``."""
-        return SampleStream(hash32(pixel ^ hash32(seed ^ mi.UInt32(0x9E3779B9))), mi.UInt32(index))
+    def of_pixels(pixel: UInt32, index: UInt32, seed: UInt32, half: UInt32 | int = 0) -> SampleStream:
+        """Streams for linear pixel numbers ``pixel`` and sample numbers ``index`` (UInt32), under one ``seed``.
+
+        Samples of the same number in either ``half`` are independent.
+        """
+        own_seed = seed + half * SEED_STEP
+        return SampleStream(hash32(pixel ^ hash32(own_seed ^ mi.UInt32(0x9E3779B9))), mi.UInt32(index), half)
 
     def at(self, index: UInt32) -> SampleStream:
         """The same pixels' points of the samples with the numbers ``index`` (UInt32)."""

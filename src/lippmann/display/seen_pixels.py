@@ -12,7 +12,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.display import NUMPY, Display
+from lippmann.display.array_ops import NUMPY
+from lippmann.display.display import Display
 from lippmann.display.pixel_window import PixelWindow
 
 Vector = tuple[float, float, float]

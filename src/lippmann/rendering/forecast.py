@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.types import Point2f, Ray3f, UInt32
 from lippmann.display import Display
 from lippmann.display.comfort import comfort_in_words
 from lippmann.display.view_cone import cone_in_words, depth_gain_of_fused_cone, view_cone
@@ -243,31 +242,18 @@ class _Found:
 
 
 class _Probe:
-    """Runs of pixels of a source, as a picture of their own."""
-
-    channels: int
+    """Short runs of a picture's pixels."""
 
     def __init__(self, source: DisplayRays | WindowRays, seed: int) -> None:
-        import mitsuba as mi
+        from lippmann.rendering.transport.ray_source import ChosenRays
 
-        self._source = source
-        self.channels = source.channels
         run = min(16, source.width)
         count = max(1, min(1 << 14, source.width * source.height) // run)
         random = np.random.default_rng(seed)
         first = random.integers(0, source.width - run + 1, count)
         columns = first[:, None] + np.arange(run)
-        rows = np.repeat(random.integers(0, source.height, count), run)
-        self.width, self.height = run, count
-        self._columns, self._rows = mi.UInt32(columns.ravel()), mi.UInt32(rows)
-
-    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
-        import drjit as dr
-        import mitsuba as mi
-
-        place = row * self.width + column
-        column, row = (dr.gather(mi.UInt32, values, place) for values in (self._columns, self._rows))
-        return self._source.rays(column, row, channel, jitter)
+        rows = random.integers(0, source.height, count)
+        self._pixels = ChosenRays(source, columns, np.broadcast_to(rows[:, None], columns.shape))
 
     def trace(self, integrator: Integrator, session: Session) -> _Found:
         """Sample the pixels again and again, each time with twice as many samples, until the time is up."""
@@ -277,13 +263,13 @@ class _Probe:
         request, progress = session.request, session.watch.progress
         batches = FullInBatches(
             integrator,
-            self,
+            self._pixels,
             seed=request.seed,
             box_filter=request.box_filter,
             transfer=request.transfer,
             memory=session.memory,
         )
-        pixels = self.width * self.height * self.channels
+        pixels = self._pixels.width * self._pixels.height * self._pixels.channels
         # Twice the same: the first compiles.
         batches.add(STREAMS)
         compiled, samples, spent, last = batches.seconds_compile, STREAMS, 0.0, 0.0
@@ -315,8 +301,8 @@ class _Probe:
         """Share of the pixels whose middle sees a surface that the display does not resolve."""
         from lippmann.rendering.film.aov import plan_layers, trace_layers
 
-        plan = plan_layers(self, session.memory)
-        depth = trace_layers(session.built, self, plan, placement.display_from_world)["depth"]
+        plan = plan_layers(self._pixels, session.memory)
+        depth = trace_layers(session.built, self._pixels, plan, placement.display_from_world)["depth"]
         far, near = placement.resolvable_range
         seen: NDArray[np.bool_] = np.isfinite(depth) & ((depth < far) | (depth > near))
         return float(seen.mean())

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from lippmann.display import Display
+from lippmann.display.box_window import panel_window
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.image import IntegralImage
 from lippmann.optics.lens import lens_notes
 from lippmann.options.choices import REUSING
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.request.plan import resolve
-from lippmann.rendering.request.region_of_interest import even_background, panel_window, scene_corners
+from lippmann.rendering.request.region_of_interest import even_background, scene_corners
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Session, open_session
 from lippmann.runtime.engine_lock import exclusive

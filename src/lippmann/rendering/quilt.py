@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
+from lippmann.display.box_window import view_window
 from lippmann.image import Provenance
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.picture import placed_options
 from lippmann.rendering.request.plan import resolve
-from lippmann.rendering.request.region_of_interest import even_background, scene_corners, view_window
+from lippmann.rendering.request.region_of_interest import even_background, scene_corners
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session
 from lippmann.runtime.engine_lock import exclusive

@@ -11,9 +11,10 @@ import trimesh
 
 import lippmann
 from lippmann.display import Display, LensArray, Panel
+from lippmann.display.box_window import panel_window, view_window
 from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.request import region_of_interest
-from lippmann.rendering.request.region_of_interest import panel_window, scene_corners, view_window
+from lippmann.rendering.request.region_of_interest import scene_corners
 from lippmann.scene.placement import place
 from lippmann.scene.studio_light import BACKDROP
 

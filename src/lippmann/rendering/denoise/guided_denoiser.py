@@ -14,13 +14,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.sobol import named_seed
+from lippmann.display.lens_field import lens_numbers, lens_numbers_in_full_color
 from lippmann.options.choices import Denoiser
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import NETWORK_STEP, Effort, denoise
 from lippmann.rendering.denoise.tuning import TUNING
 from lippmann.rendering.film.feature_buffers import Guides, plan_guides, trace_guides
 from lippmann.rendering.film.wavefront import Coverage
-from lippmann.rendering.sharing.cross_lens import lens_numbers, lens_numbers_in_full_color, share_light
+from lippmann.rendering.sharing.cross_lens import share_light
 from lippmann.rendering.sharing.cross_view import share_views
 from lippmann.rendering.sharing.tuning import TUNING as SHARING
 from lippmann.rendering.transport.ray_source import DisplayRays, OnePicture, QuiltRays, SubpixelRays, WindowRays
@@ -175,7 +177,7 @@ class GuidedDenoiser:
                 self._display_from_world,
                 # Samples of their own: with those of one half of the picture the guides would show its noise, and the
                 # denoised other half would agree with it.
-                seed=(self._seed + 0x85EBCA6B) % 2**32,
+                seed=named_seed("guides", self._seed),
                 box_filter=self._box_filter,
                 progress=self._progress,
             )

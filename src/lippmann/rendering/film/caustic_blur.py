@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide
-from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
+from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream, named_seed
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.rendering.film.memory_model import PREFERRED_LANES
 from lippmann.rendering.film.wavefront import select_colors
@@ -111,10 +111,9 @@ def _products(blur: ShownBlur, source: RaySource, window: PixelWindow, pixels: N
     row, column = divide(pixel, dr.opaque(mi.UInt32, window.width))
     row += dr.opaque(mi.UInt32, window.top)
     column += dr.opaque(mi.UInt32, window.left)
-    stream_seed = dr.opaque(mi.UInt32, seed ^ 0x2545F491) + half * SEED_STEP
     number = pixel_number(source, column, row) * channels + channel
-    stream = SampleStream.of_pixels(number, dr.zeros(mi.UInt32, lanes), stream_seed)
-    stream.half = half
+    own_seed = dr.opaque(mi.UInt32, named_seed("blur of caustics", seed))
+    stream = SampleStream.of_pixels(number, dr.zeros(mi.UInt32, lanes), own_seed, half)
     ray = source.rays(column, row, channel, stream.next_2d(PIXEL_DIMENSION))
     added = np.array(dr.ravel(blur.sample(ray, stream, mi.Bool(True)))).reshape(-1, channels, 2, 3)
     product = np.nan_to_num(added[:, :, 0] * added[:, :, 1], posinf=0.0, neginf=0.0)

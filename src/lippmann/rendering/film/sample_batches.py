@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
 from lippmann.device.kernel_ops import divide, upload
-from lippmann.device.sobol import SEED_STEP, SampleStream
+from lippmann.device.sobol import SampleStream
 from lippmann.device.types import UInt32
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.progress import Progress, ProgressCallback, of_part, silent
@@ -180,10 +180,7 @@ class FullInBatches(BatchedPicture):
         pixel = pixel_number(self._source, column, row)
         sample += dr.gather(mi.UInt32, _table(run.starts), place)
         stream_of = dr.gather(mi.UInt32, _table([batch // per_stream for batch in run.batches]), place)
-        seed = dr.opaque(mi.UInt32, self._seed) + stream_of * SEED_STEP
-
-        stream = SampleStream.of_pixels(pixel * channels + channel, sample, seed)
-        stream.half = stream_of
+        stream = SampleStream.of_pixels(pixel * channels + channel, sample, dr.opaque(mi.UInt32, self._seed), stream_of)
         pixels = PixelRays(self._source, column, row, channel, self._box_filter)
         samples = None if self._covered is None else dr.opaque(mi.Float, together)
         traced = sample_pixels(integrator, pixels, stream, samples)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
-from lippmann.device.types import Float, UInt32
+from lippmann.device.types import Bool, Color3f, Float, Spectrum, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
 from lippmann.rendering.transport.integrator import Integrator, PixelSample
@@ -189,9 +189,8 @@ def sample_pixels(
 
 def evaluate(sample: PixelSample, lanes: int, totals: RayTotals) -> None:
     """Evaluate the light of a wavefront; it is black where it is not finite. ``totals`` grows by the rays it took."""
-    counts, radiance = sample.counts, sample.radiance
-    finite = dr.isfinite(radiance.x) & dr.isfinite(radiance.y) & dr.isfinite(radiance.z)
-    sample.radiance = dr.select(finite, radiance, mi.Color3f(0))
+    counts = sample.counts
+    sample.radiance, finite = finite_or_black(sample.radiance)
     if sample.seen is not None:
         sample.seen = dr.select(finite, sample.seen, mi.Color3f(0))
         sample.excess = dr.select(finite, sample.excess, mi.Color3f(0))
@@ -201,6 +200,12 @@ def evaluate(sample: PixelSample, lanes: int, totals: RayTotals) -> None:
     totals.secondary += lane_total(counts.secondary)
     totals.shadow += lane_total(counts.shadow)
     totals.discarded += lanes - int(dr.count(finite)[0])
+
+
+def finite_or_black(radiance: Spectrum) -> tuple[Color3f, Bool]:
+    """``radiance`` where all of it is finite, else black; and where it is."""
+    finite = dr.isfinite(radiance.x) & dr.isfinite(radiance.y) & dr.isfinite(radiance.z)
+    return dr.select(finite, radiance, mi.Color3f(0)), finite
 
 
 def sum_samples(sample: PixelSample, channels: int, batches: int, count: int) -> dict[str, NDArray[np.float32]]:

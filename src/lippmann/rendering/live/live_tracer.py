@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.frozen_kernel import Frozen, aligned
-from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
+from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
 from lippmann.device.types import Array, Float, Float64, Ray3f, UInt32
 from lippmann.display import Display
 from lippmann.display.seen_pixels import PixelSet
+from lippmann.rendering.film.wavefront import finite_or_black
 from lippmann.rendering.transport.first_surface import Surfaces
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays, opaque_rows, world_ray_by
@@ -106,42 +107,34 @@ class PlacedDisplay:
         self.rotation = rotation_of(matrix)[:3, :3].T.astype(np.float32)
 
 
-class LiveTracer:
-    """Traces pixels of one display in one scene.
+class _PixelTracer:
+    """A kernel over pixels of one display, whose place in the world is an input of it.
 
     Parameters
     ----------
     display:
         The display.
-    integrator:
-        Gathers the light.
+    reads:
+        What the kernel reads, see :class:`~lippmann.device.frozen_kernel.Frozen`.
     subpixels:
         Whether sub-pixels have rays of their own.
     box_filter:
         Whether samples are spread over the pixel, not all at its centre.
     """
 
-    def __init__(self, display: Display, integrator: LiveIntegrator, *, subpixels: bool, box_filter: bool) -> None:
-        self._rays = _Rays(display, subpixels, box_filter)
-        # In a list, that the kernel may read another one's arrays.
-        self._integrator = [integrator]
-        self.kernel = Frozen(self._sample, self._integrator, changes=True)
+    def __init__(self, display: Display, reads: object, *, subpixels: bool, box_filter: bool) -> None:
+        self._source, self._box_filter = DisplayRays(display, np.eye(4), subpixels), box_filter
+        self.kernel = Frozen(self._sample_pixels, reads, changes=True)
         # The first launches change how scenes of several emitters lie on the device.
         for _ in range(_WARMING_LAUNCHES):
-            self.trace(_two_lanes(), PlacedDisplay(np.eye(4)), seed=0)
+            self._launch(_two_lanes(), PlacedDisplay(np.eye(4)), seed=0)
 
-    def trace_by(self, integrator: LiveIntegrator) -> None:
-        """Gather light by another integrator of the same scene and depth."""
-        self._integrator[0] = integrator
+    def _launch(self, lanes: Lanes, placed: PlacedDisplay, *, seed: int) -> list[Floats]:
+        """What :meth:`_sample` gives for each lane."""
+        values = self.kernel(*lanes.arrays, dr.opaque(mi.UInt32, seed), placed.rows, placed.height)
+        return [np.asarray(each) for each in values]
 
-    def trace(self, lanes: Lanes, placed: PlacedDisplay, *, seed: int) -> Samples:
-        """The samples of ``lanes``."""
-        found = self.kernel(*lanes.arrays, dr.opaque(mi.UInt32, seed), placed.rows, placed.height)
-        red, green, blue, height = (np.asarray(values) for values in found)
-        sums = np.stack([lanes.sums(values).T for values in (red, green, blue)], axis=-1)
-        return Samples(sums, lanes.firsts(height))
-
-    def _sample(
+    def _sample_pixels(
         self,
         column: UInt32,
         row: UInt32,
@@ -152,8 +145,37 @@ class LiveTracer:
         rows: Rows,
         height_row: list[Float],
     ) -> tuple[Array, ...]:
-        ray, stream = self._rays.sampled((column, row, channel), stream_of, sample, seed, rows)
-        stream.half = stream_of
+        number = (row * self._source.width + column) * self._source.channels + channel
+        stream = SampleStream.of_pixels(number, sample, seed, stream_of)
+        jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
+        ray = world_ray_by(rows, *self._source.light_rays(column, row, channel, jitter))
+        # All of the lanes' width, also where all lanes see the same.
+        zero = mi.Float(sample) * 0
+        return tuple(mi.Float(part) + zero for part in self._sample(ray, stream, height_row))
+
+    def _sample(self, ray: Ray3f, stream: SampleStream, height_row: list[Float]) -> tuple[Float, ...]:
+        raise NotImplementedError
+
+
+class LiveTracer(_PixelTracer):
+    """Traces radiance and depth of pixels by an ``integrator``."""
+
+    def __init__(self, display: Display, integrator: LiveIntegrator, *, subpixels: bool, box_filter: bool) -> None:
+        # In a list, that the kernel may read another one's arrays.
+        self._integrator = [integrator]
+        super().__init__(display, self._integrator, subpixels=subpixels, box_filter=box_filter)
+
+    def trace_by(self, integrator: LiveIntegrator) -> None:
+        """Gather light by another integrator of the same scene and depth."""
+        self._integrator[0] = integrator
+
+    def trace(self, lanes: Lanes, placed: PlacedDisplay, *, seed: int) -> Samples:
+        """The samples of ``lanes``."""
+        *radiance, height = self._launch(lanes, placed, seed=seed)
+        sums = np.stack([lanes.sums(values).T for values in radiance], axis=-1)
+        return Samples(sums, lanes.firsts(height))
+
+    def _sample(self, ray: Ray3f, stream: SampleStream, height_row: list[Float]) -> tuple[Float, ...]:
         (integrator,) = self._integrator
         if isinstance(integrator, PathIntegrator):
             radiance, _, hit = integrator.sample_with_hit(ray, stream, mi.Bool(True))
@@ -161,71 +183,25 @@ class LiveTracer:
         else:
             radiance, _ = integrator.sample(ray, stream, mi.Bool(True))
             distance = integrator.scene.ray_intersect_preliminary(ray, coherent=True, active=True).t
-        finite = dr.isfinite(radiance.x) & dr.isfinite(radiance.y) & dr.isfinite(radiance.z)
-        radiance = dr.select(finite, radiance, mi.Color3f(0))
+        radiance, _ = finite_or_black(radiance)
         hits = dr.isfinite(distance) & (distance < dr.largest(mi.Float) / 2)
         p = ray(dr.select(hits, distance, 0))
         a, b, c, d = height_row
-        height = dr.select(hits, a * p.x + b * p.y + c * p.z + d, dr.nan)
-        return radiance.x, radiance.y, radiance.z, height
+        return *radiance, dr.select(hits, a * p.x + b * p.y + c * p.z + d, dr.nan)
 
 
-class FeatureTracer:
-    """Traces feature buffers of a denoiser for pixels: albedo and normal of what each sees.
-
-    Parameters
-    ----------
-    display:
-        The display.
-    surfaces:
-        Those of the scene.
-    subpixels, box_filter:
-        As for the picture.
-    """
+class FeatureTracer(_PixelTracer):
+    """Traces feature buffers of a denoiser: albedo and normal of what pixels see of the ``surfaces``."""
 
     def __init__(self, display: Display, surfaces: Surfaces, *, subpixels: bool, box_filter: bool) -> None:
-        self._rays = _Rays(display, subpixels, box_filter)
         self._surfaces = surfaces
-        self.kernel = Frozen(self._features, surfaces, changes=True)
-        for _ in range(_WARMING_LAUNCHES):
-            self.trace(_two_lanes(), PlacedDisplay(np.eye(4)), seed=0)
+        super().__init__(display, surfaces, subpixels=subpixels, box_filter=box_filter)
 
     def trace(self, lanes: Lanes, placed: PlacedDisplay, *, seed: int) -> tuple[Floats, Floats]:
         """Sums of albedo and normal ``(n, 3)`` over the samples of ``lanes``; normals in the display's frame."""
-        found = self.kernel(*lanes.arrays, dr.opaque(mi.UInt32, seed), placed.rows)
-        sums = np.concatenate([lanes.sums(np.asarray(values)) for values in found], axis=1)
+        sums = np.concatenate([lanes.sums(values) for values in self._launch(lanes, placed, seed=seed)], axis=1)
         return sums[:, :3], sums[:, 3:] @ placed.rotation.T
 
-    def _features(
-        self,
-        column: UInt32,
-        row: UInt32,
-        channel: UInt32,
-        stream_of: UInt32,
-        sample: UInt32,
-        seed: UInt32,
-        rows: Rows,
-    ) -> tuple[Array, ...]:
-        ray, _ = self._rays.sampled((column, row, channel), stream_of, sample, seed, rows)
+    def _sample(self, ray: Ray3f, stream: SampleStream, height_row: list[Float]) -> tuple[Float, ...]:
         albedo, normal, _, _ = self._surfaces.features(ray)
-        # Of the lanes' width, also where all lanes see the same.
-        zero = mi.Float(sample) * 0
-        return tuple(mi.Float(part) + zero for part in (*albedo, *normal))
-
-
-class _Rays:
-    """Rays of a display's pixels, whose place in the world is an input."""
-
-    def __init__(self, display: Display, subpixels: bool, box_filter: bool) -> None:
-        self._source = DisplayRays(display, np.eye(4), subpixels)
-        self._box_filter = box_filter
-
-    def sampled(
-        self, pixel: tuple[UInt32, UInt32, UInt32], stream_of: UInt32, sample: UInt32, seed: UInt32, rows: Rows
-    ) -> tuple[Ray3f, SampleStream]:
-        """The ray of a sample of a pixel (column, row, channel), and the random numbers of what follows it."""
-        column, row, channel = pixel
-        number = (row * self._source.width + column) * self._source.channels + channel
-        stream = SampleStream.of_pixels(number, sample, seed + stream_of * SEED_STEP)
-        jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
-        return world_ray_by(rows, *self._source.light_rays(column, row, channel, jitter)), stream
+        return *albedo, *normal

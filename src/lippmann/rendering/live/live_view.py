@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.seen_pixels import PixelSet
 from lippmann.errors import UsageError
 from lippmann.options.light import LightOptions
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.scene.matrices import rotation_of
 from lippmann.scene.placement import Placement
+
+if TYPE_CHECKING:
+    from lippmann.rendering.live.live_tracer import PlacedDisplay
+    from lippmann.rendering.live.scene_kernels import SceneKernels
 
 Vector = tuple[float, float, float]
 
@@ -84,3 +92,25 @@ class LiveFrame:
     placement: Placement
     exposure: float
     seconds: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedView:
+    """A view with the display's place in the scene, and what is traced for it."""
+
+    kernels: SceneKernels
+    display: Display
+    view: LiveView
+    request: RenderRequest
+    placement: Placement
+    placed: PlacedDisplay
+    pixels: PixelSet
+
+    def light_up(self, exposure: float) -> None:
+        """Give the scene the light and the exposure of this view, if another one was traced meanwhile."""
+        if self.kernels.lit_for is self:
+            return
+        self.kernels.light(self.view.light, rotation_of(self.placement.world_from_display))
+        whole = replace(self.placement, exposure=0.0)  # that of the camera is in it
+        self.kernels.expose(self.display, replace(self.request, exposure=exposure), whole, measure=False)
+        self.kernels.lit_for = self

@@ -8,27 +8,20 @@ the denoiser made of the other: where that is wrong, the samples themselves are 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.display import Display
-from lippmann.display.seen_pixels import PixelSet
+from lippmann.device.sobol import named_seed
 from lippmann.rendering.denoise.noisy_blend import weigh_samples
 from lippmann.rendering.denoise.oidn import denoise
 from lippmann.rendering.film.batched_picture import STREAMS
 from lippmann.rendering.live.develop import develop, develop_picture
-from lippmann.rendering.live.live_tracer import Lanes, PlacedDisplay
-from lippmann.rendering.live.live_view import LiveFrame, LiveView
-from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.live.live_tracer import Lanes
+from lippmann.rendering.live.live_view import LiveFrame, PlacedView
 from lippmann.runtime import machine
 from lippmann.runtime.engine_lock import exclusive
-from lippmann.scene.placement import Placement
-
-if TYPE_CHECKING:
-    from lippmann.rendering.live.scene_kernels import SceneKernels
 
 Floats = NDArray[np.float32]
 
@@ -41,25 +34,12 @@ _FEATURE_SAMPLES, _JUDGED_FROM = 8, 8
 
 
 class Progressive:
-    """The growing picture of one view. ``light_up`` gives the scene its light again, which other views may change."""
+    """The growing picture of one view."""
 
-    def __init__(
-        self,
-        view: LiveView,
-        kernels: SceneKernels,
-        display: Display,
-        request: RenderRequest,
-        placement: Placement,
-        placed: PlacedDisplay,
-        pixels: PixelSet,
-        exposure: float,
-        light_up: Callable[[], None],
-    ) -> None:
-        self.view = view
-        self._light_up = light_up
-        self._kernels, self._display, self._request = kernels, display, request
-        self._placement, self._placed, self._pixels, self._exposure = placement, placed, pixels, exposure
-        self._count = len(pixels.column)
+    def __init__(self, view: PlacedView, exposure: float) -> None:
+        self._view, self._exposure = view, exposure
+        self._kernels, self._pixels = view.kernels, view.pixels
+        self._count = len(view.pixels.column)
         self._sums = np.zeros((STREAMS, self._count, 3), np.float32)
         #: Samples that all pixels have in each stream; how many pixels have the coming ones already, and how many these
         #: are.
@@ -69,7 +49,7 @@ class Progressive:
         self._task: Iterator[Floats | None] | None = None
         #: Lanes of the next step in each stream.
         self._next = min(self._count, self._most)
-        self._denoises = view.eye is not None and request.box_filter and machine.has_denoiser()
+        self._denoises = view.view.eye is not None and view.request.box_filter and machine.has_denoiser()
 
     @property
     def samples(self) -> int:
@@ -83,7 +63,7 @@ class Progressive:
     @exclusive()
     def step(self, seconds: dict[str, float]) -> LiveFrame | None:
         """One step of work; the picture if it changed."""
-        self._light_up()
+        self._view.light_up(self._exposure)
         if self._task is not None:
             return self._denoise(seconds)
         if self.samples >= _MOST_SAMPLES:
@@ -93,7 +73,7 @@ class Progressive:
             return None
         if not self._denoises:
             mean = np.asarray(self._sums.sum(axis=0) / self.samples, np.float32)
-            return self._frame(develop(mean, self._pixels, self._request), seconds, is_denoised=False)
+            return self._frame(develop(mean, self._pixels, self._view.request), seconds, is_denoised=False)
         # The noise is taken out anew each time that there are 1.7 times the samples.
         return self._denoise(seconds) if self.samples >= 1.7 * self._denoised_at else None
 
@@ -104,8 +84,8 @@ class Progressive:
             self._coming = max(1, self._next // self._count)
         last = min(self._begun + max(1, self._next // self._coming), self._count)
         lanes = Lanes(self._pixels, slice(self._begun, last), STREAMS, self._coming, self._taken)
-        tracer = self._kernels.tracer(self._display, self._request)
-        self._sums[:, lanes.part] += tracer.trace(lanes, self._placed, seed=self._request.seed).sums
+        tracer = self._kernels.tracer(self._view.display, self._view.request)
+        self._sums[:, lanes.part] += tracer.trace(lanes, self._view.placed, seed=self._view.request.seed).sums
         count = (last - self._begun) * self._coming
         self._begun = last % self._count
         if not self._begun:
@@ -118,12 +98,12 @@ class Progressive:
 
     def _trace_features(self, seconds: dict[str, float]) -> None:
         started = time.perf_counter()
-        tracer = self._kernels.feature_tracer(self._display, self._request)
+        tracer = self._kernels.feature_tracer(self._view.display, self._view.request)
         albedo, normal = np.empty((2, self._count, 3), np.float32)
-        step = self._kernels.most_lanes // _FEATURE_SAMPLES
+        step, seed = self._kernels.most_lanes // _FEATURE_SAMPLES, named_seed("guides", self._view.request.seed)
         for start in range(0, self._count, step):
             lanes = Lanes(self._pixels, slice(start, start + step), samples=_FEATURE_SAMPLES)
-            albedo[lanes.part], normal[lanes.part] = tracer.trace(lanes, self._placed, seed=self._request.seed + 1)
+            albedo[lanes.part], normal[lanes.part] = tracer.trace(lanes, self._view.placed, seed=seed)
         self._features = albedo / np.float32(_FEATURE_SAMPLES), normal / np.float32(_FEATURE_SAMPLES)
         seconds["features"] = time.perf_counter() - started
 
@@ -149,11 +129,11 @@ class Progressive:
 
     def _developed(self, picture: Floats) -> NDArray[np.uint8]:
         if self._pixels.blocks is None:
-            return develop_picture(picture, self._pixels, self._request)
-        return develop(self._pixels.values_of_lenses(picture), self._pixels, self._request)
+            return develop_picture(picture, self._pixels, self._view.request)
+        return develop(self._pixels.values_of_lenses(picture), self._pixels, self._view.request)
 
     def _frame(self, pixels: NDArray[np.uint8], seconds: dict[str, float], *, is_denoised: bool) -> LiveFrame:
-        return LiveFrame(pixels, self.samples, is_denoised, self._placement, self._exposure, seconds)
+        return LiveFrame(pixels, self.samples, is_denoised, self._view.placement, self._exposure, seconds)
 
 
 def _denoised(

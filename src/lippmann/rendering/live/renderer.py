@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -13,22 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.display.seen_pixels import EyeMap, PixelSet, window_pixels
+from lippmann.display.seen_pixels import EyeMap, window_pixels
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.choices import POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.live.develop import develop
-from lippmann.rendering.live.live_view import LiveFrame, LiveView
+from lippmann.rendering.live.live_view import LiveFrame, LiveView, PlacedView
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.matrices import rotation_of
-from lippmann.scene.placement import Placement
 from lippmann.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from lippmann.rendering.live.live_tracer import PlacedDisplay
     from lippmann.rendering.live.progressive import Progressive
     from lippmann.rendering.live.scene_kernels import SceneKernels
 
@@ -36,28 +34,6 @@ Floats = NDArray[np.float32]
 
 #: Lanes of a step of a frame: on two cores about as long as a whole frame of an eye, so that such frames come between.
 STEP_LANES = 1 << 18
-
-
-@dataclass(frozen=True, eq=False)
-class _Stand:
-    """Where the display stands in a view, and how the view is traced."""
-
-    kernels: SceneKernels
-    display: Display
-    view: LiveView
-    request: RenderRequest
-    placement: Placement
-    placed: PlacedDisplay
-    pixels: PixelSet
-
-    def light_up(self, exposure: float) -> None:
-        """Give the scene the light and the exposure of this view, if another one was traced meanwhile."""
-        if self.kernels.lit_for is self:
-            return
-        self.kernels.light(self.view.light, rotation_of(self.placement.world_from_display))
-        whole = replace(self.placement, exposure=0.0)  # that of the camera is in it
-        self.kernels.expose(self.display, replace(self.request, exposure=exposure), whole, measure=False)
-        self.kernels.lit_for = self
 
 
 class LiveRenderer:
@@ -97,7 +73,7 @@ class LiveRenderer:
         self._map = lru_cache(4)(EyeMap)
         self._seen = lru_cache(4)(lambda map, eye: map.seen_by(eye))
         self._window = lru_cache(2)(window_pixels)
-        self._shown: _Stand | None = None
+        self._shown: PlacedView | None = None
         self._height: Floats = np.zeros(0, np.float32)
         self.set_scene(scene)
 
@@ -195,17 +171,7 @@ class LiveRenderer:
 
         stand = self._stand(kernels, display, view, _resting(view.request), {})
         exposure = kernels.expose(display, stand.request, stand.placement, measure=True)
-        return Progressive(
-            view,
-            kernels,
-            display,
-            stand.request,
-            stand.placement,
-            stand.placed,
-            stand.pixels,
-            exposure,
-            lambda: stand.light_up(exposure),
-        )
+        return Progressive(stand, exposure)
 
     @exclusive()
     def heights(self, view: LiveView) -> Floats:
@@ -271,7 +237,7 @@ class LiveRenderer:
         view: LiveView,
         request: RenderRequest,
         seconds: dict[str, float],
-    ) -> _Stand:
+    ) -> PlacedView:
         from lippmann.rendering.live.live_tracer import PlacedDisplay
 
         if not kernels.can_light(view.light):
@@ -289,7 +255,7 @@ class LiveRenderer:
                 pixels = self._window(display, view.window, subpixels=subpixels, row_step=view.row_step)
             else:
                 pixels = self._seen(self._map(display, view.size, subpixels=subpixels), view.eye)
-        stand = _Stand(kernels, display, view, resolved, placement, placed, pixels)
+        stand = PlacedView(kernels, display, view, resolved, placement, placed, pixels)
         kernels.lit_for = stand
         return stand
 

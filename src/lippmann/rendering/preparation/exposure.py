@@ -9,18 +9,15 @@ from __future__ import annotations
 
 import math
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.primaries import REC709, xyz_from_rgb
-from lippmann.device.types import Point2f, Ray3f, UInt32
 from lippmann.rendering.film.wavefront import trace_frame
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.transport.integrator import Integrator
-from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.rendering.transport.ray_source import ChosenRays, RaySource
 from lippmann.scene.values.description import Color
 
 
@@ -45,7 +42,12 @@ def measure_exposure(
     memory, seed:
         Bytes that this may take, and the picture's seed.
     """
-    few = ScatteredRays(source, TUNING.exposure_side)
+    columns, rows = (
+        (2 * np.arange(count) + 1) * length // (2 * count)
+        for length in (source.width, source.height)
+        for count in [min(TUNING.exposure_side, length)]
+    )
+    few = ChosenRays(source, *np.meshgrid(columns, rows))
     plan = cut_wavefronts(few.width, few.height, TUNING.exposure_samples, channels=few.channels, memory=memory)
     return exposure_for(trace_frame(integrator, few, plan, seed=seed, box_filter=True).pixels, background)
 
@@ -71,23 +73,3 @@ def _sums_of_blocks(values: NDArray[np.generic]) -> NDArray[np.float64]:
     for axis in (0, 1):
         values = np.add.reduceat(values, np.arange(0, values.shape[axis], TUNING.exposure_block), axis, np.float64)
     return np.asarray(values, dtype=np.float64)
-
-
-class ScatteredRays:
-    """At most ``side`` pixels along each side of the picture that ``source`` has rays for."""
-
-    def __init__(self, source: RaySource, side: int) -> None:
-        self._source = source
-        self.channels = source.channels
-        self.width, self.height = min(side, source.width), min(side, source.height)
-        self._columns, self._rows = (
-            mi.UInt32((2 * np.arange(count) + 1) * length // (2 * count))
-            for count, length in ((self.width, source.width), (self.height, source.height))
-        )
-
-    def in_picture(self, column: UInt32, row: UInt32) -> tuple[UInt32, UInt32]:
-        """Column and row of pixels in the whole picture."""
-        return dr.gather(mi.UInt32, self._columns, column), dr.gather(mi.UInt32, self._rows, row)
-
-    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
-        return self._source.rays(*self.in_picture(column, row), channel, jitter)

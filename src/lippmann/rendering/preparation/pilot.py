@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide
-from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
+from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream, named_seed
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, Float, MitsubaScene, Point2f, Point3f, Ray3f, UInt32
 from lippmann.rendering.preparation.tuning import TUNING
@@ -30,8 +30,6 @@ from lippmann.rendering.transport.sharp_events import sharp_lobe
 
 #: Dimensions of the sample stream at one surface.
 DIMENSIONS_PER_SURFACE = 4
-#: Seed of the pilot paths: the picture's own would make its preparation depend on it.
-_SEED = 0x6C616D70
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +98,7 @@ def brightest_seen_light(integrator: PathIntegrator, source: RaySource) -> float
 
 def _place_of(path: UInt32, source: RaySource) -> tuple[SampleStream, UInt32, UInt32, Point2f]:
     """Samples of each path by its number; column and row of its pixel, and its place in it."""
-    stream = SampleStream.of_pixels(mi.UInt32(0), path, dr.opaque(mi.UInt32, _SEED))
+    stream = SampleStream.of_pixels(mi.UInt32(0), path, dr.opaque(mi.UInt32, named_seed("pilot")))
     place = stream.next_2d(PIXEL_DIMENSION)
     x, y = place.x * dr.opaque(mi.Float, source.width), place.y * dr.opaque(mi.Float, source.height)
     column, row = mi.UInt32(x), mi.UInt32(y)

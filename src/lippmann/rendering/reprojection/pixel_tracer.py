@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from lippmann.device.frozen_kernel import Frozen, aligned
 from lippmann.device.kernel_ops import divide
-from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
+from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Array, Float, Ray3f, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.batched_picture import STREAMS
-from lippmann.rendering.film.wavefront import RayTotals, compile_seconds
+from lippmann.rendering.film.wavefront import RayTotals, compile_seconds, finite_or_black
 from lippmann.rendering.reprojection.point_image import BACKGROUND, TRACED, BoolArray, IntArray, PointImage, RealArray
 from lippmann.rendering.reprojection.rules import alike, nearer
 from lippmann.rendering.reprojection.tuning import TUNING
 from lippmann.rendering.transport.integrator import ReusableIntegrator
-from lippmann.rendering.transport.ray_source import DisplayRays
+from lippmann.rendering.transport.ray_source import DisplayRays, PixelRays
 from lippmann.runtime.numba_jit import uncounted
 from lippmann.runtime.row_threads import Bands
 
@@ -97,12 +97,10 @@ class PixelTracer:
     def _sample(self, pixel: UInt32, sample: UInt32, seed: UInt32) -> tuple[Array, ...]:
         row, column = divide(pixel, self._source.width)
         number, of_stream = divide(sample, STREAMS)
-        stream = SampleStream.of_pixels(pixel, number, seed + of_stream * SEED_STEP)
-        jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
-        ray = self._source.rays(column, row, mi.UInt32(0), jitter)
+        stream = SampleStream.of_pixels(pixel, number, seed, of_stream)
+        ray = PixelRays(self._source, column, row, mi.UInt32(0), self._box_filter).ray(stream)
         radiance, counts, first = self._integrator.sample_with_hit(ray, stream, mi.Bool(True))
-        finite = dr.isfinite(radiance.x) & dr.isfinite(radiance.y) & dr.isfinite(radiance.z)
-        radiance = dr.select(finite, radiance, mi.Color3f(0))
+        radiance, finite = finite_or_black(radiance)
         one, none = mi.UInt32(1), mi.UInt32(0)
         return (
             radiance,

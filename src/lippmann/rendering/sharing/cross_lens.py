@@ -25,7 +25,7 @@ from lippmann.device.kernel_ops import divide
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Array, UInt32
 from lippmann.display import Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.lens_field import lens_centers, lens_numbers
 from lippmann.rendering.sharing.device_pixels import light_of_pixels, upload
 from lippmann.rendering.sharing.tuning import TUNING
 
@@ -56,8 +56,9 @@ def share_light(
     stop:
         Weight of a squared relative difference of light: the less noise is left, the larger it may be.
     lenses:
-        From :func:`lens_numbers`: of a window, or of sub-pixels that show one colour each; those of sub-pixels in full
-        colour from :func:`lens_numbers_in_full_color`. None for whole pixels of the whole panel.
+        From :func:`~lippmann.display.lens_field.lens_numbers`: of a window, or of sub-pixels that show one colour each;
+        those of sub-pixels in full colour from :func:`~lippmann.display.lens_field.lens_numbers_in_full_color`. None
+        for whole pixels of the whole panel.
     columns:
         How many make a pixel: 3 of sub-pixels in full colour.
 
@@ -71,7 +72,7 @@ def share_light(
     shared = np.empty_like(light)
     is_lenticular = display.lens_array.layout == "lenticular"
     reach = (TUNING.reach, 0 if is_lenticular else TUNING.reach)
-    centers = _lens_centers(display) * (columns, 1)
+    centers = lens_centers(display) * (columns, 1)
     if lenses is None:
         lenses = lens_numbers(display)
     groups = [slice(0, 3)] if len(lenses) == 1 else [slice(c, c + 1) for c in range(3)]
@@ -79,41 +80,6 @@ def share_light(
         picture = _Picture(light[..., group], guides.normal, guides.height, lens, centers, display.gap, reach, stop)
         shared[..., group] = light_of_pixels(picture.mean_light, light[..., group].shape)
     return np.asarray(shared * albedo, dtype=np.float32)
-
-
-def lens_numbers(display: Display, window: PixelWindow | None = None, *, subpixels: bool = False) -> NDArray[np.int32]:
-    """``(1, H, W)`` number of the lens of every pixel, lenses counted row by row; ``(3, H, W)`` of every sub-pixel."""
-    panel, grid = display.panel, display.lens_grid
-    window = window or PixelWindow(0, 0, panel.width, panel.height)
-    result = np.empty((3 if subpixels else 1, *window.shape), dtype=np.int32)
-    for first in range(0, window.height, 64):
-        last = min(first + 64, window.height)
-        band = slice(window.top + first, window.top + last)
-        v, u = (index + 0.5 for index in np.mgrid[band, window.columns].astype(np.float64))
-        for channel, part in enumerate(result):
-            x, y = display.subpixel_point(u, v, np.full_like(u, channel)) if subpixels else display.panel_point(u, v)
-            i, j = display.lens_of(x, y)
-            i, j = np.clip(i, 0, grid.columns - 1), np.clip(j, 0, grid.rows - 1)
-            part[first:last] = j * grid.columns + i
-    return result
-
-
-def lens_numbers_in_full_color(display: Display, window: PixelWindow | None = None) -> NDArray[np.int32]:
-    """``(1, H, 3 W)``: :func:`lens_numbers` of the sub-pixels, in their order from left to right."""
-    numbers = lens_numbers(display, window, subpixels=True)[list(display.panel.subpixel_order)]
-    return np.ascontiguousarray(np.moveaxis(numbers, 0, 2)).reshape(1, numbers.shape[1], -1)
-
-
-def _lens_centers(display: Display) -> NDArray[np.float64]:
-    """``(rows, columns, 2)`` places of the lenses in the lens plane, in pixels to the right and downwards."""
-    grid, pitch = display.lens_grid, display.panel.pixel_pitch
-    j, i = (index.astype(np.float64) for index in np.indices((grid.rows, grid.columns)))
-    x, y = display.lens_center(i, j, 0 * i, 0 * j)
-    if display.lens_array.layout == "lenticular":
-        # The foot of the axis, so that neighbours lie straight across from each other.
-        lattice = display.lattice
-        x, y = lattice.from_axes(lattice.across(x, y), 0 * i)
-    return np.ascontiguousarray(np.stack([x, -y], axis=-1) / pitch)
 
 
 class _Picture:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import upload
+from lippmann.device.pbr.even_points import PointOf, evenly, no_point
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, EmitterPtr, Float, MitsubaScene, Point3f, SurfaceInteraction3f, Vector3f
-from lippmann.rendering.transport.casters import PointOf, evenly, no_point
 from lippmann.rendering.transport.light_sampling import LightSampler, by_registry, registry_numbers
 from lippmann.rendering.transport.sharp_events import facing_normal, lambertian
 
@@ -63,7 +63,6 @@ class EmitterRays:
         Of next-event estimation in it.
     """
 
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(self, scene: MitsubaScene, sampler: LightSampler) -> None:
         self._scene = scene
         self._sampler = sampler

@@ -145,7 +145,6 @@ class PhysicalSurfaces:
         crossings = mi.UInt32(0)
         active = pi.is_valid()
         o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
-        # The direction is no state: else Dr.Jit would record the loop a second time, without it.
         while dr.hint(active, label="null surfaces", exclude=[d]):
             toward = mi.Ray3f(o, d)
             si = pi.compute_surface_interaction(toward, mi.RayFlags.All)
@@ -170,7 +169,6 @@ class PhysicalSurfaces:
         steps = mi.UInt32(0)  # specular surfaces so far
         pi = self._scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         covered = mi.Bool(pi.is_valid())
-        # Rays are told by origin and direction: else Dr.Jit would record the loop a second time, without their time.
         while dr.hint(active, label="to the first rough surface"):
             toward = mi.Ray3f(o, d)
             si = pi.compute_surface_interaction(toward, mi.RayFlags.All)

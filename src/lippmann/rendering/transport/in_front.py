@@ -14,8 +14,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import SRGB_EXPONENT, SRGB_OFFSET, SRGB_SLOPE, SRGB_THRESHOLD
-from lippmann.device.kernel_ops import upload
+from lippmann.device.kernel_ops import linear_to_srgb, srgb_to_linear, upload
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, Color3f, Float, Point3f, Ray3f, Spectrum
 from lippmann.rendering.transport.first_surface import PhysicalSurfaces
@@ -117,19 +116,6 @@ def _rows(value: Point3f, lanes: int) -> Floats:
     """``(lanes,)`` or ``(lanes, 3)`` float32 of an evaluated array; one of a single entry counts for every lane."""
     array = np.asarray(value, dtype=np.float32).T
     return np.ascontiguousarray(np.broadcast_to(array, (lanes, *array.shape[1:])))
-
-
-def linear_to_srgb(linear: Color3f) -> Color3f:
-    """sRGB codes of linear values, 0 or more: the curve goes on above 1."""
-    curve = (1 + SRGB_OFFSET) * dr.power(dr.maximum(linear, SRGB_THRESHOLD), 1 / SRGB_EXPONENT) - SRGB_OFFSET
-    return dr.select(linear <= SRGB_THRESHOLD, SRGB_SLOPE * dr.maximum(linear, 0), curve)
-
-
-def srgb_to_linear(code: Color3f) -> Color3f:
-    """The inverse of :func:`linear_to_srgb`."""
-    threshold = SRGB_SLOPE * SRGB_THRESHOLD
-    curve = dr.power((dr.maximum(code, threshold) + SRGB_OFFSET) / (1 + SRGB_OFFSET), SRGB_EXPONENT)
-    return dr.select(code <= threshold, dr.maximum(code, 0) / SRGB_SLOPE, curve)
 
 
 def toward_light(frame_from_world: Numbers) -> Numbers:

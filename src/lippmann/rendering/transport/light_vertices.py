@@ -16,6 +16,8 @@ the density of light vertices per area over that of the path's own points there,
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -45,8 +47,9 @@ from lippmann.rendering.transport.tuning import TUNING
 Floats = NDArray[np.float32]
 
 
+@dataclass
 class JointLight:
-    """Light of a point that light vertices bring, too.
+    """Light of a point that light vertices bring, too; state of the path loop.
 
     Attributes
     ----------
@@ -57,16 +60,11 @@ class JointLight:
         geometric normal and the way to the emitter; 0 where light vertices bring nothing.
     cosine:
         The same of the shading normal.
-    half:
-        Of the picture.
     """
 
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
-    def __init__(self, share: Spectrum, reach: Float, cosine: Float, half: UInt32) -> None:
-        self.share = share
-        self.reach = reach
-        self.cosine = cosine
-        self.half = half
+    share: Spectrum
+    reach: Float
+    cosine: Float
 
 
 class Arrival:
@@ -84,7 +82,6 @@ class Arrival:
         Of the picture.
     """
 
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(self, vertices: LightVertices, albedo: Color3f, reach: Float, half: UInt32) -> None:
         self.vertices = vertices
         self.albedo = albedo
@@ -94,7 +91,7 @@ class Arrival:
     def joint(self, si: SurfaceInteraction3f, scattered: Color3f, wo: Vector3f, direction: Vector3f) -> JointLight:
         """Of what the surface scatters from ``wo``, ``direction`` in the world: the BSDF times the cosine."""
         share = lambertian_share(si, self.albedo, scattered, wo)
-        return JointLight(share, self.reach * dr.abs(dr.dot(si.n, direction)), dr.abs(wo.z), self.half)
+        return JointLight(share, self.reach * dr.abs(dr.dot(si.n, direction)), dr.abs(wo.z))
 
     def weigh(
         self,
@@ -114,7 +111,7 @@ class Arrival:
         joint = self.joint(si, mi.Color3f(scattered), si.to_local(ds.d), ds.d)
         joint.reach = dr.select(is_direct, joint.reach, 0)
         scattered_pdf = dr.select(ds.delta, 0, joint.cosine * dr.inv_pi)
-        return self.vertices.weight(joint, ds, plain, pdf, scattered_pdf, active)
+        return self.vertices.weight(joint, ds, plain, pdf, scattered_pdf, self.half, active)
 
 
 def reach_of(si: SurfaceInteraction3f, bsdf: BSDFPtr, d: Vector3f, pdf: Float, active: Bool) -> Float:
@@ -142,7 +139,6 @@ class LightVertices:
         See :meth:`~lippmann.rendering.transport.emitter_rays.EmitterRays.densities`.
     """
 
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(
         self, scene: MitsubaScene, halves: tuple[LitPoints, LitPoints], rays: int, densities: NDArray[np.float32]
     ) -> None:
@@ -168,9 +164,16 @@ class LightVertices:
         self._place, self._normal, self._shading, self._glow = (upload(table[:, k : k + 4]) for k in (0, 4, 8, 12))
 
     def weight(
-        self, joint: JointLight, ds: DirectionSample3f, plain: Float, own: Float, other: Float, active: Bool
+        self,
+        joint: JointLight,
+        ds: DirectionSample3f,
+        plain: Float,
+        own: Float,
+        other: Float,
+        half: UInt32,
+        active: Bool,
     ) -> Spectrum:
-        """MIS weight of light from ``ds`` that a path found with pdf ``own``.
+        """MIS weight of light from ``ds`` that a path found with pdf ``own``, in a sample of the ``half``.
 
         Parameters
         ----------
@@ -181,7 +184,7 @@ class LightVertices:
         other:
             Pdf of the other of emitter sampling and scattering; both per steradian at the point, see the module.
         """
-        reach = joint.reach * self._densities_at(ds, joint.half, active)
+        reach = joint.reach * self._densities_at(ds, half, active)
         return plain + dr.select(reach > 0, joint.share * (mis_weight(own, other, reach) - plain), 0)
 
     def _densities_at(self, ds: DirectionSample3f, half: UInt32, active: Bool) -> Float:

@@ -76,7 +76,6 @@ class PathIntegrator:
         Those of another integrator of the scene; None to make them.
     """
 
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(
         self,
         scene: MitsubaScene,
@@ -136,8 +135,6 @@ class PathIntegrator:
         context = mi.BSDFContext()
         techniques = self._techniques_without_seen if without_seen else self._techniques
 
-        # What does not change is no state, and rays are told by origin and direction: else Dr.Jit would record loops a
-        # second time, without what is the same in all turns.
         o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)  # current ray
         active = mi.Bool(active)
         radiance = mi.Spectrum(0)

@@ -46,7 +46,6 @@ class Technique:
 
     reads: tuple[str, ...] = ()
 
-    # Not a dataclass, nor are those below: Dr.Jit would take them for loop state and write their fields.
     def begin(self) -> Any:
         """State of a path that begins at the eye."""
         return ()
@@ -217,14 +216,11 @@ class SeenLightApart(Technique):
 class _Joint:
     """State of :class:`LightVertexJoins`.
 
-    ``departure``: pdf of the way here from a vertex that was joined; 0 from others. The rest is that of a
-    :class:`~.light_vertices.JointLight`.
+    ``departure``: pdf of the way here from a vertex that was joined; 0 from others. ``light``: what is met on this way.
     """
 
     departure: Float
-    share: Spectrum
-    reach: Float
-    cosine: Float
+    light: JointLight
 
 
 class LightVertexJoins(Technique):
@@ -248,13 +244,13 @@ class LightVertexJoins(Technique):
     reads = ("albedo",)
 
     def begin(self) -> _Joint:
-        return _Joint(mi.Float(0), mi.Spectrum(0), mi.Float(0), mi.Float(0))
+        return _Joint(mi.Float(0), JointLight(mi.Spectrum(0), mi.Float(0), mi.Float(0)))
 
     def weigh_emission(
         self, state: _Joint, half: UInt32, ds: DirectionSample3f, weight: Float, emitter_pdf: Float, active: Bool
     ) -> Spectrum:
-        joint = JointLight(state.share, state.reach, state.cosine, half)
-        return self._vertices.weight(joint, ds, weight, joint.cosine * dr.inv_pi, emitter_pdf, active)
+        scattered_pdf = state.light.cosine * dr.inv_pi
+        return self._vertices.weight(state.light, ds, weight, scattered_pdf, emitter_pdf, half, active)
 
     def arrive(self, state: _Joint, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
         vertex.arrival = self._arrival(state, vertex)
@@ -280,7 +276,8 @@ class LightVertexJoins(Technique):
         departs = self._joins(vertex) & ~passes & ~mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
         if self._has_absorption:
             departs &= bs.wo.z * vertex.si.wi.z > 0
-        return _Joint(dr.select(departs, bs.pdf, 0), joint.share, dr.select(passes, 0, joint.reach), joint.cosine)
+        joint.reach = dr.select(passes, 0, joint.reach)
+        return _Joint(dr.select(departs, bs.pdf, 0), joint)
 
 
 class Techniques:

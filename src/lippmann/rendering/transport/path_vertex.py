@@ -1,7 +1,4 @@
-"""Vertices of a path, as its loop and its techniques see them.
-
-No class here but :class:`LastVertex` is a dataclass: Dr.Jit would take it for loop state and write its fields.
-"""
+"""Vertices of a path, as its loop and its techniques see them."""
 
 from __future__ import annotations
 

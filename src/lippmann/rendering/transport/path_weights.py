@@ -45,7 +45,6 @@ def first_emitter_samples(sample: UInt32) -> tuple[UInt32, UInt32]:
 class Clamp:
     """Limit on what indirect light brings at once; None for no limit."""
 
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(self, most: Float | None) -> None:
         self._most = most
 

@@ -103,7 +103,6 @@ class Gathered:
         an unbiased estimate of the sum over all photons.
     """
 
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(self, irradiance: Color3f, toward: Vector3f, flux: Color3f) -> None:
         self.irradiance = irradiance
         self.toward = toward
@@ -121,7 +120,6 @@ class PhotonMap:
         Of a look-up, in world units.
     """
 
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(self, halves: tuple[Photons, Photons], radius: float) -> None:
         self.radius = radius
         self.halves = halves
@@ -214,7 +212,6 @@ class PhotonMap:
         first = mi.UInt32(part)
         first_bucket = half * (self._last_bucket + 2)
         looking = active & self.may_reach(p, active)
-        # What does not change is no state: else Dr.Jit would record the loops a second time, without it.
         while dr.hint(
             looking,
             label="cells",

@@ -137,7 +137,6 @@ class PhotonShooter:
         power, active = mi.Color3f(power), mi.Bool(active)
         events, turn = mi.UInt32(0), mi.UInt32(0)
         absorption = mi.Color3f(0) if features.has_absorption else None
-        # What does not change is no state: else Dr.Jit would record the loop a second time, without it.
         while dr.hint(active, label="photon events", exclude=[scene, features, stream, landed, surfaces]):
             si = scene.ray_intersect(mi.Ray3f(o, d), mi.RayFlags.All, False, active)
             active &= si.is_valid()
@@ -192,7 +191,6 @@ def _absorbed(power: Color3f, absorption: Color3f | None, si: SurfaceInteraction
 class _Landed:
     """Photons of one kernel: at most one of each lane at each surface."""
 
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(self, lanes: int, surfaces: int) -> None:
         self._lanes = lanes
         self._number = dr.opaque(mi.UInt32, lanes)

@@ -66,7 +66,6 @@ class PixelRays:
         Samples are spread over the pixel; else all go through its centre.
     """
 
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(
         self, source: RaySource, column: UInt32, row: UInt32, channel: UInt32, box_filter: bool = True
     ) -> None:
@@ -146,8 +145,34 @@ class WindowRays(OnePicture):
         return (row + self._top) * self._source.width + (column + self._left)
 
 
-class SinglePixelRays(OnePicture):
-    """Rays of single (sub-)pixels of a display, one beside the other, with the random numbers of the whole picture.
+class ChosenRays(OnePicture):
+    """Rays of chosen pixels of a picture, as a picture of their own with its own random numbers.
+
+    Parameters
+    ----------
+    source:
+        The whole picture.
+    columns, rows:
+        ``(height, width)``: which pixel stands at each place.
+    """
+
+    def __init__(self, source: RaySource, columns: NDArray[np.integer], rows: NDArray[np.integer]) -> None:
+        self.height, self.width = columns.shape
+        self.channels = source.channels
+        self._source = source
+        self._columns, self._rows = (mi.UInt32(np.asarray(values.ravel(), np.uint32)) for values in (columns, rows))
+
+    def in_picture(self, column: UInt32, row: UInt32) -> tuple[UInt32, UInt32]:
+        """Column and row of pixels in the whole picture."""
+        place = row * self.width + column
+        return dr.gather(mi.UInt32, self._columns, place), dr.gather(mi.UInt32, self._rows, place)
+
+    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
+        return self._source.rays(*self.in_picture(column, row), channel, jitter)
+
+
+class SinglePixelRays(ChosenRays):
+    """Rays of single (sub-)pixels, one beside the other, with the random numbers of the whole picture.
 
     Parameters
     ----------
@@ -157,8 +182,6 @@ class SinglePixelRays(OnePicture):
         ``(n,)``: which pixels; ``channels`` are 0 where sub-pixels have no rays of their own.
     """
 
-    height, channels = 1, 1
-
     def __init__(
         self,
         source: DisplayRays,
@@ -166,25 +189,18 @@ class SinglePixelRays(OnePicture):
         rows: NDArray[np.integer],
         channels: NDArray[np.integer],
     ) -> None:
-        self.width = len(columns)
-        self._source = source
-        self._columns, self._rows, self._own = (
-            mi.UInt32(np.asarray(values, np.uint32)) for values in (columns, rows, channels)
-        )
+        super().__init__(source, columns[None], rows[None])
+        self.channels = 1
+        self._own = mi.UInt32(np.asarray(channels, np.uint32))
 
     def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
-        del row, channel
-        return self._source.rays(*self._pixel(column), jitter)
+        return super().rays(column, row, dr.gather(mi.UInt32, self._own, column), jitter)
 
     def number(self, column: UInt32, row: UInt32) -> UInt32:
         """Index of the (sub-)pixels in the whole picture."""
-        del row
-        x, y, channel = self._pixel(column)
-        return (y * self._source.width + x) * self._source.channels + channel
-
-    def _pixel(self, place: UInt32) -> tuple[UInt32, UInt32, UInt32]:
-        x, y, channel = (dr.gather(mi.UInt32, table, place) for table in (self._columns, self._rows, self._own))
-        return x, y, channel
+        x, y = self.in_picture(column, row)
+        number = (y * self._source.width + x) * self._source.channels
+        return number + dr.gather(mi.UInt32, self._own, column)
 
 
 class SubpixelRays(OnePicture):

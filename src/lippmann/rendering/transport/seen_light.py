@@ -23,7 +23,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.pbr.gltf_bsdf import SHARP_FIRST, SHARP_LOBE
-from lippmann.device.sobol import SampleStream, hash32
+from lippmann.device.sobol import SampleStream, hash32, named_seed
 from lippmann.device.syntax import syntax
 from lippmann.device.types import (
     Bool,
@@ -45,8 +45,6 @@ from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import follows_sharply, is_sharp
 from lippmann.rendering.transport.tuning import TUNING
 
-#: Tells the streams of chains from those of paths.
-_CHAINS = 0x5EE21147
 #: Sample dimensions used at one vertex.
 _DIMENSIONS_PER_VERTEX = 2
 #: Sample dimension, from a vertex's first, of the emitter without size that is sampled there.
@@ -105,10 +103,9 @@ def seen_light(
     rays = mi.UInt32(0)
     shadow: Any = mi.UInt32(0) if takes_shadow_rays else None
     number = mi.UInt32(0)
-    of_chains = SampleStream(hash32(stream.key ^ _CHAINS), stream.index, stream.half)
+    of_chains = SampleStream(hash32(stream.key ^ named_seed("chains of seen light")), stream.index, stream.half)
     first = stream.index * chains
     tracing = active & (number < chains)
-    # What does not change is no state: else Dr.Jit would record the loop a second time, without it.
     while dr.hint(
         tracing, label="chains", exclude=[integrator, of_chains, pixel, stream, chains, first, most, takes_shadow_rays]
     ):
@@ -155,8 +152,6 @@ def _chain(
 
     pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
     active &= _may_show_light(pi)
-    # What does not change is no state, and rays are told by origin and direction: else Dr.Jit would record the loop a
-    # second time, without what is the same in all turns.
     while dr.hint(active, label="chain", exclude=[integrator, scene, context, stream, at_first]):
         toward = mi.Ray3f(o, d)
         si = pi.compute_surface_interaction(toward)

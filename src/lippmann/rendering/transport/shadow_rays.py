@@ -27,7 +27,6 @@ class ShadowRays:
         Whether some of its surfaces let rays straight through.
     """
 
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(self, scene: MitsubaScene, has_null: bool) -> None:
         self._scene, self._has_null = scene, has_null
 
@@ -44,7 +43,6 @@ class ShadowRays:
             transmittance = dr.select(self._scene.ray_test(ray, active), mi.Spectrum(0), transmittance)
         else:
             crossings = mi.UInt32(0)
-            # What does not change, such as a ray's time, is no state: else Dr.Jit would record the loop a second time.
             o, d, distance = mi.Point3f(ray.o), mi.Vector3f(ray.d), mi.Float(ray.maxt)
             while dr.hint(active, label="visibility", exclude=[end]):
                 part = mi.Ray3f(o, d)

@@ -25,7 +25,6 @@ class ShownBlur:
     It is that of Lambertian lobes; the gloss of the same surfaces is taken to be blurred no more.
     """
 
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(self, integrator: PathIntegrator, photons: PhotonMap) -> None:
         self._paths = integrator
         self._usual, self._wide = photons, PhotonMap(photons.halves, 2 * photons.radius)
@@ -40,7 +39,6 @@ class ShownBlur:
         shown = mi.Spectrum(0)
         throughput = mi.Spectrum(1)
         depth, crossings = mi.UInt32(0), mi.UInt32(0)
-        # What does not change is no state: else Dr.Jit would record the loop a second time, without it.
         while dr.hint(active, label="sharp", exclude=[paths, context, stream]):
             toward = mi.Ray3f(o, d)
             si = paths.scene.ray_intersect(toward, mi.RayFlags.All, True, active)

@@ -64,7 +64,6 @@ class VolumePathIntegrator:
         Samples the scene's emitters, by the scene's own weights.
     """
 
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(self, scene: MitsubaScene, depth: int, name: str = "path", background: Color | None = None) -> None:
         self.scene = scene
         self.depth = depth

@@ -55,7 +55,6 @@ class WhittedIntegrator:
         Ray depth of primary rays, at least 1.
     """
 
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(self, built: BuiltClassic, depth: int) -> None:
         self.name = "classic"
         self.depth = depth

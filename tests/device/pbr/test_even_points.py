@@ -26,7 +26,7 @@ def test_points_of_a_mesh_are_spread_evenly(flip):
     import drjit as dr
     import mitsuba as mi
 
-    from lippmann.rendering.transport.casters import Triangles
+    from lippmann.device.pbr.even_points import Triangles
 
     triangles = Triangles(a_mesh(flip))
     assert triangles.area == pytest.approx(2.0)
@@ -51,7 +51,7 @@ def test_points_of_a_mesh_are_spread_evenly(flip):
 def test_points_of_a_single_triangle_are_spread_evenly():
     import mitsuba as mi
 
-    from lippmann.rendering.transport.casters import Triangles
+    from lippmann.device.pbr.even_points import Triangles
 
     mesh = mi.Mesh("mesh", 3, 1)
     parameters = mi.traverse(mesh)
@@ -69,7 +69,7 @@ def test_triangles_are_those_that_mitsuba_draws():
     """Of a ball: as large as its surface, and every point lies on it."""
     import mitsuba as mi
 
-    from lippmann.rendering.transport.casters import Triangles
+    from lippmann.device.pbr.even_points import Triangles
 
     trimesh = pytest.importorskip("trimesh")
     ball = trimesh.creation.icosphere(3, 2.0)
