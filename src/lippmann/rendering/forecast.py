@@ -24,7 +24,7 @@ from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.picture import traced_window
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.preconditions import why_no_estimate
-from lippmann.rendering.request.render_request import RenderRequest, shown_value
+from lippmann.rendering.request.render_request import RenderRequest, format_value
 from lippmann.rendering.session import Session, open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.placement import Placement
@@ -126,7 +126,7 @@ class Forecast:
             "memory": f"about {self.memory['expected'] / 2**30:.1f} GiB, "
             f"with a limit of {self.memory['limit'] / 2**30:.1f} GiB for the picture",
             "time": f"about {duration_in_words(self.seconds['total'])} on {self.device} ({stages})",
-            **{name: f"{shown_value(each['value'])} ({each['reason']})" for name, each in self.plan.items()},
+            **{name: f"{format_value(each['value'])} ({each['reason']})" for name, each in self.plan.items()},
         }
 
     def _repr_html_(self) -> str:
@@ -167,11 +167,11 @@ def forecast(
     probe = _Probe(source, request.seed)
     samples = source.width * source.height * request.channels * request.samples
     integrator = session.integrator(whole, placement.display_from_world, placement.exposure)
-    found = probe.trace(integrator, session)
+    probed = probe.trace(integrator, session)
     seconds = {
         "load": session.watch.seconds["load"],
         "build": frames * session.watch.seconds["build"],
-        "trace": found.compile + frames * samples * found.seconds_per_sample,
+        "trace": probed.compile + frames * samples * probed.seconds_per_sample,
     }
     if request.denoises:
         seconds["denoise"] = frames * _denoise_seconds(session, source, placement)
@@ -195,7 +195,7 @@ def forecast(
         blurred_share=share_beyond,
         rays={
             "primary": frames * samples,
-            **{kind: round(frames * samples * share) for kind, share in found.rays.items()},
+            **{kind: round(frames * samples * share) for kind, share in probed.rays.items()},
         },
         memory={
             "expected": _resident() + width * height * memory_model.PICTURE + _working_bytes(source, session),
@@ -203,7 +203,7 @@ def forecast(
         },
         seconds=seconds,
         plan=_plan(session, source, window),
-        probe={"samples": found.samples, "seconds": found.seconds},
+        probe={"samples": probed.samples, "seconds": probed.seconds},
         device=session.engine.gpu_name or f"cpu, {session.engine.threads} threads",
         proof=None if display.lens is None else prove(display),
         notes=(*session.notes, *placement.warnings, *lens_notes(display)),
@@ -231,7 +231,7 @@ def _plan(
 
 
 @dataclass(frozen=True)
-class _Found:
+class _ProbeResult:
     """What the probe took; ``rays`` per sample, by kind."""
 
     samples: int
@@ -255,7 +255,7 @@ class _Probe:
         rows = random.integers(0, source.height, count)
         self._pixels = ChosenRays(source, columns, np.broadcast_to(rows[:, None], columns.shape))
 
-    def trace(self, integrator: Integrator, session: Session) -> _Found:
+    def trace(self, integrator: Integrator, session: Session) -> _ProbeResult:
         """Sample the pixels again and again, each time with twice as many samples, until the time is up."""
         from lippmann.rendering.film.batched_picture import STREAMS
         from lippmann.rendering.film.sample_batches import FullInBatches
@@ -295,7 +295,7 @@ class _Probe:
                 count *= 2
         number = request.samples * pixels
         shares = {kind: _count_at(request.samples, counts) / number for kind, counts in rays.items()}
-        return _Found(done * pixels, spent, compiled, last, shares)
+        return _ProbeResult(done * pixels, spent, compiled, last, shares)
 
     def share_beyond(self, session: Session, placement: Placement) -> float:
         """Share of the pixels whose middle sees a surface that the display does not resolve."""
@@ -304,8 +304,8 @@ class _Probe:
         plan = plan_layers(self._pixels, session.memory)
         depth = trace_layers(session.built, self._pixels, plan, placement.display_from_world)["depth"]
         far, near = placement.resolvable_range
-        seen: NDArray[np.bool_] = np.isfinite(depth) & ((depth < far) | (depth > near))
-        return float(seen.mean())
+        is_beyond: NDArray[np.bool_] = np.isfinite(depth) & ((depth < far) | (depth > near))
+        return float(is_beyond.mean())
 
 
 def _count_at(samples: int, counts: list[tuple[int, int]]) -> float:

@@ -74,7 +74,7 @@ def _misses_caustics(choices: Mapping[str, object]) -> bool:
     return choices.get("caustics") == "paths"
 
 
-def seen_share(pixels: NDArray[np.float32] | None, background: Color | None, rays: RayTotals, samples: int) -> float:
+def visible_share(pixels: NDArray[np.float32] | None, background: Color | None, rays: RayTotals, samples: int) -> float:
     """Share of a picture's pixels that may show something of the scene, at most 1.
 
     Parameters

@@ -246,7 +246,7 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     noisy = frame.pixels
     if frame.coverage is not None and (further := denoiser.coverage()) is not None:
         noisy = exchange_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)
-    cleaned = remove_excess(clean_light(noisy, frame.seen, denoiser, traced.samples), frame.excess)
+    cleaned = remove_excess(clean_light(noisy, frame.specular, denoiser, traced.samples), frame.excess)
     frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
     return replace(traced, options=_denoiser_options(denoiser), seconds={"denoise": denoiser.seconds})
 

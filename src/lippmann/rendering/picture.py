@@ -85,7 +85,7 @@ def render_picture(
     )
     # Files hold whole numbers of 32 bits.
     maps = {name: v.astype(np.uint32) if v.dtype.kind in "iu" else v for name, v in frame.maps.items()}
-    return IntegralImage(request.shown(frame.pixels), display, placement.world_from_display, provenance, maps)
+    return IntegralImage(request.tone_mapped(frame.pixels), display, placement.world_from_display, provenance, maps)
 
 
 def choose_exposure(scene: Scene, display: Display, request: RenderRequest) -> float:

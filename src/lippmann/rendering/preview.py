@@ -64,4 +64,4 @@ def render_preview(
     session.watch.seconds.update(traced.seconds)
     options = {"pixel_filter": request.pixel_filter, "camera": pose.name, **traced.options}
     provenance = session.provenance(traced.frame, samples=traced.samples, options=options)
-    return Preview(request.shown(traced.frame.pixels), provenance)
+    return Preview(request.tone_mapped(traced.frame.pixels), provenance)

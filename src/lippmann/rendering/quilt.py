@@ -98,7 +98,7 @@ def render_quilt(
         estimate=traced.estimate,
         notes=(*placement.warnings, *traced.notes),
     )
-    return QuiltFrame(session.request.shown(traced.frame.pixels), provenance)
+    return QuiltFrame(session.request.tone_mapped(traced.frame.pixels), provenance)
 
 
 def _assembled(

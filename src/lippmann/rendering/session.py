@@ -27,7 +27,7 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
-from lippmann.rendering.light_statements import light_notes, seen_share, stated_error, warn_of_emptiness
+from lippmann.rendering.light_statements import light_notes, stated_error, visible_share, warn_of_emptiness
 from lippmann.rendering.request.plan import follow
 from lippmann.rendering.request.region_of_interest import even_background
 from lippmann.rendering.request.render_request import Choice, RenderRequest
@@ -305,7 +305,7 @@ class Session:
             background = (0.0, 0.0, 0.0)
         if not has_pixels and background is not None and max(background) == 0.0:
             return ()  # glowing surfaces in front of a black background send no rays on
-        return warn_of_emptiness(seen_share(frame.pixels if has_pixels else None, background, frame.rays, work))
+        return warn_of_emptiness(visible_share(frame.pixels if has_pixels else None, background, frame.rays, work))
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -173,7 +173,7 @@ def packed(prepared: Prepared, traced: TracedTile) -> TileResult:
         sums = lens_sums(job.display, job.grid[traced.index], traced.errors)
     if job.keeps_maps:
         maps = dict(traced.maps)
-    values = stored_values(job.request.shown(traced.pixels), job.stored, job.transfer)
+    values = stored_values(job.request.tone_mapped(traced.pixels), job.stored, job.transfer)
     return TileResult(traced.index, values, maps, sums, dict(vars(traced.rays)), traced.notes)
 
 

@@ -34,13 +34,13 @@ class Noise:
     of_excess = None
     covered = None
 
-    def shown(self, values):
+    def displayed(self, values):
         return values
 
-    def seen(self):
+    def specular(self):
         return None if self.of_seen is None else self.of_seen[0]
 
-    def seen_halves(self):
+    def specular_halves(self):
         return self.of_seen
 
     def excess(self):
@@ -183,11 +183,11 @@ def test_an_emitter_in_a_narrow_lobe_does_not_light_the_pixels_beside_it():
 
     renderer.of_seen = tuple(emitters)
     picture = Denoised(renderer, denoise, "srgb").picture()
-    for shown, half in zip(given, rest, strict=True):
-        assert shown[100, 100] == pytest.approx(8.0)
-        assert shown[50, 50] == pytest.approx(8.0)
-        shown[100, 100] = shown[50, 50] = half[100, 100] = half[50, 50] = 0
-        assert shown == pytest.approx(half)
+    for displayed, half in zip(given, rest, strict=True):
+        assert displayed[100, 100] == pytest.approx(8.0)
+        assert displayed[50, 50] == pytest.approx(8.0)
+        displayed[100, 100] = displayed[50, 50] = half[100, 100] = half[50, 50] = 0
+        assert displayed == pytest.approx(half)
     expected = np.mean(renderer.traced_halves(), axis=0)
     assert picture == pytest.approx(expected)
 
@@ -209,9 +209,9 @@ def test_what_is_still_far_beyond_white_without_its_noise_is_as_bright_as_the_sa
     renderer.samples = samples
     for value, half in zip((290.0, 310.0), renderer.traced_halves(), strict=True):
         half[40:60, 40:60] = value
-    shown = renderer.traced_picture() if samples == 1 else np.mean(renderer.traced_halves(), axis=0)
+    displayed = renderer.traced_picture() if samples == 1 else np.mean(renderer.traced_halves(), axis=0)
     picture = Denoised(renderer, blur, "srgb").picture()
-    assert picture[45:55, 45:55] == pytest.approx(shown[45:55, 45:55])
+    assert picture[45:55, 45:55] == pytest.approx(displayed[45:55, 45:55])
 
 
 @pytest.mark.parametrize(("samples", "hidden"), [(4, True), (64, False)])

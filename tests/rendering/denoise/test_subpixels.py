@@ -51,7 +51,7 @@ def test_own_colours_are_those_that_sub_pixels_have_alone(integrator, order, win
     assert alone.picture().std() > 0.05
     assert together.picture() == pytest.approx(alone.picture(), rel=1e-5, abs=1e-6)
     for half, other in zip(together.traced_halves(), alone.traced_halves(), strict=True):
-        assert together.shown(half) == pytest.approx(other, rel=1e-5, abs=1e-6)
+        assert together.displayed(half) == pytest.approx(other, rel=1e-5, abs=1e-6)
     assert together.squared_error().values == pytest.approx(alone.squared_error().values, rel=1e-3, abs=1e-6)
     assert together.rays == alone.rays
 

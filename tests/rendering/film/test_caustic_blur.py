@@ -97,8 +97,8 @@ def test_an_edge_is_told_to_a_factor():
 def test_pixels_are_the_same_in_parts_and_fewer_stand_for_all(monkeypatch):
     from lippmann.rendering.film import caustic_blur
 
-    monkeypatch.setattr(caustic_blur, "SAMPLES_OF_LOOK", 16)
-    monkeypatch.setattr(caustic_blur, "FEWEST_LOOKED_AT", 0)
+    monkeypatch.setattr(caustic_blur, "SAMPLES_OF_PIXEL", 16)
+    monkeypatch.setattr(caustic_blur, "FEWEST_PIXELS", 0)
     light = lambda x: np.where(x > 0, 1.0, 0.0)  # noqa: E731
     whole = blur_of(light, 0.1, samples=8)
     looked = (whole != 0).any(axis=2)
@@ -115,8 +115,8 @@ def test_pixels_are_the_same_in_parts_and_fewer_stand_for_all(monkeypatch):
 def test_a_look_is_repeated_at_twice_the_share(monkeypatch):
     from lippmann.rendering.film import caustic_blur
 
-    monkeypatch.setattr(caustic_blur, "SAMPLES_OF_LOOK", 64)
-    monkeypatch.setattr(caustic_blur, "FEWEST_LOOKED_AT", SIZE * SIZE // 4)
+    monkeypatch.setattr(caustic_blur, "SAMPLES_OF_PIXEL", 64)
+    monkeypatch.setattr(caustic_blur, "FEWEST_PIXELS", SIZE * SIZE // 4)
     integrator, source = matt_plane(PlaneOfPhotons(lambda x: 1 + 5 * x**2, 0.2))
     blur = caustic_blur.SquaredBlur(integrator, source, WHOLE, 3)
     looked = [float((blur.after(samples) != 0).any(axis=2).mean()) for samples in (8, 24, 32, 64)]

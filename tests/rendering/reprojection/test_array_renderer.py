@@ -213,7 +213,7 @@ def test_a_point_behind_what_probes_have_met_is_not_taken(flat_tracer, sheet):
     from lippmann.display.lens_field import LensField
     from lippmann.rendering.reprojection.backward_warp import Gathering, gather, probed_limit
     from lippmann.rendering.reprojection.epipolar_march import mark_nearest
-    from lippmann.rendering.reprojection.point_image import MISSED, REPROJECTED, TRACED, WANTED
+    from lippmann.rendering.reprojection.point_image import MISSED, QUEUED, REPROJECTED, TRACED
 
     display = DISPLAYS["square"]
     field = LensField.of(display)
@@ -236,7 +236,7 @@ def test_a_point_behind_what_probes_have_met_is_not_taken(flat_tracer, sheet):
         points.status[here], points.status[probes] = MISSED, TRACED
         points.disparity[probes] = np.resize(seen, 8)
         gather(0, 96, points, field, gathering, rules(), nearest)
-        missed[name] = np.count_nonzero(points.status[here] == WANTED)
+        missed[name] = np.count_nonzero(points.status[here] == QUEUED)
         middle = probed_limit(points, field, 43, 43, gathering)
         assert middle == pytest.approx(wall if name == "wall" else near)
     assert missed["wall"] < 20
@@ -249,7 +249,7 @@ def test_care_does_not_gather_what_the_sources_dispute(apart, careful, taken, fl
     from lippmann.display.lens_field import LensField
     from lippmann.rendering.reprojection.backward_warp import Gathering, gather
     from lippmann.rendering.reprojection.epipolar_march import mark_nearest
-    from lippmann.rendering.reprojection.point_image import MISSED, REPROJECTED, WANTED
+    from lippmann.rendering.reprojection.point_image import MISSED, QUEUED, REPROJECTED
 
     field = LensField.of(DISPLAYS["square"])
     points = flat_tracer(DISPLAYS["square"], [], sky=(0.2, 0.2, 0.2)).full()
@@ -263,7 +263,7 @@ def test_care_does_not_gather_what_the_sources_dispute(apart, careful, taken, fl
     mark_nearest(0, 96, points, field, ~target, nearest)
     gather(0, 96, points, field, Gathering(target, source, 8, 3, 3), rules(careful), nearest)
     both = here & np.isin(np.arange(96) % 8, np.arange(1, 7))  # the outermost are shown by one source only
-    assert np.all(points.status[both] == (REPROJECTED if taken else WANTED))
+    assert np.all(points.status[both] == (REPROJECTED if taken else QUEUED))
     if taken:
         assert points.color[both] == pytest.approx(0.2 + apart / 2)
 

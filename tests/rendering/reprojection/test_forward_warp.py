@@ -71,7 +71,7 @@ def draw(points, rows, targets, sources, rules):
 )
 def test_a_plane_is_reprojected_exactly(level, slope, careful, tilt):
     """Colours that are linear along the plane's line of sight come out as they are, wherever a source reaches."""
-    from lippmann.rendering.reprojection.point_image import REPROJECTED, WANTED
+    from lippmann.rendering.reprojection.point_image import QUEUED, REPROJECTED
 
     rows = the_rows()
     slope *= abs(level)
@@ -95,7 +95,7 @@ def test_a_plane_is_reprojected_exactly(level, slope, careful, tilt):
     sure = np.minimum(np.abs(np.abs(o + 2 * WIDTH * s) - half), np.abs(np.abs(o - 2 * WIDTH * s) - half)) > 0.05
     # Pieces drawn by two sources must agree; stretched ones of very oblique planes may be left out.
     assert np.array_equal(found[sure], reached[sure])
-    assert np.all(points.status[0, columns][~found] == WANTED)
+    assert np.all(points.status[0, columns][~found] == QUEUED)
     assert np.allclose(points.disparity[0, columns][found], s[found], rtol=1e-3, atol=1e-5)
     assert np.allclose(points.color[0, columns][found], truth.color[0, columns][found], atol=2e-3)
 
@@ -169,11 +169,11 @@ def test_traced_pixels_stay():
 
 
 def test_nothing_farther_than_what_probes_met_is_taken():
-    from lippmann.rendering.reprojection.point_image import REPROJECTED, TRACED, WANTED
+    from lippmann.rendering.reprojection.point_image import QUEUED, REPROJECTED, TRACED
 
     rows = the_rows()
     # Between probes that have met different surfaces, the nearer one counts.
-    for above, below, expected in ((-0.1, -0.1, REPROJECTED), (0.5, 0.5, WANTED), (-0.1, 0.5, WANTED)):
+    for above, below, expected in ((-0.1, -0.1, REPROJECTED), (0.5, 0.5, QUEUED), (-0.1, 0.5, QUEUED)):
         points = plane(rows, -0.1, 0.0, constant(0.2), height=5)
         forget(points, rows, [2])
         for row, places, met in ((0, (0, 4), above), (4, (2, 6), below)):
@@ -185,7 +185,7 @@ def test_nothing_farther_than_what_probes_met_is_taken():
 
 @pytest.mark.parametrize("careful", [False, True])
 def test_care_leaves_fragile_points_and_edges_to_tracing(careful):
-    from lippmann.rendering.reprojection.point_image import WANTED
+    from lippmann.rendering.reprojection.point_image import QUEUED
 
     rows = the_rows()
     rules = the_rules(careful=careful, tolerance=0.06)
@@ -193,13 +193,13 @@ def test_care_leaves_fragile_points_and_edges_to_tracing(careful):
     points.fragile[:, 8:16] = points.fragile[:, 24:32] = True
     forget(points, rows, [2])
     draw(points, rows, [2], [[1, 3]], rules)
-    assert np.all((points.status[:, 17:23] == WANTED) == careful)
+    assert np.all((points.status[:, 17:23] == QUEUED) == careful)
 
     points = plane(rows, -1e-4, 0.0, constant(0.2))
     points.color[:, 12:16] = points.color[:, 28:32] = 0.6
     forget(points, rows, [2])
     draw(points, rows, [2], [[1, 3]], rules)
-    missed = points.status[0, 16:24] == WANTED
+    missed = points.status[0, 16:24] == QUEUED
     assert np.any(missed[3:5]) == careful
     assert not missed[1:3].any()
     assert not missed[5:7].any()
@@ -207,24 +207,24 @@ def test_care_leaves_fragile_points_and_edges_to_tracing(careful):
 
 @pytest.mark.parametrize("column", [12, 28])
 def test_one_fragile_pixel_of_one_source_is_enough(column):
-    from lippmann.rendering.reprojection.point_image import WANTED
+    from lippmann.rendering.reprojection.point_image import QUEUED
 
     rows = the_rows()
     points = plane(rows, -1e-4, 0.0, constant(0.2))
     points.fragile[:, column] = True
     forget(points, rows, [2])
     draw(points, rows, [2], [[1, 3]], the_rules())
-    missed = points.status[0, 16:24] == WANTED
+    missed = points.status[0, 16:24] == QUEUED
     assert missed[4]
     assert not missed[1:3].any()
     assert not missed[6]
 
 
 def test_care_leaves_to_tracing_what_the_sources_dispute():
-    from lippmann.rendering.reprojection.point_image import REPROJECTED, WANTED
+    from lippmann.rendering.reprojection.point_image import QUEUED, REPROJECTED
 
     rows = the_rows()
-    for apart, expected in ((0.02, REPROJECTED), (0.3, WANTED)):
+    for apart, expected in ((0.02, REPROJECTED), (0.3, QUEUED)):
         points = plane(rows, -1e-4, 0.0, constant(0.2))
         points.color[:, 24:32] += apart
         forget(points, rows, [2])
@@ -238,7 +238,7 @@ def test_care_leaves_to_tracing_what_the_sources_dispute():
 @pytest.mark.parametrize("sources", [1, 2])
 def test_where_an_outline_may_reach_farther_points_are_not_taken(careful, sources):
     """Between its last pixel and the next one, which sees the wall, the nearer thing may go on."""
-    from lippmann.rendering.reprojection.point_image import WANTED
+    from lippmann.rendering.reprojection.point_image import QUEUED
 
     rows = the_rows()
     points = plane(rows, -1e-4, 0.0, constant(0.2))
@@ -247,7 +247,7 @@ def test_where_an_outline_may_reach_farther_points_are_not_taken(careful, source
         points.disparity[:, 8 * lens : 8 * lens + 4] = -0.05
     forget(points, rows, [2])
     draw(points, rows, [2], [[1, 3]], the_rules(careful=careful))
-    missed = points.status[0, 16:24] == WANTED
+    missed = points.status[0, 16:24] == QUEUED
     # The outline of the left source ends between the places 2.6 and 3.6, that of the right one between 3.4 and 4.4.
     assert missed[3] == (careful and sources == 1)
     assert not missed[[1, 2, 6]].any()

@@ -14,11 +14,11 @@ LENS = np.repeat([0, 1], [9, 3])
 def thinned(row, known=()):
     """A picture whose given row holds wanted pixels, thinned out; ``known`` ones have been traced."""
     from lippmann.rendering.reprojection.missed_runs import thin_out
-    from lippmann.rendering.reprojection.point_image import TRACED, WANTED, PointImage
+    from lippmann.rendering.reprojection.point_image import QUEUED, TRACED, PointImage
     from lippmann.rendering.reprojection.rules import choose_rules
 
     points = PointImage.empty(row + 1, len(LENS))
-    points.status[row] = WANTED
+    points.status[row] = QUEUED
     points.status[row, list(known)] = TRACED
     lens = np.broadcast_to(LENS, points.status.shape)
     thin_out(row, row + 1, points, lens, choose_rules(careful=False, coded=False))
@@ -26,9 +26,9 @@ def thinned(row, known=()):
 
 
 def wanted(row, known=()):
-    from lippmann.rendering.reprojection.point_image import WANTED
+    from lippmann.rendering.reprojection.point_image import QUEUED
 
-    return np.flatnonzero(thinned(row, known)[0].status[row] == WANTED).tolist()
+    return np.flatnonzero(thinned(row, known)[0].status[row] == QUEUED).tolist()
 
 
 def test_the_first_pixel_of_each_run_and_one_in_four_are_traced():

@@ -28,7 +28,7 @@ def scattered(count, seed, *, flat=True):
     return Photons(*arrays, random.integers(1, 5, count).astype(np.uint32))
 
 
-def gathered(photon_map, points, half, surfaces, *, choice=0.5, active=True, normal=(0, 0, 1), seen=True, **parts):
+def gathered(photon_map, points, half, surfaces, *, choice=0.5, active=True, normal=(0, 0, 1), by_kernel=True, **parts):
     import drjit as dr
     import mitsuba as mi
 
@@ -39,7 +39,7 @@ def gathered(photon_map, points, half, surfaces, *, choice=0.5, active=True, nor
     si.sh_frame = mi.Frame3f(up)
     si.wi = mi.Vector3f(0, 0, 1)
     half, surfaces = mi.UInt32(half), mi.UInt32(surfaces)
-    return photon_map.gather(si, up, none, half, surfaces, choice, mi.Bool(seen), mi.Bool(active), **parts)
+    return photon_map.gather(si, up, none, half, surfaces, choice, mi.Bool(by_kernel), mi.Bool(active), **parts)
 
 
 def looked_up(photon_map, points, half, surfaces, active=True):
@@ -137,25 +137,28 @@ def test_a_look_up_is_the_sum_over_all_photons(radius, flat):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seen", [True, False])
-def test_parts_of_the_photons_have_the_mean_of_all(seen):
+@pytest.mark.parametrize("by_kernel", [True, False])
+def test_parts_of_the_photons_have_the_mean_of_all(by_kernel):
     from lippmann.rendering.transport.photon_map import PhotonMap
 
     halves = scattered(3000, 5), scattered(1000, 6)
     photon_map = PhotonMap(halves, 0.2)
     points = np.float32(np.random.default_rng(7).uniform(-0.5, 0.5, (200, 3)) * [1, 1, 0.01])
     for half in (0, 1):
-        whole = np.array(gathered(photon_map, points, half, 9, seen=seen).irradiance)
+        whole = np.array(gathered(photon_map, points, half, 9, by_kernel=by_kernel).irradiance)
         parts = np.stack(
-            [np.array(gathered(photon_map, points, half, 9, seen=seen, part=k, most=8).irradiance) for k in range(32)]
+            [
+                np.array(gathered(photon_map, points, half, 9, by_kernel=by_kernel, part=k, most=8).irradiance)
+                for k in range(32)
+            ]
         )
         np.testing.assert_allclose(parts.mean(axis=0), whole, rtol=1e-4, atol=1e-5 * whole.max())
         assert (parts.std(axis=0).mean(axis=1) > 0.05 * whole.mean(axis=1)).all()  # each looks at photons of its own
 
 
-@pytest.mark.parametrize("seen", [True, False])
+@pytest.mark.parametrize("by_kernel", [True, False])
 @pytest.mark.parametrize("count", [7, 1000, 20_000])
-def test_a_look_up_meets_few_photons_of_a_cell_however_many_there_are(count, seen):
+def test_a_look_up_meets_few_photons_of_a_cell_however_many_there_are(count, by_kernel):
     """All photons of a focus are alike: what a look-up brings tells how many it has met, and how much each counted."""
     from lippmann.rendering.transport.photon_map import PhotonMap, Photons
 
@@ -165,7 +168,7 @@ def test_a_look_up_meets_few_photons_of_a_cell_however_many_there_are(count, see
         at = np.full((photons, 3), 0.5, np.float32)
         up = np.tile(np.float32([0, 0, 1]), (photons, 1))
         focus = Photons(at, up, up, np.ones((photons, 3), np.float32), np.ones(photons, np.uint32))
-        found = gathered(PhotonMap((focus, focus), 1.0), at[:1], 0, 9, seen=seen, part=part, most=most)
+        found = gathered(PhotonMap((focus, focus), 1.0), at[:1], 0, 9, by_kernel=by_kernel, part=part, most=most)
         return np.array(found.irradiance).item(0)
 
     of_each = brought(1, 0) * 2 ** max(0, np.ceil(np.log2(count / most)))
@@ -253,7 +256,7 @@ def test_surfaces_that_are_not_seen_have_the_light_of_their_cell(normal):
     # Not quite on the photons' plane, which for upright ones is the border of cells.
     points = np.float32(random.uniform(-0.7, 0.7, (60, 2)) @ along + 0.03 * np.array(normal))
     moved = at_place(photons, np.float32(photons.position + 0.03 * np.float32(normal)))
-    found = gathered(PhotonMap((moved, moved), 0.1), points, 0, 9, normal=normal, seen=False).irradiance
+    found = gathered(PhotonMap((moved, moved), 0.1), points, 0, 9, normal=normal, by_kernel=False).irradiance
     expected = irradiance_of_cell(moved, points, np.tile(np.float32(normal), (60, 1)), 0.1)
     np.testing.assert_allclose(np.array(found).T, expected, rtol=0.03, atol=0.03)
 
@@ -273,7 +276,7 @@ def test_cells_keep_the_flux(normal):
     photons = at_place(photons, np.float32(photons.position + 0.03 * np.float32(normal)))
     random = np.random.default_rng(6)
     points = np.float32(random.uniform(-0.8, 0.8, (4000, 2)) @ along + 0.03 * np.array(normal))
-    found = gathered(PhotonMap((photons, photons), 0.1), points, 1, 1, normal=normal, seen=False).irradiance
+    found = gathered(PhotonMap((photons, photons), 0.1), points, 1, 1, normal=normal, by_kernel=False).irradiance
     assert np.array(found).mean() == pytest.approx(2.5, rel=0.015)
 
 

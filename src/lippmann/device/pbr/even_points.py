@@ -74,7 +74,7 @@ def no_point(sample: Point2f) -> tuple[Point3f, Vector3f]:
 def area_of(shape: mi.Shape) -> float:
     """Area of a shape; not a number for shapes that do not tell it."""
     try:
-        return float(np.array(shape.surfacearea_of()).ravel()[0])
+        return float(np.array(shape.surface_area()).ravel()[0])
     except (RuntimeError, NotImplementedError):
         return math.nan
 

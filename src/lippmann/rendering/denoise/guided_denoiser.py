@@ -1,8 +1,8 @@
-"""Open Image Denoise for one picture of one scene: guides are traced once, pictures cleaned as they come.
+"""Open Image Denoise for the successive states of one picture, with guides that are traced once.
 
-The network is shown pixels as they lie on the panel: near the lens plane they look like a plain picture there. Sky and
-background behind all surfaces have no noise: it is shown the rectangle that holds all surfaces, and cleans what is near
-one.
+The network gets the pixels in panel order: near the lens plane they look like a plain picture. Sky and background
+behind all surfaces have no noise. So the network gets the rectangle that contains all surfaces, and its output is used
+near surfaces only.
 """
 
 from __future__ import annotations
@@ -33,25 +33,25 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float32]
 
-#: Pixels around the surfaces, so that the network sees what they stand before; whole steps of the network.
+#: Margin in pixels around the surfaces, so that the network sees their background; whole steps of the network.
 MARGIN = NETWORK_STEP
-#: Pixels around the surfaces that are cleaned, too: guides of a few samples miss edges that barely reach into one.
+#: Pixels around the surfaces that are denoised, too: guides of few samples miss edges that barely reach into a pixel.
 EDGE = 2
 
 
 class GuidedDenoiser:
-    """Takes the noise out of pictures; called with ``(H, W, 3)`` linear pixels, one for each of ``source``.
+    """Denoises pictures ``(H, W, 3)`` linear, one pixel for each of ``source``.
 
     Parameters
     ----------
     built, source, display_from_world, seed, box_filter:
-        Those of the picture, for guides that show what its pixels see.
+        Those of the picture, for tracing its guides.
     memory:
         Bytes that may be used.
     threads:
         Of the denoiser.
     kind:
-        The network's effort, or "oidn" for that which the samples are worth.
+        The network's effort, or "oidn" to choose it by the number of samples.
     shares:
         Micro-images share their light, see :mod:`lippmann.rendering.sharing.cross_lens`, and so do the views of a
         quilt, see :mod:`lippmann.rendering.sharing.cross_view`.
@@ -96,9 +96,10 @@ class GuidedDenoiser:
         self.used: Effort = "fast"
 
     def __call__(self, pixels: Floats, samples: int, turned: bool = False) -> Floats:
-        """A picture without its noise, which has shared its light: views of a quilt before it is clean.
+        """The denoised picture, with its light shared where that is asked for.
 
-        ``samples`` are those of each pixel, ``turned`` is that of :func:`~lippmann.rendering.denoise.oidn.denoise`.
+        Views of a quilt share their light before denoising, micro-images after it. ``samples`` are those of each pixel;
+        ``turned`` is that of :func:`~lippmann.rendering.denoise.oidn.denoise`.
         """
         started = time.perf_counter()
         self._progress(Progress("denoise", 0, 1))
@@ -115,7 +116,7 @@ class GuidedDenoiser:
         return cleaned
 
     def _share(self, clean: Floats) -> Floats:
-        """A clean picture that has shared its light."""
+        """A denoised picture with the light shared between its micro-images."""
         source = self._source
         assert isinstance(source, DisplayRays | WindowRays | SubpixelRays)
         if self._lenses is None:
@@ -134,14 +135,14 @@ class GuidedDenoiser:
         )
 
     def coverage(self) -> tuple[Coverage, Coverage] | None:
-        """By either half of the rays of the guides."""
+        """Coverage by either half of the guides' rays."""
         started = time.perf_counter()
-        found = self.guides().coverage
+        coverage_halves = self.guides().coverage
         self.seconds += time.perf_counter() - started
-        return found
+        return coverage_halves
 
     def probe(self, samples: int) -> float:
-        """Seconds that a picture of so many samples takes, cleaned by halves, guides included, by a small one."""
+        """Estimated seconds to denoise both halves, guides included, extrapolated from a small picture."""
         side = 128
         small = np.zeros((side, side, 3), dtype=np.float32)
         effort = effort_of(self._kind, samples)
@@ -156,7 +157,7 @@ class GuidedDenoiser:
             self._surfaces = [SurfacePart.of(guides.normal[tile]) for tile in source.tiles()]
         result = np.empty_like(pixels)
         for tile, surfaces in zip(source.tiles(), self._surfaces, strict=True):
-            result[tile] = denoise_seen(
+            result[tile] = denoise_surfaces(
                 pixels[tile],
                 guides.albedo[tile],
                 guides.normal[tile],
@@ -175,8 +176,7 @@ class GuidedDenoiser:
                 self._source,
                 plan_guides(self._source, TUNING.guide_samples, self._memory),
                 self._display_from_world,
-                # Samples of their own: with those of one half of the picture the guides would show its noise, and the
-                # denoised other half would agree with it.
+                # Samples of their own: with those of one half-buffer the guides would carry its noise into the other.
                 seed=named_seed("guides", self._seed),
                 box_filter=self._box_filter,
                 progress=self._progress,
@@ -185,7 +185,7 @@ class GuidedDenoiser:
 
 
 def effort_of(kind: Denoiser, samples: int) -> Effort:
-    """The effort that the user's word names, or that so many samples of each pixel deserve where it names none."""
+    """The effort that ``kind`` names; where it names none, that for the number of samples per pixel."""
     if kind in ("oidn-fast", "oidn-high"):
         return "fast" if kind == "oidn-fast" else "high"
     return "high" if samples >= TUNING.high_from else "fast"
@@ -208,13 +208,13 @@ class SurfacePart:
 
     @staticmethod
     def of(normal: NDArray[np.generic]) -> SurfacePart | None:
-        """By a guide ``(H, W, 3)``, which is 0 where there is no surface; None where there is none at all."""
+        """From the normals ``(H, W, 3)``, 0 where there is no surface; None for a picture without surfaces."""
         is_surface = (normal[..., 0] != 0) | (normal[..., 1] != 0) | (normal[..., 2] != 0)
         place = _rectangle(is_surface)
         return None if place is None else SurfacePart(place, _widened(is_surface[place])[..., None])
 
 
-def denoise_seen(
+def denoise_surfaces(
     color: NDArray[np.generic],
     albedo: NDArray[np.generic],
     normal: NDArray[np.generic],
@@ -226,21 +226,21 @@ def denoise_seen(
 ) -> Floats:
     """The picture without its noise; arguments as those of :func:`~lippmann.rendering.denoise.oidn.denoise`.
 
-    The network is shown the rectangle of the ``surfaces``, those of ``normal``. What is not near one is left as it is,
-    so that nothing tells where that rectangle ends.
+    The network gets the rectangle of the ``surfaces``, those of ``normal``. Pixels that are not near a surface are left
+    as they are, so that no border of that rectangle shows.
     """
     result = np.array(color, dtype=np.float32)
     if surfaces is not None:
         place = surfaces.place
-        shown = color[place], albedo[place], normal[place]
-        # The guides follow mirrors and glass without chance, so what noise they have lies along edges alone.
-        cleaned = denoise(*shown, clean_guides=True, effort=effort, turned=turned, threads=threads)
+        images = color[place], albedo[place], normal[place]
+        # Guides follow mirrors and glass deterministically, so they are noisy along edges alone.
+        cleaned = denoise(*images, clean_guides=True, effort=effort, turned=turned, threads=threads)
         np.copyto(result[place], cleaned, where=surfaces.near)
     return result
 
 
 def _widened(is_surface: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """With the pixels up to ``EDGE`` beside and above each other."""
+    """The mask dilated by ``EDGE`` pixels."""
     for axis in (0, 1):
         lines = np.swapaxes(is_surface, 0, axis)
         wide = lines.copy()

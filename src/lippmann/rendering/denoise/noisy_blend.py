@@ -1,19 +1,17 @@
-"""How much of a denoised pixel its own samples should make up, by what the halves of a picture say of each other.
+"""Inverse-MSE blend of the denoised and the noisy value of each pixel.
 
-A denoiser knows pictures, not this scene: it wipes out stripes that it takes for noise, and what is seen through water.
-Such errors stay, however many samples there are, while the samples' own noise falls. So where a clean half lies farther
-from the truth than its noisy samples scatter, it gives way to them: of two pictures with squared errors E and V that
-know nothing of each other the best mean has E / (E + V) of the second. Both are measured, E by the other half. That
-such means converge was shown by A. Firmino, J. R. Frisvad, H. W. Jensen, *Progressive Denoising of Monte Carlo Rendered
-Images*, Computer Graphics Forum 41(2), 2022, where a network chooses; here the measurement does, over the pixels
-around.
+A denoiser has a bias: it removes stripes that look like noise, or detail behind water. The bias stays however many
+samples there are, while the noise falls. The best mean of two independent estimates with squared errors E (denoised)
+and V (noisy) gives the noisy one the weight E / (E + V). Both are estimated, E with the other half-buffer. Such blends
+converge (A. Firmino, J. R. Frisvad, H. W. Jensen, *Progressive Denoising of Monte Carlo Rendered Images*, Computer
+Graphics Forum 41(2), 2022). There a network chooses the weight; here it follows from local means of the estimates.
 
-Single pixels tell nothing. E counts as far as it exceeds its own standard deviation, so that few and noisy samples
-change nothing, and over small and large neighbourhoods: in a small one a bright hit may be missing by chance, in a
-large one what is wrong with an edge is lost. The geometric mean of what both say is zero where either says nothing.
+The estimates of single pixels are too noisy. E is soft-thresholded at its standard error, so that few and noisy samples
+change nothing. It is averaged over a small and a large neighbourhood: the small one may miss a firefly by chance, the
+large one averages the error of an edge away. The weight is the geometric mean of both, so 0 where either is 0.
 
-A pixel's own difference to the other half has no say in its weight: where that half happens to agree with the noise of
-the samples, these would seem to be right, and the other half could not judge the picture any more.
+The mean leaves the pixel itself out (cross-fitting): else a pixel whose two halves agree by chance would get a large
+weight, and the other half would no longer be independent of the result.
 """
 
 from __future__ import annotations
@@ -32,13 +30,12 @@ Halves = tuple[Floats, Floats]
 
 
 def weigh_samples(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int) -> Floats:
-    """The weight of each pixel's own samples against its clean value, ``(H, W, 1)`` in [0, 1].
+    """Weight of the noisy value of each pixel against the denoised one, ``(H, W, 1)`` in [0, 1].
 
     Parameters
     ----------
     noisy, clean:
-        Two halves of the samples that know nothing of each other, and what a denoiser made of each; ``(H, W, 3)``
-        linear.
+        Two independent half-buffers, and each of them denoised; ``(H, W, 3)`` linear.
     transfer:
         How values become codes; errors are measured between codes.
     threads:
@@ -64,9 +61,9 @@ def weigh_samples(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: 
 def _noise_and_error(
     a: Floats, b: Floats, clean_a: Floats, clean_b: Floats, transfer: Transfer
 ) -> tuple[Floats, Floats]:
-    """Squared errors, between codes, of a noisy half and of a clean one, ``(H, W)``; right on the average.
+    """Unbiased estimates of the squared errors, in codes, of a noisy and of a denoised half, ``(H, W)``.
 
-    Beyond white the codes are cut off, but what is wrong there is wrong around, too.
+    Codes are clipped at white only for their slope, as an error beyond white reaches the pixels around.
     """
     weight = np.square(coding_slope(np.clip(np.float32(0.5) * (clean_a + clean_b), 0, 1), transfer)) / 6
     scatter = np.square(a - b)
@@ -91,8 +88,8 @@ def mean_around(values: Floats, reach: int, bands: Bands) -> Floats:
 def _window_sums(values: Floats, size: int) -> Floats:
     """Sums down each column over all windows of ``size`` rows.
 
-    Windows are put together from such of 1, 2, 4, ... rows: nothing is taken away again, so that a strong value leaves
-    nothing behind.
+    Windows are composed of windows of 1, 2, 4, ... rows. Unlike in a running sum nothing is subtracted, so a large
+    value leaves no rounding error behind.
     """
     length = len(values) - size + 1
     total = np.zeros_like(values[:length])
@@ -108,7 +105,7 @@ def _window_sums(values: Floats, size: int) -> Floats:
 
 
 def _pixels_around(shape: tuple[int, ...], reach: int) -> Floats:
-    """``(H, W)``: of how many pixels the mean around each is, itself included."""
+    """``(H, W)``: number of pixels in the window around each, itself included."""
     rows, columns = (
         np.minimum(place + reach, len(place) - 1) - np.maximum(place - reach, 0) + 1 for place in map(np.arange, shape)
     )

@@ -1,8 +1,7 @@
-"""Noise taken out of a picture by Intel's Open Image Denoise, in the package ``pyoidn``.
+"""Denoising by Intel's Open Image Denoise, from the package ``pyoidn``.
 
-That is a neural network which knows pictures of path tracers; guides (albedo and normal of what each pixel sees) tell
-it which edges are the scene's. It runs on the GPU if the engine does; else on the CPU, with threads of its own beside
-Dr.Jit's: neither pins them to cores.
+The network is trained on pictures of path tracers. Guides (albedo and normal of what each pixel sees) show it the edges
+of the scene. It runs on the GPU if the engine does; else on the CPU, with threads of its own beside Dr.Jit's.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ def denoise(
     turned: bool = False,
     threads: int | None = None,
 ) -> FloatArray:
-    """The picture without its noise.
+    """The denoised picture.
 
     Parameters
     ----------
@@ -56,13 +55,13 @@ def denoise(
         Guides of the same shape: reflectance in [0, 1], and vectors with components in [-1, 1] of any frame (the zero
         vector where nothing is seen). They may be noisy. A normal needs an albedo beside it.
     clean_guides:
-        The guides hold no noise: finer detail is kept, and so would noise be. With the effort
-        ``high`` that takes twice the time.
+        Whether the guides hold no noise: the network then keeps their finest detail. With the effort ``high`` that
+        takes twice the time.
     effort:
         ``fast`` takes half the time of ``high``, a fifth with clean guides, for about 1 dB.
     turned:
-        The network is shown all upside down and from right to left. What it gets wrong it gets wrong another way then,
-        so that the mean of two pictures of which one was turned is nearer to the truth.
+        Rotate the network's input by 180 degrees, and its output back. The network's errors then differ, so that they
+        partly cancel in the mean of a rotated and an unrotated result.
     threads:
         CPU threads; None for all cores that the process may use.
 
@@ -106,10 +105,9 @@ def denoise(
 
 
 def _turned(image: FloatArray) -> FloatArray:
-    """Upside down and from right to left.
+    """The image rotated by 180 degrees and padded to whole steps of the network by reflection.
 
-    It is filled up to whole steps, so that the network sees the same pixels together as else; mirrored, for it would
-    take pixels that are repeated for something that is there.
+    So the network groups the same pixels as without rotation. Repeated pixels would look like an object to it.
     """
     height, width = image.shape[:2]
     before = (-height % NETWORK_STEP, 0), (-width % NETWORK_STEP, 0), (0, 0)
@@ -166,9 +164,9 @@ _devices: dict[int | None, OidnDevice] = {}
 
 
 def _filtered(pyoidn: ModuleType, images: dict[str, FloatArray], set_up: SetUp, threads: int) -> FloatArray:
-    """What a filter makes of ``images``, packed ``(H, W, 3)`` by the filter's names for them.
+    """Output of a filter for ``images``, packed ``(H, W, 3)``, by the filter's input names.
 
-    A GPU that cannot do it, for want of memory say, leaves it to the CPU.
+    Falls back to the CPU where the GPU fails, for example for lack of memory.
 
     Raises
     ------

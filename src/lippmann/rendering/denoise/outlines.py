@@ -1,12 +1,12 @@
-"""Outlines in front of the background, by more rays than paths.
+"""Coverage at outlines in front of the background, from paths and the guides' rays together.
 
-Where a surface ends in front of sky or background, a pixel of few samples shows too much of the one and too little of
-the other, and a denoiser cannot know how much of each there should be. The rays of its guides are further samples of
-just that: of what share of the pixel is covered. What the paths lack of the one side is put in place of what they have
-too much of the other, with the colours that either has in the pixels around.
+Where a surface ends in front of the background, the coverage of a pixel with few samples is noisy, and a denoiser
+cannot know the right one. The rays of its guides are further samples of coverage. The difference between the coverage
+by all rays and by the paths alone is multiplied by the difference between the surface's and the background's colour, as
+estimated from the pixels around, and added.
 
-It is a control variate: the coverage by the paths alone has the expectation of that by all rays, and the colours come
-of other pixels, so the expectation of a pixel stays what it is.
+This is a control variate: both coverages have the same expectation, and the colours come from other pixels, so the
+expectation of the pixel does not change.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from lippmann.runtime.row_threads import Bands
 
 Floats = NDArray[np.float32]
 
-#: Less weight of the pixels around than this, of 8, tells no colour: a pixel counts that is half of one side.
+#: Least total weight of the eight pixels around for a colour; a pixel that is half covered has more.
 _LEAST_WEIGHT = 0.05
 #: Places of the pixels around one in a square of nine.
 _AROUND = [step for step in np.ndindex(3, 3) if step != (1, 1)]
@@ -31,9 +31,9 @@ def exchange_coverage(pixels: Floats, paths: Coverage, further: Coverage, *, thr
     Parameters
     ----------
     paths:
-        As the samples of ``pixels`` tell it.
+        Coverage by the samples of ``pixels``.
     further:
-        As further rays through the same pixels do, which know nothing of those samples.
+        Coverage by further, independent rays through the same pixels.
     threads:
         CPU threads; the result does not depend on them.
 
@@ -48,9 +48,9 @@ def exchange_coverage(pixels: Floats, paths: Coverage, further: Coverage, *, thr
     if not len(rows):
         return pixels
     result = pixels.astype(np.float32)
-    # The side is told by all colours together, where sub-pixels have rays of their own, too.
+    # One coverage for all colours, also where sub-pixels have rays of their own.
     covered = paths.share.mean(axis=2, dtype=np.float64)
-    # Pixels that show more of one side tell more of its colour: by the fourth power.
+    # Colours are averaged with the fourth power of the coverage as weight: mixed pixels hardly count.
     of_surface, behind = (np.pad(np.square(np.square(share)), 1) for share in (covered, 1 - covered))
     colors = np.pad(pixels, ((1, 1), (1, 1), (0, 0)))
 
@@ -69,9 +69,9 @@ def exchange_coverage(pixels: Floats, paths: Coverage, further: Coverage, *, thr
 def _color_around(
     colors: Floats, weights: NDArray[np.float64], here: tuple[NDArray[np.intp], NDArray[np.intp]]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How much is seen of one side in the eight pixels around some, ``(N,)``, and its colour, ``(N, 3)``.
+    """Total weight ``(N,)`` and mean colour ``(N, 3)`` of one side over the eight pixels around each of ``here``.
 
-    ``colors``, and their ``weights`` for that side, are those of the picture with an edge of one pixel around.
+    ``colors`` and ``weights`` are those of the picture, padded by one pixel.
     """
     total = np.zeros(len(here[0]))
     within, color, square = np.zeros((3, len(total), 3))
@@ -83,8 +83,8 @@ def _color_around(
         color += weight[:, None] * value
         square += weight[:, None] * np.square(value)
     each = np.maximum(total, _LEAST_WEIGHT)[:, None]
-    # What is beyond white is not seen, and a highlight is no colour of a whole side; but half of what is five times
-    # white in all pixels around is white still. A deviation is the root of little.
+    # Values beyond white are clipped, as a highlight is no colour of a whole side; but a side that is far beyond white
+    # in all pixels keeps its brightness: the mean less one standard deviation.
     mean = color / each
     deviation = np.sqrt(np.maximum(square / each - np.square(mean), 0))
     return total, np.maximum(within / each, mean - deviation)

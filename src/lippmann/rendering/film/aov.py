@@ -1,7 +1,7 @@
-"""What each pixel sees, in numbers: ground truth for whoever estimates it from the picture.
+"""AOVs of the first surface: depth, normal, albedo, shape and position, as ground truth.
 
-One ray through each pixel's middle, and nothing averaged: between two surfaces there is no third. All layers speak of
-the display's frame (mm, +z toward the viewer).
+One ray through each pixel's centre, without averaging: the mean of two surfaces is neither. All layers are in the
+display's frame (mm, +z toward the viewer).
 """
 
 from __future__ import annotations
@@ -58,11 +58,11 @@ def trace_layers(
     built:
         The scene on the device.
     source:
-        Rays of the pixels. Of sub-pixels with rays of their own those in the middle count.
+        Rays of the pixels; of sub-pixels with rays of their own, those of the middle one.
     plan:
         Tiles from :func:`plan_layers`; the result is the same whatever they are.
     display_from_world:
-        ``(4, 4)`` affine map to the frame that the layers speak of.
+        ``(4, 4)`` affine map to the display's frame.
 
     Returns
     -------
@@ -97,14 +97,14 @@ def _trace_tile(
     # Opaque, so that one kernel serves all tiles.
     row += dr.opaque(mi.UInt32, tile.first_row)
     ray = source.rays(column, row, mi.UInt32(1), mi.Point2f(0.5))  # the sub-pixel in the middle
-    seen = surfaces.first_hit(ray)
-    position = to_frame(display_from_world, seen.p) + mi.Vector3f(*display_from_world[:3, 3].tolist())
-    position = dr.select(seen.hit, position, dr.nan)
+    surface = surfaces.first_hit(ray)
+    position = to_frame(display_from_world, surface.p) + mi.Vector3f(*display_from_world[:3, 3].tolist())
+    position = dr.select(surface.hit, position, dr.nan)
     values = {
-        "depth": dr.select(seen.hit, position.z, -dr.inf),
-        "normal": dr.select(seen.hit, dr.normalize(to_frame(normal_matrix(display_from_world), seen.n)), 0),
-        "albedo": seen.albedo,
-        "shape": dr.select(seen.hit, mi.Float(seen.shape), -1),
+        "depth": dr.select(surface.hit, position.z, -dr.inf),
+        "normal": dr.select(surface.hit, dr.normalize(to_frame(normal_matrix(display_from_world), surface.n)), 0),
+        "albedo": surface.albedo,
+        "shape": dr.select(surface.hit, mi.Float(surface.shape), -1),
         "position": position,
     }
     dr.eval(values)
@@ -118,7 +118,7 @@ def to_frame(matrix: NDArray[np.float64], vector: Vector3f) -> Vector3f:
 
 
 def to_numpy(value: Float | Vector3f, lanes: int) -> FloatArray:
-    """``(lanes,)`` or ``(lanes, channels)`` of an evaluated array; one of a single entry counts for every lane."""
+    """``(lanes,)`` or ``(lanes, channels)`` of an evaluated array; an array of width 1 is broadcast."""
     array = np.asarray(value, dtype=np.float32).T
     shape = (lanes,) if array.ndim == 1 else (lanes, array.shape[1])
     return np.ascontiguousarray(np.broadcast_to(array, shape))

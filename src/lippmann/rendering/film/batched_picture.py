@@ -1,4 +1,4 @@
-"""A picture whose samples are kept in batches: their sums, how many they are, and what follows from both."""
+"""A picture as sums and counts of several batches of samples, with its half-buffers and its error estimate."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from lippmann.rendering.film.wavefront_plan import Run
 
 Floats = NDArray[np.float32]
 
-#: Independent sample streams: two are the fewest that can be compared, and cost the least evenness.
+#: Independent sample streams. Two are enough to compare, and keep the best stratification.
 STREAMS = 2
 
 
@@ -26,18 +26,18 @@ class BatchedPicture:
     Parameters
     ----------
     batches:
-        How many, a multiple of ``STREAMS``.
+        Number of batches, a multiple of ``STREAMS``.
     shape:
-        Height and width of what is traced.
+        Height and width of the traced picture.
     channels:
         1, or 3 where each pixel has samples of its sub-pixels.
     transfer:
         How values become codes; errors are measured between codes.
-    keeps_seen, keeps_coverage:
-        Whether seen light and coverage are kept, too.
+    keeps_specular, keeps_coverage:
+        Whether specular light and coverage are kept, too.
     blur_after:
-        What blur adds to the squared error of each traced pixel ``(H, W, 3)``, linear, after so many samples; None
-        where there is none.
+        Squared bias of each traced pixel by the blur of caustics, ``(H, W, 3)`` linear, from the number of samples;
+        None without photons.
     """
 
     def __init__(
@@ -47,15 +47,15 @@ class BatchedPicture:
         channels: int,
         transfer: Transfer,
         *,
-        keeps_seen: bool,
+        keeps_specular: bool,
         keeps_coverage: bool,
         blur_after: Callable[[int], Floats | None],
     ) -> None:
         pixels = shape[0] * shape[1]
         self._shape, self._transfer = shape, transfer
         self._sums = np.zeros((batches, pixels, 3), dtype=np.float32)
-        self._seen = np.zeros((STREAMS, pixels, 3), dtype=np.float32) if keeps_seen else None
-        self._excess = np.zeros((1, pixels, 3), dtype=np.float32) if keeps_seen else None
+        self._specular = np.zeros((STREAMS, pixels, 3), dtype=np.float32) if keeps_specular else None
+        self._excess = np.zeros((1, pixels, 3), dtype=np.float32) if keeps_specular else None
         self._covered = np.zeros((STREAMS, pixels, channels), dtype=np.float32) if keeps_coverage else None
         #: Samples that each batch has of every pixel.
         self._taken = [0] * batches
@@ -70,12 +70,12 @@ class BatchedPicture:
 
     @property
     def samples(self) -> int:
-        """Samples that each pixel has had."""
+        """Samples per pixel so far."""
         return sum(self._taken)
 
     @property
     def batches(self) -> int:
-        """How many batches there are."""
+        """Number of batches."""
         return len(self._taken)
 
     @property
@@ -84,45 +84,45 @@ class BatchedPicture:
 
     def picture(self) -> Floats:
         """``(H, W, 3)`` float32: the mean of all samples, linear; black where there are none."""
-        return self.shown(self.traced_picture())
+        return self.displayed(self.traced_picture())
 
     def traced_picture(self) -> Floats:
-        """:meth:`picture` with all that is traced of it, see :meth:`shown`."""
+        """:meth:`picture` with all that is traced of it, see :meth:`displayed`."""
         return self._mean(self._sums)
 
     def traced_halves(self) -> tuple[Floats, Floats]:
-        """The means of either stream's samples, with all that is traced; they know nothing of each other."""
+        """Half-buffers A and B: the means of either stream, of all that is traced."""
         per_stream = self._batches_of_stream
         return self._means([self._sums[s * per_stream : (s + 1) * per_stream].sum(axis=0) for s in range(STREAMS)])
 
-    def seen_halves(self) -> tuple[Floats, Floats] | None:
-        """What of :meth:`traced_halves` is seen light; None where that is not told, or not kept."""
-        return None if self._seen is None else self._means(list(self._seen))
+    def specular_halves(self) -> tuple[Floats, Floats] | None:
+        """The specular light in :meth:`traced_halves`; None where it is not kept."""
+        return None if self._specular is None else self._means(list(self._specular))
 
-    def seen(self) -> Floats | None:
-        """What of :meth:`traced_picture` is seen light; None where that is not told, or not kept."""
-        return None if self._seen is None else self._mean(self._seen)
+    def specular(self) -> Floats | None:
+        """The specular light in :meth:`traced_picture`; None where it is not kept."""
+        return None if self._specular is None else self._mean(self._specular)
 
     def coverage_halves(self) -> tuple[Coverage, Coverage] | None:
-        """As the samples of either of :meth:`traced_halves` tell it; None where it is not told, or not kept."""
+        """Coverage of either half-buffer; None where it is not kept."""
         if self._covered is None:
             return None
         first, second = map(Coverage, self._means(list(self._covered)), self._per_stream())
         return first, second
 
     def excess(self) -> Floats | None:
-        """What of :meth:`picture` rests on single chains of seen light, see
-        :mod:`lippmann.rendering.transport.seen_light`; None where that is not told, or not kept."""
-        return None if self._excess is None else self.shown(self._mean(self._excess))
+        """The excess in :meth:`picture`, see :mod:`lippmann.rendering.transport.specular_chains`; None where it is not
+        kept."""
+        return None if self._excess is None else self.displayed(self._mean(self._excess))
 
     def _mean(self, sums: Floats) -> Floats:
-        """Of all samples, whose sums lie in several parts."""
+        """Mean of all samples from partial ``sums``."""
         total: Floats = sums.sum(axis=0)
         total *= np.float32(1 / max(1, self.samples))
         return total.reshape(*self.shape, 3)
 
     def _means(self, sums: Sequence[Floats]) -> tuple[Floats, Floats]:
-        """Of the sums of each stream."""
+        """Means of each stream from its ``sums``."""
         first, second = (
             (total * np.float32(1 / max(1, n))).reshape(*self.shape, -1)
             for total, n in zip(sums, self._per_stream(), strict=True)
@@ -130,7 +130,7 @@ class BatchedPicture:
         return first, second
 
     def _per_stream(self) -> list[int]:
-        """Samples of every pixel that each stream has had."""
+        """Samples per pixel of each stream."""
         each = self._batches_of_stream
         return [sum(self._taken[s * each : (s + 1) * each]) for s in range(STREAMS)]
 
@@ -146,7 +146,7 @@ class BatchedPicture:
         if self.samples < STREAMS:
             raise UsageError("one sample per pixel does not tell its own error", rule="two or more do")
         if self._errors is None:
-            error, outliers = error_of_batches(self.shown(self._sums), self._taken, self._transfer)
+            error, outliers = error_of_batches(self.displayed(self._sums), self._taken, self._transfer)
             shape = self.shape[0], -1
             error = error.reshape(shape)
             blur = self.squared_blur()
@@ -156,7 +156,7 @@ class BatchedPicture:
         return self._errors
 
     def squared_blur(self) -> Floats | None:
-        """``(H, W)``: what the blur of caustics adds to the squared errors of the codes; None where there is none.
+        """``(H, W)``: squared bias of the codes by the blur of caustics; None without photons.
 
         See :class:`lippmann.rendering.film.caustic_blur.SquaredBlur`.
         """
@@ -164,21 +164,21 @@ class BatchedPicture:
         if linear is None:
             return None
         slope = coding_slope(self.picture(), self._transfer)
-        blur: Floats = (np.square(slope) * self.shown(linear)).mean(axis=-1)
+        blur: Floats = (np.square(slope) * self.displayed(linear)).mean(axis=-1)
         return blur
 
-    def shown(self, values: Floats) -> Floats:
-        """Of values ``(..., W, 3)`` of what is traced those that the picture shows."""
+    def displayed(self, values: Floats) -> Floats:
+        """The display's pixels from traced values ``(..., W, 3)``."""
         return values
 
     def _keep(self, run: Run, sums: dict[str, Floats]) -> None:
-        """Add to its batches what :func:`~lippmann.rendering.film.wavefront.sum_samples` gives for a run."""
+        """Add the sums of a run (:func:`~lippmann.rendering.film.wavefront.sum_samples`) to its batches."""
         per_stream = self._batches_of_stream
         pixels = slice(run.first, run.last)
         for place, batch in enumerate(run.batches):
             kept = {
                 "radiance": (self._sums, batch),
-                "seen": (self._seen, batch // per_stream),
+                "specular": (self._specular, batch // per_stream),
                 "excess": (self._excess, 0),
                 "covered": (self._covered, batch // per_stream),
             }

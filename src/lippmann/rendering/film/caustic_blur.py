@@ -1,12 +1,11 @@
-"""The squared error that the blur of caustics by photons adds to the pixels of a picture.
+"""Squared bias of photon density estimation (the blur of caustics), per pixel.
 
-It is the same for all samples that share photons, so that nothing in how they differ tells of it. The photons of either
-half of the samples tell it independently, and the product of what they say is its square without bias.
+All samples that share photons have the same bias, so their variance does not show it. The photons of the two halves of
+the samples give two independent estimates of the bias; their product is an unbiased estimate of its square.
 
-A look-up of twice the radius differs from one of the radius about as much as that one differs from the truth. Squared,
-that is 9 times too much where light is smooth, whose blur grows with the square of the radius, and 2.3 times too little
-at straight edges, whose blur keeps its height and grows in width. Caustics have both; for those of the bundled scenes
-see ``docs/background/caustics.md``.
+The bias is estimated as the difference between a look-up of twice the radius and one of the radius. Squared, this is 9
+times too large where light is smooth (bias grows with the square of the radius), and 2.3 times too small at straight
+edges (blur keeps its height and grows in width). Caustics have both; ``docs/background/caustics.md`` has figures.
 """
 
 from __future__ import annotations
@@ -26,22 +25,21 @@ from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.ray_source import RaySource, pixel_number
-from lippmann.rendering.transport.shown_caustics import ShownBlur
+from lippmann.rendering.transport.visible_caustics import VisibleBlur
 
 Floats = NDArray[np.float32]
 
-#: Of a picture of fewer samples only some pixels are looked at, one for each in this many samples; and so many of the
-#: whole picture, at least.
-SAMPLES_OF_LOOK, FEWEST_LOOKED_AT = 256, 1 << 12
+#: Share of the pixels whose bias is measured: samples per pixel over the first number, but at least so many pixels.
+SAMPLES_OF_PIXEL, FEWEST_PIXELS = 256, 1 << 12
 
 
 class SquaredBlur:
-    """Expected square of what blur adds to the linear pixels of a window.
+    """Expected squared bias by blur of the linear pixels of a window.
 
     Parameters
     ----------
     integrator, source, window:
-        Of the picture; pixels have the same values in any window.
+        Those of the picture; a pixel has the same value in any window.
     seed:
         Of the picture, 0 to 2**32 - 1.
     """
@@ -55,7 +53,7 @@ class SquaredBlur:
         self._of_pass = np.zeros((0, 3), np.float32)
 
     def after(self, samples: int) -> Floats | None:
-        """``(H, W, 3)`` for a picture of so many samples per pixel; None where no photons are in passes.
+        """``(H, W, 3)`` squared bias of a picture of ``samples`` samples per pixel; None without photon passes.
 
         Values of single pixels are noisy, and may be negative; their sums are not biased.
         """
@@ -63,19 +61,19 @@ class SquaredBlur:
         if passes is None:
             return None
         pixels = self._source.width * self._source.height
-        share = min(1.0, max(samples / SAMPLES_OF_LOOK, FEWEST_LOOKED_AT / pixels))
-        # A look is worth its time again at twice the share.
+        share = min(1.0, max(samples / SAMPLES_OF_PIXEL, FEWEST_PIXELS / pixels))
+        # Measured anew at each doubling of the share.
         if share >= 2 * self._share or share == 1.0 > self._share:
-            # The photons that the last sample met are at hand.
+            # The photons of the last sample are cached.
             self._share, self._pass = share, (samples - 1) // passes.pass_samples
             self._of_pass = self._measure(passes.of_pass(self._pass), share)
         scaled = _mean_area(passes, samples) / radius_of_pass(self._pass) ** 2
         return (self._of_pass * np.float32(scaled**2)).reshape(*self._window.shape, 3)
 
     def _measure(self, photons: PhotonMap, share: float) -> Floats:
-        """``(pixels, 3)``, of this share of the pixels, each of which stands for its like."""
+        """``(pixels, 3)`` from a ``share`` of the pixels, each weighted by 1 / share; the others are 0."""
         assert isinstance(self._integrator, PathIntegrator)
-        blur = ShownBlur(self._integrator, photons)
+        blur = VisibleBlur(self._integrator, photons)
         chosen = _choose_pixels(self._source, self._window, self._seed, share)
         squares = np.zeros((self._window.pixels, 3), np.float32)
         step = max(1, PREFERRED_LANES // (2 * self._source.channels))
@@ -86,7 +84,7 @@ class SquaredBlur:
 
 
 def _mean_area(passes: CausticPhotons, samples: int) -> float:
-    """Mean squared radius of the passes that serve so many samples, over that of the first: blur is as that."""
+    """Mean squared radius over the passes of ``samples`` samples, relative to the first: bias is proportional to it."""
     size = passes.pass_samples
     served = (min(size, samples - first) for first in range(0, samples, size))
     return sum(each * radius_of_pass(number) ** 2 for number, each in enumerate(served)) / samples
@@ -101,8 +99,8 @@ def _choose_pixels(source: RaySource, window: PixelWindow, seed: int, share: flo
     return np.flatnonzero(mixed < share * 2**32)
 
 
-def _products(blur: ShownBlur, source: RaySource, window: PixelWindow, pixels: NDArray[np.intp], seed: int) -> Floats:
-    """``(pixels, 3)``: what the first half's photons say times what the second's do."""
+def _products(blur: VisibleBlur, source: RaySource, window: PixelWindow, pixels: NDArray[np.intp], seed: int) -> Floats:
+    """``(pixels, 3)``: product of the bias estimates of the two halves."""
     channels = source.channels
     lanes = len(pixels) * channels * 2
     rest, half = divide(dr.arange(mi.UInt32, lanes), 2)

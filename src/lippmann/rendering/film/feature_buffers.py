@@ -1,4 +1,4 @@
-"""Guides for a denoiser: what each pixel sees on the average of its samples."""
+"""Feature buffers of the denoiser (guides): albedo, normal and height, averaged over a pixel's samples."""
 
 from __future__ import annotations
 
@@ -31,9 +31,8 @@ FloatArray = NDArray[np.float32]
 class Guides:
     """``albedo`` and ``normal``, ``(H, W, 3)`` float32 each; components in [0, 1] and in [-1, 1] (display frame).
 
-    ``height`` is ``(H, W)`` float32: the z (mm) at which things seem to lie, those in mirrors behind them. None where
-    it is not known. ``coverage`` is told by the first and by the second half of their samples; None where it is not
-    known.
+    ``height`` is ``(H, W)`` float32: apparent z (mm), of reflections behind their mirror. ``coverage`` is that of the
+    first and of the second half of the guides' samples. Both are None where they are not known.
     """
 
     albedo: FloatArray
@@ -42,15 +41,15 @@ class Guides:
     coverage: tuple[Coverage, Coverage] | None = None
 
     def reflected(self) -> FloatArray:
-        """``(H, W, 3)``: what colour is divided by for light that can be shared, and light multiplied by for colour.
+        """``(H, W, 3)``: divisor that demodulates colour into light that can be shared, and the factor back.
 
-        The albedo, and a little more: black surfaces that shine have light, too.
+        The albedo plus a small offset, as black glossy surfaces reflect light, too.
         """
         return np.asarray(np.clip(self.albedo, 0, 1) + np.float32(0.02), dtype=np.float32)
 
 
 def plan_guides(source: RaySource, samples: int, memory: int) -> Plan:
-    """Tiles and passes for the guides of a picture of so many samples a pixel, within ``memory`` bytes.
+    """Tiles and passes for guides of ``samples`` samples per pixel, within ``memory`` bytes.
 
     Raises
     ------
@@ -71,15 +70,15 @@ def trace_guides(
     box_filter: bool = True,
     progress: ProgressCallback = silent,
 ) -> Guides:
-    """Albedo, normal, height of the first surface that is neither mirror nor clear glass, as a pixel's samples see it.
+    """Mean albedo, normal and height of the first surface along a pixel's rays that is neither mirror nor clear glass.
 
-    ``plan`` comes from :func:`plan_guides`; ``box_filter`` is that of the picture, ``seed`` should be another one:
-    where samples fall is all the noise that guides hold, and it would be the picture's own. A sub-pixel that has rays
-    of its own gets its own channel of the albedo from them; normal and height are the means of all three.
+    ``plan`` comes from :func:`plan_guides`; ``box_filter`` is that of the picture. ``seed`` should differ from the
+    picture's: else guides and picture share the same sample positions, and so the same noise. A sub-pixel with rays of
+    its own gets its own channel of the albedo from them; normal and height are the means of all three.
     """
     surfaces = make_surfaces(built)
     matrix = np.asarray(display_from_world, dtype=np.float64)
-    # Normals of the scene's own shape: where depth is compressed, those of the display would hardly differ.
+    # Normals of the uncompressed scene: with compressed depth, those in the display's frame would hardly differ.
     rotation = rotation_of(inverse(matrix))[:3, :3].T.astype(np.float32)
     albedo = np.zeros((plan.height, plan.width, 3), dtype=np.float32)
     normal = np.zeros_like(albedo)
@@ -88,9 +87,9 @@ def trace_guides(
     done = 0
     for tile, run in plan:
         rows = slice(tile.first_row, tile.first_row + tile.rows)
-        found = _trace_tile(surfaces, source, plan, tile, run, seed, box_filter, matrix[2])
+        sums = _trace_tile(surfaces, source, plan, tile, run, seed, box_filter, matrix[2])
         shape = (tile.rows, plan.width, plan.channels)
-        colors, normals, heights, *halves = (_in_rows(part, shape) for part in found)
+        colors, normals, heights, *halves = (_in_rows(part, shape) for part in sums)
         height[rows] += heights.mean(axis=2) / plan.samples
         if plan.channels == 3:
             colors = np.diagonal(colors, axis1=2, axis2=3)[:, :, None]
@@ -133,12 +132,12 @@ def _trace_tile(
     albedo, normal, distance, covered = surfaces.features(ray)
     x, y, z = mi.Point3f(ray.o) + mi.Vector3f(ray.d) * distance
     weights = [dr.opaque(mi.Float, float(weight)) for weight in z_from_world]
-    # For what lies farther than 100 m the light lines of all lenses are parallel.
+    # Beyond 100 m the light lines of all lenses are parallel.
     height = dr.clip(x * weights[0] + y * weights[1] + z * weights[2] + weights[3], -1e5, 1e5)
     is_first = stream.index < dr.opaque(mi.UInt32, plan.samples // 2)
     hits = [dr.select(covered & of_half, mi.Float(1), mi.Float(0)) for of_half in (is_first, ~is_first)]
     values = [mi.Float(part) + dr.zeros(mi.Float, lanes) for part in (*albedo, *normal, height, *hits)]
-    # All at once: sums one by one would follow the rays nine times.
+    # All at once: evaluated one by one, the rays would be traced nine times.
     dr.eval(values)
     if run.count > 1:
         values = [dr.block_sum(part, run.count) for part in values]

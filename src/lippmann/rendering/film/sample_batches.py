@@ -1,10 +1,9 @@
-"""Every ray of every pixel, in batches: from how they differ follows the error of the picture they make together.
+"""Full rendering in batches of samples, whose differences give the error of the picture.
 
-The samples of a pixel come from ``STREAMS`` sample streams that know nothing of each other, and those of each stream
-in equally many runs, one batch each. Samples of one stream are spread evenly over the pixel and the lights together, so
-that a picture from few streams is better than one from many; the difference between streams tells how much better.
-They are traced here, wavefront by wavefront. What is kept of them is in :mod:`.batched_picture`, and what the batches
-tell is worked out in :mod:`lippmann.rendering.estimate.jackknife`.
+The samples of a pixel come from ``STREAMS`` independent sample streams. Each stream is divided into equally many
+batches. The samples of one stream are stratified together over the pixel and the emitters, so fewer streams mean less
+variance; the difference between streams measures how much less. This module traces the samples, wavefront by wavefront.
+:mod:`.batched_picture` holds their sums, :mod:`lippmann.rendering.estimate.jackknife` estimates the error.
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ Floats = NDArray[np.float32]
 
 
 class FullInBatches(BatchedPicture):
-    """A picture that gets better with every call of :meth:`add` and knows how good it is.
+    """A progressive picture with an estimate of its own error; :meth:`add` takes more samples.
 
     Parameters
     ----------
@@ -61,17 +60,17 @@ class FullInBatches(BatchedPicture):
     transfer:
         How values become codes; errors are measured between codes.
     memory:
-        Bytes that may be used, the picture's own included; the fewer, the fewer batches are kept apart.
+        Bytes that may be used, the picture's own included; less memory means fewer batches.
     window:
-        The part of the picture that is rendered; None for all of it. Parts rendered apart are the same as in one piece.
+        The part of the picture that is rendered; None for all of it. Its pixels are those of the whole picture.
     for_denoiser:
-        What a denoiser treats apart is kept, too, where the integrator tells it: see :meth:`seen_halves` and
+        Specular light and coverage are kept, too, where the integrator separates them: see :meth:`specular_halves` and
         :meth:`coverage_halves`.
 
     Attributes
     ----------
     rays, seconds_compile, seconds_trace:
-        What all calls of :meth:`add` took together.
+        Totals over all calls of :meth:`add`.
 
     Raises
     ------
@@ -101,7 +100,7 @@ class FullInBatches(BatchedPicture):
         self._window = window or PixelWindow(0, 0, source.width, source.height)
         pixels = self._window.pixels
         keeps_coverage = for_denoiser and isinstance(integrator, PathIntegrator)
-        keeps_seen = isinstance(integrator, PathIntegrator) and for_denoiser and integrator.light.chains is not None
+        keeps_specular = isinstance(integrator, PathIntegrator) and for_denoiser and integrator.light.chains is not None
         further = memory_model.FOR_DENOISER * keeps_coverage
         batches, self._lanes = _sizes(pixels, source.channels, memory, further)
         super().__init__(
@@ -109,7 +108,7 @@ class FullInBatches(BatchedPicture):
             self._window.shape,
             source.channels,
             transfer,
-            keeps_seen=keeps_seen,
+            keeps_specular=keeps_specular,
             keeps_coverage=keeps_coverage,
             blur_after=SquaredBlur(integrator, source, self._window, seed).after,
         )
@@ -137,7 +136,7 @@ class FullInBatches(BatchedPicture):
         self.seconds_compile += compiled
         self.seconds_trace += time.perf_counter() - started - compiled
 
-    def shown(self, values: Floats) -> Floats:
+    def displayed(self, values: Floats) -> Floats:
         """``(..., H, W, 3)``; of sub-pixels whose rays keep all colours, ``(..., H, 3 W, 3)``, each its own colour."""
         return self._source.own_colors(values) if isinstance(self._source, SubpixelRays) else values
 
@@ -145,9 +144,9 @@ class FullInBatches(BatchedPicture):
         """Wavefronts that take ``samples`` more of every pixel."""
         number, per_stream = self.batches, self._batches_of_stream
         each, rest = divmod(samples, number)
-        # Where the streams go on; their batches take one stretch after the other.
+        # The next sample of each stream; its batches take consecutive runs of samples.
         had = self._per_stream()
-        # The rest goes to the batches that have the fewest, in turn of their streams.
+        # The remainder goes to the batches with the fewest samples, alternating between streams.
         fewest = sorted(_alternate(number), key=lambda batch: self._taken[batch])
         for batches, count in ((tuple(range(number)), each), (tuple(sorted(fewest[:rest])), 1)):
             starts = []
@@ -160,11 +159,11 @@ class FullInBatches(BatchedPicture):
                 yield from cut_batches(pixels, batches, tuple(starts), count, lanes, strip)
 
     def _trace(self, integrator: Integrator, run: Run, together: int) -> dict[str, Floats]:
-        """What :func:`~lippmann.rendering.film.wavefront.sum_samples` gives for a run; excess by the samples that every
-        pixel then has ``together``.
+        """Sums of a run (:func:`~lippmann.rendering.film.wavefront.sum_samples`); every pixel then has ``together``
+        samples, by which excess is limited.
 
-        Lanes are ordered pixel (see :mod:`.wavefront`), then channel, then batch, then sample. What differs from run
-        to run is opaque to the compiler, so that all share a kernel.
+        Lanes are ordered pixel (see :mod:`.wavefront`), channel, batch, sample. Values that differ from run to run are
+        opaque to the compiler, so that all runs share a kernel.
         """
         channels, window = self._source.channels, self._window
         number, per_stream = len(run.batches), self._batches_of_stream
@@ -190,7 +189,7 @@ class FullInBatches(BatchedPicture):
 
 
 def _stretches(integrator: Integrator, first: int, samples: int) -> Iterator[tuple[Integrator, int]]:
-    """Parts of ``samples`` of each pixel from number ``first`` on, each with the integrator that has its light."""
+    """Runs of ``samples`` samples per pixel from number ``first`` on, each with the integrator of its photon pass."""
     while samples > 0:
         count, current = samples, integrator
         if isinstance(integrator, PathIntegrator):
@@ -212,7 +211,7 @@ def trace_in_batches(
     memory: int,
     progress: ProgressCallback = silent,
 ) -> tuple[Frame, PixelErrors]:
-    """The picture of ``samples`` (two or more) of every pixel and its errors, band by band of rows.
+    """The picture of ``samples`` (two or more) samples per pixel and its errors, in bands of rows.
 
     Only one band's batches are kept at a time, so that memory follows ``memory`` for pictures of any size.
 
@@ -245,10 +244,10 @@ def trace_in_batches(
         )
         band.add(samples, of_part(progress, first / height, (last - first) / height, samples * height * width))
         whole[first:last] = band.picture()
-        found = band.squared_error()
-        error[first:last] = found.values
-        outliers[first:last] = 0 if found.outliers is None else found.outliers
-        blur[first:last] = 0 if found.blur is None else found.blur
+        band_errors = band.squared_error()
+        error[first:last] = band_errors.values
+        outliers[first:last] = 0 if band_errors.outliers is None else band_errors.outliers
+        blur[first:last] = 0 if band_errors.blur is None else band_errors.blur
         frame.rays += band.rays
         frame.seconds_compile += band.seconds_compile
         frame.seconds_trace += band.seconds_trace
@@ -256,13 +255,13 @@ def trace_in_batches(
 
 
 def _alternate(number: int) -> tuple[int, ...]:
-    """Batches in turn of their streams."""
+    """Batch numbers, alternating between streams."""
     per_stream = number // STREAMS
     return tuple(stream * per_stream + place for place in range(per_stream) for stream in range(STREAMS))
 
 
 def _sizes(pixels: int, channels: int, memory: int, further: int) -> tuple[int, int]:
-    """How many batches are kept beside ``further`` bytes of a pixel, and the lanes of a wavefront."""
+    """Number of batches that fit beside ``further`` bytes per pixel, and the lanes of a wavefront."""
     for batches in (memory_model.MOST_BATCHES, memory_model.MOST_BATCHES // 2, STREAMS):
         kept = pixels * (memory_model.batches(batches) + further)
         needed = min(memory_model.SMALLEST_LANES, pixels * channels * batches)

@@ -1,10 +1,10 @@
-"""Every ray of every pixel: the reference that all other methods are judged by.
+"""Wavefronts of samples: every ray of every pixel, without reuse.
 
-Pixels are traced column by column in strips of four rows. The processor follows the rays of 16 lanes at once, until the
-last of them has ended. Four rows of a column look the same way through lenses above each other, or through neighbouring
-points of one lens, and meet much the same; four pixels of a row are as many views. Samples know their pixel, so that no
-order changes the picture. What is left below the last whole strip lies in rows. Lanes are *places* in this order;
-pictures are in rows.
+Pixels are traced column by column in strips of four rows, for coherence: the processor traces the rays of 16 lanes
+together, until the last of them ends. Four rows of a column look in the same direction through lenses above each other,
+or through neighbouring points of one lens, and hit much the same; four pixels of a row are four views. The random
+numbers depend on the pixel alone, so the order does not change the picture. Rows below the last whole strip are traced
+row by row. Lanes are *places* in this order; pictures are in rows.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
 from lippmann.rendering.transport.integrator import Integrator, PixelSample
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource, pixel_number
-from lippmann.rendering.transport.seen_light import sample_pixel
+from lippmann.rendering.transport.specular_chains import sample_pixel
 
 T = TypeVar("T", bound=np.generic)
 
@@ -36,7 +36,7 @@ STRIP_ROWS = 4
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """Share of a pixel's samples whose primary ray meets a surface; what the others see is behind all surfaces.
+    """Coverage: share of a pixel's samples whose primary ray hits a surface.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Coverage:
     samples: int
 
     def __add__(self, other: Coverage) -> Coverage:
-        """By the samples of both."""
+        """Coverage by the samples of both."""
         samples = self.samples + other.samples
         hits = self.samples * self.share + other.samples * other.share
         return Coverage((hits / max(1, samples)).astype(np.float32), samples)
@@ -76,7 +76,7 @@ class RayTotals:
 
 @dataclass
 class Frame:
-    """A rendered picture with what it took.
+    """A rendered picture with its costs.
 
     Attributes
     ----------
@@ -85,11 +85,11 @@ class Frame:
     maps:
         Further layers ``(height, width)`` of the methods that have any.
     shares:
-        How the pixels came about, as shares of all; empty where all were traced.
+        Shares of pixels that were traced, reprojected and interpolated; empty where all were traced.
     seen, excess:
-        What of ``pixels`` is seen light, and what of that rests on single chains; None where that is not told.
+        The specular light in ``pixels`` and its excess; None where they are not separated.
     coverage:
-        How much of the pixels surfaces cover; None where that is not told.
+        Coverage of the pixels by surfaces; None where it is not known.
     """
 
     pixels: NDArray[np.float32]
@@ -99,7 +99,7 @@ class Frame:
     seconds_reuse: float = 0.0
     maps: dict[str, NDArray[np.generic]] = field(default_factory=dict)
     shares: dict[str, float] = field(default_factory=dict)
-    seen: NDArray[np.float32] | None = None
+    specular: NDArray[np.float32] | None = None
     excess: NDArray[np.float32] | None = None
     coverage: Coverage | None = None
 
@@ -117,9 +117,8 @@ def trace_frame(
 ) -> Frame:
     """Trace all samples of ``plan`` and average them per pixel.
 
-    Where ``plan`` is of a part of the picture, ``corner`` is the row and column of that part's first pixel; its pixels
-    are then the same as those of the whole. ``for_denoiser`` keeps what one treats apart, too, where the integrator
-    tells it: seen light and coverage.
+    For a part of a picture, ``corner`` is the row and column of its first pixel; its pixels are then those of the
+    whole. ``for_denoiser`` keeps specular light and coverage, too, where the integrator separates them.
     """
     frame = Frame(np.zeros((plan.height, plan.width, 3), dtype=np.float32))
     parts = {"radiance": frame.pixels}
@@ -143,7 +142,7 @@ def trace_frame(
             parts[name][tile.first_row : tile.first_row + tile.rows] += in_rows
         done += lanes
         progress(Progress("trace", done, plan.work))
-    frame.seen, frame.excess = parts.get("seen"), parts.get("excess")
+    frame.specular, frame.excess = parts.get("specular"), parts.get("excess")
     frame.coverage = Coverage(parts["covered"], plan.samples) if "covered" in parts else None
     frame.seconds_trace = time.perf_counter() - started - frame.seconds_compile
     return frame
@@ -158,11 +157,10 @@ def samples_of_tile(
     box_filter: bool,
     corner: tuple[int, int] = (0, 0),
 ) -> tuple[PixelRays, SampleStream]:
-    """The pixels and sample streams of one wavefront, lanes ordered pixel (see the module's head), then channel, then
-    sample.
+    """The pixels and sample streams of one wavefront; lanes are ordered pixel (see the module), channel, sample.
 
-    ``corner``: row and column at which the part of the picture begins that ``plan`` is of. Whatever differs from tile
-    to tile is opaque to the compiler, so that all tiles run the same kernel.
+    ``corner`` as in :func:`trace_frame`. Values that differ from tile to tile are opaque to the compiler, so that all
+    tiles share a kernel.
     """
     lanes = tile.rows * plan.width * plan.channels * run.count
     per_channel, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
@@ -180,22 +178,22 @@ def samples_of_tile(
 def sample_pixels(
     integrator: Integrator, pixels: PixelRays, stream: SampleStream, samples: Float | None
 ) -> PixelSample:
-    """One sample of each lane's pixel; seen light and coverage apart where the integrator tells them and ``samples``
-    are given, those of the pixel so far, these included."""
+    """One sample of each lane's pixel; specular light and coverage separately where the integrator has them and
+    ``samples``, the pixel's samples up to and including these, are given."""
     if isinstance(integrator, PathIntegrator):
         return sample_pixel(integrator, pixels, stream, mi.Bool(True), samples)
     return PixelSample(*integrator.sample(pixels.ray(stream), stream, mi.Bool(True)))
 
 
 def evaluate(sample: PixelSample, lanes: int, totals: RayTotals) -> None:
-    """Evaluate the light of a wavefront; it is black where it is not finite. ``totals`` grows by the rays it took."""
+    """Evaluate the radiance of a wavefront, set it to black where it is not finite, and add its rays to ``totals``."""
     counts = sample.counts
     sample.radiance, finite = finite_or_black(sample.radiance)
-    if sample.seen is not None:
-        sample.seen = dr.select(finite, sample.seen, mi.Color3f(0))
+    if sample.specular is not None:
+        sample.specular = dr.select(finite, sample.specular, mi.Color3f(0))
         sample.excess = dr.select(finite, sample.excess, mi.Color3f(0))
     # All at once: a sum of an unevaluated radiance would run the path loop anew.
-    dr.eval(sample.radiance, sample.seen, sample.excess, sample.covered, counts.secondary, counts.shadow, finite)
+    dr.eval(sample.radiance, sample.specular, sample.excess, sample.covered, counts.secondary, counts.shadow, finite)
     totals.primary += lanes
     totals.secondary += lane_total(counts.secondary)
     totals.shadow += lane_total(counts.shadow)
@@ -209,12 +207,12 @@ def finite_or_black(radiance: Spectrum) -> tuple[Color3f, Bool]:
 
 
 def sum_samples(sample: PixelSample, channels: int, batches: int, count: int) -> dict[str, NDArray[np.float32]]:
-    """``(pixels, batches, 3)`` sums of what is told of evaluated samples, ``(pixels, batches, channels)`` of coverage.
+    """Sums of evaluated samples ``(pixels, batches, 3)`` by name, and of coverage ``(pixels, batches, channels)``.
 
     Lanes are ordered pixel, channel, batch, sample.
     """
     sums: dict[str, NDArray[np.float32]] = {}
-    for name in ("radiance", "seen", "excess"):
+    for name in ("radiance", "specular", "excess"):
         light = getattr(sample, name)
         if light is not None:
             parts = [dr.block_sum(component, count) if count > 1 else component for component in light]
@@ -226,9 +224,9 @@ def sum_samples(sample: PixelSample, channels: int, batches: int, count: int) ->
 
 
 def select_colors(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """``(pixels, ..., 3)``: of ``(pixels, channels, ..., 3)`` what the pixels show.
+    """``(pixels, ..., 3)`` from ``(pixels, channels, ..., 3)``: the own colour of each sub-pixel.
 
-    The rays of a sub-pixel carry all three colours; it shows its own.
+    The rays of a sub-pixel carry all three colours.
     """
     if values.shape[1] == 1:
         return values[:, 0]
@@ -247,7 +245,7 @@ def compile_seconds() -> float:
 
 
 def in_strips(pixels: int, width: int) -> int:
-    """How many of the first ``pixels`` of a picture of ``width`` lie in whole strips."""
+    """Number of pixels in whole strips, of the first ``pixels`` of a picture of that ``width``."""
     strip = STRIP_ROWS * width
     return pixels // strip * strip
 
@@ -272,7 +270,7 @@ def pixel_at(place: UInt32, width: UInt32 | int, strips: UInt32) -> tuple[UInt32
 
 
 def to_rows(values: NDArray[T], width: int) -> NDArray[T]:
-    """``values (pixels, ...)`` in rows, of values in the order of places that begin with a strip."""
+    """``values (pixels, ...)`` reordered from places, which begin with a strip, to rows."""
     whole = in_strips(len(values), width)
     inner = values.shape[1:]
     ordered = np.empty_like(values)

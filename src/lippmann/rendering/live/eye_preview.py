@@ -54,8 +54,8 @@ def render_eye_preview(
     """
     resolved = resolve(replace(request, method="full"), scene, display)
     width, height = display.panel.size_inside(*(size or (LONGER_SIDE, LONGER_SIDE)))
-    seen = EyeMap(display, (width, height), subpixels=bool(resolved.subpixels)).seen_by(eye)
-    samples = _choose_samples(request, resolved, len(seen.column))
+    visible = EyeMap(display, (width, height), subpixels=bool(resolved.subpixels)).seen_by(eye)
+    samples = _choose_samples(request, resolved, len(visible.column))
     denoises = _denoises(request, resolved, scene)
     # The noise is taken out of what the eye sees, not of what is traced.
     plain = replace(resolved, spp=samples, denoise="none")
@@ -64,31 +64,31 @@ def render_eye_preview(
 
     # Mitsuba may be loaded now that the engine has chosen its libraries.
     from lippmann.rendering.denoise.dual_buffer import clean_light
-    from lippmann.rendering.denoise.guided_denoiser import SurfacePart, denoise_seen, effort_of
+    from lippmann.rendering.denoise.guided_denoiser import SurfacePart, denoise_surfaces, effort_of
     from lippmann.rendering.job import Job
     from lippmann.rendering.methods import guided_denoiser, one_stream
     from lippmann.rendering.transport.ray_source import DisplayRays, SinglePixelRays
 
     whole = DisplayRays(display, placement.world_from_display, bool(resolved.subpixels))
-    source = SinglePixelRays(whole, seen.column, seen.row, seen.channel)
+    source = SinglePixelRays(whole, visible.column, visible.row, visible.channel)
     integrator = session.integrator(whole, placement.display_from_world, placement.exposure)
     job = Job(session, integrator, source, placement.display_from_world)
     frame = one_stream(job).frame
-    picture = seen.arrange(frame.pixels[0])
+    picture = visible.arrange(frame.pixels[0])
     options: dict[str, object] = {}
     if denoises:
         effort, guides = effort_of(request.denoise, samples), guided_denoiser(job).guides()
         noisy, albedo, normal = (
-            seen.arrange_lenses(values[0]) for values in (frame.pixels, guides.albedo, guides.normal)
+            visible.arrange_lenses(values[0]) for values in (frame.pixels, guides.albedo, guides.normal)
         )
         surfaces = SurfacePart.of(normal)
 
         def take_noise_out(light: Floats, *_: object) -> Floats:
-            return denoise_seen(light, albedo, normal, surfaces, effort=effort)
+            return denoise_surfaces(light, albedo, normal, surfaces, effort=effort)
 
         clean = session.watch.stage("denoise", lambda: clean_light(noisy, None, take_noise_out, samples))
-        picture = clean if seen.blocks is None else seen.arrange(seen.values_of_lenses(clean))
-        picture *= seen.number >= 0
+        picture = clean if visible.blocks is None else visible.arrange(visible.values_of_lenses(clean))
+        picture *= visible.number >= 0
         options = {"denoise": "oidn", "denoise_effort": effort}
     frame.pixels = picture
     provenance = session.provenance(
@@ -97,7 +97,7 @@ def render_eye_preview(
         options={"eye": list(eye), **options, **placed_options(resolved, placement)},
         notes=placement.warnings,
     )
-    return Preview(resolved.shown(picture), provenance)
+    return Preview(resolved.tone_mapped(picture), provenance)
 
 
 def _choose_samples(asked: RenderRequest, resolved: RenderRequest, pixels: int) -> int:

@@ -71,9 +71,9 @@ class LiveRenderer:
         self._display = display
         # Of the eyes of some pages, and of a whole panel that moves and that rests.
         self._map = lru_cache(4)(EyeMap)
-        self._seen = lru_cache(4)(lambda map, eye: map.seen_by(eye))
+        self._visible = lru_cache(4)(lambda map, eye: map.seen_by(eye))
         self._window = lru_cache(2)(window_pixels)
-        self._shown: PlacedView | None = None
+        self._latest: PlacedView | None = None
         self._height: Floats = np.zeros(0, np.float32)
         self.set_scene(scene)
 
@@ -98,13 +98,13 @@ class LiveRenderer:
         """
         self._kernels = self._open(scene)
         self._scene = scene
-        self._shown = None
+        self._latest = None
 
     @exclusive()
     def set_display(self, display: Display) -> None:
         """Show the scene on another display, or on the same one in another size."""
         self._display = display
-        self._shown = None
+        self._latest = None
 
     def frame(self, view: LiveView) -> LiveFrame:
         """A picture of one sample a pixel in direct light, for a view that changes.
@@ -144,7 +144,7 @@ class LiveRenderer:
                 lanes = Lanes(stand.pixels, slice(start, start + step))
                 found = tracer.trace(lanes, stand.placed, seed=stand.request.seed)
                 values[lanes.part], heights[lanes.part] = found.sums[0], found.height
-        self._shown, self._height = stand, heights
+        self._latest, self._height = stand, heights
         with _timed(seconds, "encode"):
             codes = develop(values, stand.pixels, stand.request)
             if view.eye is None and view.row_step > 1:
@@ -182,11 +182,11 @@ class LiveRenderer:
         ``(height, width)`` float32; NaN where nothing is seen. Compare with the display's ``resolvable_depth`` for what
         blurs.
         """
-        if self._shown is None or self._shown.view != view:
+        if self._latest is None or self._latest.view != view:
             self.frame(view)
-        assert self._shown is not None
+        assert self._latest is not None
         # Where sub-pixels have rays of their own the green one stands for the pixel.
-        number = self._shown.pixels.number[..., self._shown.pixels.channels // 2]
+        number = self._latest.pixels.number[..., self._latest.pixels.channels // 2]
         with_nothing = np.append(self._height, np.float32(np.nan))
         return np.asarray(with_nothing[number], np.float32)
 
@@ -254,7 +254,7 @@ class LiveRenderer:
             if view.eye is None:
                 pixels = self._window(display, view.window, subpixels=subpixels, row_step=view.row_step)
             else:
-                pixels = self._seen(self._map(display, view.size, subpixels=subpixels), view.eye)
+                pixels = self._visible(self._map(display, view.size, subpixels=subpixels), view.eye)
         stand = PlacedView(kernels, display, view, resolved, placement, placed, pixels)
         kernels.lit_for = stand
         return stand

@@ -25,8 +25,8 @@ from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler, WeightedLightSampler
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource
-from lippmann.rendering.transport.seen_light import seen_light
 from lippmann.rendering.transport.sharp_events import sharp_lobe
+from lippmann.rendering.transport.specular_chains import specular_light
 
 #: Dimensions of the sample stream at one surface.
 DIMENSIONS_PER_SURFACE = 4
@@ -88,11 +88,11 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
     return Pilot(moments, indirect, int(placed.sum()), _region_about(point.T[hit != 0].astype(np.float64)))
 
 
-def brightest_seen_light(integrator: PathIntegrator, source: RaySource) -> float:
+def brightest_specular_light(integrator: PathIntegrator, source: RaySource) -> float:
     """Largest radiance, exposed, the mean of its components, that a chain of sharp events shows in the picture."""
     stream, column, row, _ = _place_of(dr.arange(mi.UInt32, TUNING.pilot_chains), source)
     pixel, number = PixelRays(source, column, row, mi.UInt32(0)), dr.opaque(mi.UInt32, 1)
-    light = integrator.exposed(seen_light(integrator, pixel, stream, number, mi.Bool(True))[0])
+    light = integrator.exposed(specular_light(integrator, pixel, stream, number, mi.Bool(True))[0])
     return float(dr.max(dr.mean(light))[0])
 
 

@@ -11,7 +11,7 @@ from lippmann.options.choices import REUSING
 from lippmann.rendering.film.memory_model import LIGHT_VERTEX
 from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
 from lippmann.rendering.preparation.photons import shoot_photons
-from lippmann.rendering.preparation.pilot import Pilot, brightest_seen_light, make_light_sampler, trace_pilot
+from lippmann.rendering.preparation.pilot import Pilot, brightest_specular_light, make_light_sampler, trace_pilot
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import has_sharp_surfaces
@@ -118,7 +118,7 @@ def trace_light_vertices(
 
 
 def count_chains(integrator: PathIntegrator, request: RenderRequest, source: RaySource) -> int:
-    """Chains of sharp events of each path (:mod:`~lippmann.rendering.transport.seen_light`): a fixed number, or none.
+    """Specular chains per path (:mod:`~lippmann.rendering.transport.specular_chains`): a fixed number, or 0.
 
     A denoiser takes highlights for noise, so a denoised picture shows seen light by chains if one of the pilot's meets
     light brighter than white. None where all rays of a pixel are one, or its points are taken from others.
@@ -126,4 +126,4 @@ def count_chains(integrator: PathIntegrator, request: RenderRequest, source: Ray
     is_denoised = request.denoise != "none" and request.box_filter and request.method not in REUSING
     if not is_denoised or not has_sharp_surfaces(integrator.scene):
         return 0
-    return TUNING.chains if brightest_seen_light(integrator, source) > 1 else 0
+    return TUNING.chains if brightest_specular_light(integrator, source) > 1 else 0

@@ -1,1 +1,1 @@
-"""Using traced points again: from micro-image to micro-image, as the 2014 paper does, and faster."""
+"""Reprojection of traced points between micro-images, in the order of the 2014 paper and in a faster one."""

@@ -1,4 +1,4 @@
-"""Missed pixels as the mean of the corresponding ones under the lenses to either side: the paper's interpolation."""
+"""Missed pixels as the mean of the corresponding ones under both neighbouring lenses: the paper's interpolation."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from lippmann.runtime.row_threads import Bands
 
 
 def average_neighbors(points: PointImage, field: LensField, numbers: Pixels, rules: Rules, bands: Bands) -> None:
-    """Give the pixels ``numbers`` (linear) the mean colour of their corresponding ones, or of the one that there is.
+    """Give the pixels ``numbers`` (linear) the mean colour of their one or two corresponding pixels.
 
-    Pixels without any stay missed; where ``careful`` is set, so do those with one neighbour, or with two that disagree.
+    Pixels without a corresponding one stay missed. With ``careful`` rules, so do those with a single one, or with two
+    that disagree.
     """
     bands.pixels(_average, len(numbers), points, numbers, *field.corresponding_beside(numbers), rules)
 

@@ -1,14 +1,13 @@
-"""Points of finished micro-images gathered by others, pixel by pixel, for lenses of any layout. Compiled.
+"""Backward warp: pixels of target micro-images gather points from finished ones, for lenses of any layout. Compiled.
 
-A pixel of the target sees along its light line; under another lens that line appears as a straight line of pixels, its
-points in order of their height. The pixel walks along it, from the nearest point to the farthest, until the line enters
-a surface that the other lens sees: there it has found its own point. Colour and disparity are taken between the four
-pixels around that place, if these see one surface: no holes open up, and no colour is taken from half a pixel away.
+The light line of a target pixel appears under another lens as an epipolar line of pixels, ordered by height. The pixel
+marches along it from the nearest point to the farthest, until the line enters a surface that the source lens sees.
+Colour and disparity are interpolated bilinearly there, if the four pixels see one surface. So there are no holes and no
+offsets of half a pixel.
 
-Where the line passes an outline at its very depth, the nearer surface may reach further than its last pixel. And nearer
-things that no source has seen are not known: therefore some pixels, the *probes*, are traced beforehand, on a wide grid
-over the whole picture that comes to every row and column; a point farther away than what the probes around it have met
-is not taken.
+Where the line passes an outline at its depth, the nearer surface may extend beyond its last pixel. And occluders that
+no source has seen are unknown: so some pixels, the *probes*, are traced beforehand, on a sparse grid that visits every
+row and column. Points farther away than the probes around them are rejected.
 """
 
 from __future__ import annotations
@@ -20,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display.lens_field import LensField
-from lippmann.rendering.reprojection.epipolar_march import color_at, is_trusted, look_along, mark_nearest
-from lippmann.rendering.reprojection.point_image import BACKGROUND, REPROJECTED, TRACED, WANTED, PointImage, RealArray
+from lippmann.rendering.reprojection.epipolar_march import color_at, is_trusted, march, mark_nearest
+from lippmann.rendering.reprojection.point_image import BACKGROUND, QUEUED, REPROJECTED, TRACED, PointImage, RealArray
 from lippmann.rendering.reprojection.rules import Rules, alike, coded_value, nearer
 from lippmann.rendering.reprojection.schedule import Lenses, Step
 from lippmann.rendering.reprojection.tuning import TUNING
@@ -30,7 +29,7 @@ from lippmann.runtime.row_threads import Bands
 
 
 class Gathering(NamedTuple):
-    """Who gathers from whom.
+    """Targets and sources of a step, and the grid of probes.
 
     Attributes
     ----------
@@ -41,7 +40,7 @@ class Gathering(NamedTuple):
     probe_stride, probe_shift:
         Columns from one probe to the next in a row, and how far they move from row to row.
     probe_reach:
-        Rows and columns from a pixel over which probes are asked.
+        Rows and columns around a pixel whose probes count.
     """
 
     target: NDArray[np.bool_]
@@ -79,16 +78,16 @@ class BackwardWarp:
         self._bands.lines(gather, len(self._nearest), *arguments)
 
     def finish(self, lenses: Lenses) -> None:
-        """Others receive from these lenses now."""
+        """Prepare the micro-images of ``lenses`` as sources."""
         done = np.zeros(len(self._field.center), dtype=np.bool_)
         done[lenses] = True
         self._bands.lines(mark_nearest, len(self._nearest), self._points, self._field, done, self._nearest)
 
 
 def scatter_shift(stride: int) -> int:
-    """Columns by which probes ``stride`` apart move from row to row: they visit all columns and leave no large holes.
+    """Shift in columns of the probes from row to row, for a ``stride``: they visit all columns without large holes.
 
-    About the golden section of the stride.
+    Near the golden section of the stride, and coprime with it.
     """
     shift = round((sqrt(5) - 1) / 2 * stride)
     while gcd(shift, stride) > 1:
@@ -98,7 +97,7 @@ def scatter_shift(stride: int) -> int:
 
 @uncounted
 def probed_limit(points: PointImage, field: LensField, row: int, column: int, gathering: Gathering) -> float:
-    """Nothing farther than this disparity is to be expected at a pixel, say the probes around it; 0: no one knows."""
+    """Disparity of the farthest point to expect at a pixel, from the probes around it; 0 without probes."""
     height, width = points.status.shape
     stride, reach = gathering.probe_stride, gathering.probe_reach
     nearest, farthest = 0.0, 0.0
@@ -115,7 +114,7 @@ def probed_limit(points: PointImage, field: LensField, row: int, column: int, ga
                 elif nearer(farthest, s):
                     farthest = s
             c += stride
-    # Probes that see one surface vouch for all of it; between different ones only the nearer is sure.
+    # Probes on one surface allow its farthest point; probes on different ones only the nearest.
     return farthest if alike(nearest, farthest, TUNING.one_probed_surface) else nearest
 
 
@@ -131,7 +130,7 @@ def gather(
 ) -> None:
     """Give the pixels of the targets the points of their sources.
 
-    Pixels that get a point become :data:`REPROJECTED`, missed ones :data:`WANTED`; traced ones stay as they are.
+    Pixels that get a point become :data:`REPROJECTED`, missed ones :data:`QUEUED`; traced ones stay as they are.
     ``nearest (H, W)`` as of :func:`mark_nearest`.
     """
     sources = gathering.source.shape[1]
@@ -142,7 +141,7 @@ def gather(
         for column in range(points.status.shape[1]):
             if points.status[row, column] != TRACED and gathering.target[field.lens[row, column]]:
                 got = _gather_pixel(points, field, gathering, rules, nearest, row, column, depth, share, color)
-                points.status[row, column] = REPROJECTED if got else WANTED
+                points.status[row, column] = REPROJECTED if got else QUEUED
 
 
 @uncounted
@@ -160,7 +159,7 @@ def _gather_pixel(
 ) -> bool:
     lens = field.lens[row, column]
     front = 0.0
-    outlines, seen, asked = 0, 0, 0
+    outlines, hits, asked = 0, 0, 0
     beside_nearest = BACKGROUND
     doubted = 0
     for k in range(len(depth)):
@@ -170,32 +169,32 @@ def _gather_pixel(
             continue
         shift_x = field.center[source, 0] - field.center[lens, 0]
         shift_y = field.center[source, 1] - field.center[lens, 1]
-        place, s, beside = look_along(points, field, nearest, source, column + shift_x, row + shift_y, shift_x, shift_y)
+        place, s, beside = march(points, field, nearest, source, column + shift_x, row + shift_y, shift_x, shift_y)
         asked += 1
         if beside != BACKGROUND:
             outlines += 1
             if nearer(beside, beside_nearest):
                 beside_nearest = beside
-        if not place.found:
+        if not place.is_known:
             continue
-        seen += 1
+        hits += 1
         depth[k] = s
         share[k] = 1.0 / np.sqrt(shift_x * shift_x + shift_y * shift_y)
         if front == 0.0 or nearer(s, front):
             front = s
         if rules.careful and not is_trusted(points, place, rules):
-            # Only what is taken in the end must be trusted.
+            # Rejected only if its colour is used in the end.
             doubted |= 1 << k
         for channel in range(3):
             color[k, channel] = color_at(points, place, channel)
-    if seen == 0:
+    if hits == 0:
         return False
     total, mean = 0.0, 0.0
     for k in range(len(depth)):
         if share[k] > 0.0 and not alike(depth[k], front, TUNING.one_point):
             share[k] = 0.0
         if share[k] == 0.0:
-            # What no source gave is no number, perhaps: even nothing of it would count.
+            # Colours without a source may be NaN: 0 times NaN is not 0.
             continue
         if doubted >> k & 1:
             return False

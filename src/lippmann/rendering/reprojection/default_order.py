@@ -11,7 +11,7 @@ from lippmann.rendering.reprojection.backward_warp import BackwardWarp
 from lippmann.rendering.reprojection.forward_warp import ForwardWarp
 from lippmann.rendering.reprojection.missed_runs import bridge, thin_out
 from lippmann.rendering.reprojection.pixel_tracer import Pixels, PixelTracer
-from lippmann.rendering.reprojection.point_image import MISSED, WANTED, PointImage
+from lippmann.rendering.reprojection.point_image import MISSED, QUEUED, PointImage
 from lippmann.rendering.reprojection.rules import Rules
 from lippmann.rendering.reprojection.schedule import Lenses, odd_and_even, refine
 from lippmann.rendering.reprojection.search import choose_neighborhoods, search
@@ -21,10 +21,10 @@ from lippmann.runtime.row_threads import Bands
 class DefaultOrder:
     """Makes the micro-images of a display.
 
-    Under straight cylindrical lenses every row of pixels is a world of its own: a forward warp of spans takes a seventh
-    of the time of the backward warp, which slanted sheets, square and hexagonal arrays need.
+    Under straight cylindrical lenses each row of pixels is independent of the others (an epipolar plane), and a forward
+    warp of spans takes a seventh of the time of the backward warp that all other layouts need.
 
-    ``points`` is where the picture comes to be; nothing is known of it yet.
+    ``points`` receives the picture, and is empty at first.
     """
 
     def __init__(self, display: Display, points: PointImage, tracer: PixelTracer, bands: Bands, rules: Rules) -> None:
@@ -35,27 +35,26 @@ class DefaultOrder:
         self._warp: ForwardWarp | BackwardWarp = warp(points, self._field, bands, rules)
 
     def lens_view(self) -> None:
-        """Every micro-image from its neighbours, near or far; what no point reached is traced."""
+        """Reproject every micro-image from nearer and farther neighbours, and trace its missed pixels."""
         self._make(np.arange(self._field.columns))
 
     def interpolated(self) -> None:
-        """The odd micro-images of each row of lenses (counted from 1) as in :meth:`lens_view`; what no point reached of
-        the even ones becomes the mean of the corresponding pixels of their odd neighbours on both sides.
+        """Odd micro-images of each row of lenses (counted from 1) as in :meth:`lens_view`. Missed pixels of the even
+        ones are the mean of the corresponding pixels of their two odd neighbours.
 
         Corresponding pixels are those whose light lines are nearest to parallel. The last micro-image of an even number
-        has one neighbour, whose colours it takes where reuse need not be careful. Pixels for which neither neighbour
-        has a corresponding one are traced, and with them, where reuse is careful, those that have one neighbour only or
-        two that disagree.
+        has one neighbour and takes its colours. Pixels without a corresponding one are traced. With careful rules, so
+        are those with a single one, or with two that disagree.
         """
         odd, even = odd_and_even(self._field.columns, self._field.rows)
         self._make(odd)
         if len(even.targets):
             self._warp.receive(even)
-            average_neighbors(self._points, self._field, self._wanted(), self._rules, self._bands)
-            self._trace_wanted()
+            average_neighbors(self._points, self._field, self._queued(), self._rules, self._bands)
+            self._trace_queued()
 
     def correct(self) -> None:
-        """Trace what reprojection has falsified, as far as it can be found."""
+        """Search for falsified pixels and trace them."""
         neighborhoods = choose_neighborhoods(self._display, self._field.reach)
         search(self._points, self._field, neighborhoods, self._tracer, self._bands, self._rules)
 
@@ -63,25 +62,25 @@ class DefaultOrder:
         field, status = self._field, self._points.status
         keys, steps = refine(columns, field.rows, field.columns)
         for row in range(len(status)):
-            # All probes are traced now, whether or not their micro-images are made.
-            status[row, self._warp.probes(row)] = WANTED
-        self._tracer.trace(self._wanted(), self._points)
+            # Probes of all micro-images, also of those that are not made here.
+            status[row, self._warp.probes(row)] = QUEUED
+        self._tracer.trace(self._queued(), self._points)
         is_key = np.isin(np.arange(len(field.center)), keys)
-        status[is_key[field.lens] & (status == MISSED)] = WANTED
-        self._trace_wanted()
+        status[is_key[field.lens] & (status == MISSED)] = QUEUED
+        self._trace_queued()
         self._warp.finish(keys)
         for step in steps:
             self._warp.receive(step)
-            self._trace_wanted()
+            self._trace_queued()
             self._warp.finish(step.targets)
 
-    def _wanted(self) -> Pixels:
-        return np.flatnonzero(self._points.status == WANTED).astype(np.uint32)
+    def _queued(self) -> Pixels:
+        return np.flatnonzero(self._points.status == QUEUED).astype(np.uint32)
 
-    def _trace_wanted(self) -> None:
-        """Trace some of the wanted pixels, bridge the others from them, and trace those that care does not bridge."""
+    def _trace_queued(self) -> None:
+        """Trace some of the queued pixels, bridge the others, and trace those that careful rules do not bridge."""
         arguments = self._points, self._field.lens, self._rules
         self._bands.lines(thin_out, len(self._points.status), *arguments)
-        self._tracer.trace(self._wanted(), self._points)
+        self._tracer.trace(self._queued(), self._points)
         self._bands.lines(bridge, len(self._points.status), *arguments)
-        self._tracer.trace(self._wanted(), self._points)
+        self._tracer.trace(self._queued(), self._points)

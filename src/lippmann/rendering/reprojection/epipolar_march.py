@@ -1,4 +1,4 @@
-"""Along a line of sight as another lens sees it, to the first surface there, between that lens's pixels. Compiled."""
+"""March along an epipolar line to the first surface, with bilinear interpolation between pixels. Compiled."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from lippmann.runtime.numba_jit import inlined, uncounted
 
 
 class Place(NamedTuple):
-    """A place between four pixels under one lens.
+    """A place between four pixels under one lens, for bilinear interpolation.
 
     Attributes
     ----------
-    found:
-        Whether enough of the four belong to the lens, are known and see one surface.
+    is_known:
+        Whether enough of the four pixels belong to the lens, are known and see one surface.
     whole:
-        Whether none is missing.
+        Whether all four do.
     row, column:
         Of the upper left one.
     a, b, c, d:
-        Weights of upper left, upper right, lower left and lower right; 0 for those that have no say.
+        Weights of upper left, upper right, lower left and lower right; 0 for pixels that do not count.
     disparity:
         Of the surface there.
     """
 
-    found: bool
+    is_known: bool
     whole: bool
     row: int
     column: int
@@ -43,7 +43,7 @@ class Place(NamedTuple):
 
 @uncounted
 def place_at(points: PointImage, field: LensField, lens: int, x: float, y: float) -> Place:
-    """The place (x, y) under ``lens``. At the rim of a micro-image those pixels that there are stand for the others."""
+    """The place (x, y) under ``lens``; at the rim of a micro-image, from the existing pixels alone."""
     height, width = points.status.shape
     column, row = int(np.floor(x + TUNING.on_center)), int(np.floor(y + TUNING.on_center))
     u, v = x - column, y - row
@@ -73,16 +73,16 @@ def place_at(points: PointImage, field: LensField, lens: int, x: float, y: float
         else:
             d = 0.0
     whole = total > 1.0 - TUNING.on_center
-    found = (whole or (count > 1 and total >= TUNING.smallest_share)) and alike(low, high, TUNING.one_surface)
+    is_known = (whole or (count > 1 and total >= TUNING.smallest_share)) and alike(low, high, TUNING.one_surface)
     share = 1.0 / total if total > 0.0 else 0.0
-    # Rounding must not put what is infinitely far away any farther or nearer.
+    # Equal disparities must stay exact, as background is recognised by its value.
     disparity = s * share if low < high else low
-    return Place(found, whole, row, column, a * share, b * share, c * share, d * share, disparity)
+    return Place(is_known, whole, row, column, a * share, b * share, c * share, d * share, disparity)
 
 
 @inlined
 def is_trusted(points: PointImage, place: Place, rules: Rules) -> bool:
-    """Whether the colour at a place may be seen from elsewhere: no pixel of it is fragile, no edge runs through it."""
+    """Whether the colour at a place may be reprojected: no pixel is fragile, no edge runs through it."""
     first_row, first_column = -1, -1
     trusted = True
     tolerance = rules.tolerance if place.whole else TUNING.rim_tolerance * rules.tolerance
@@ -115,9 +115,9 @@ def color_at(points: PointImage, place: Place, channel: int) -> float:
 def mark_nearest(
     first_row: int, last_row: int, points: PointImage, field: LensField, target: IntArray, nearest: RealArray
 ) -> None:
-    """Enter into ``nearest (H, W)`` the disparity of the nearest point in the 3x3 pixels around each pixel.
+    """Set ``nearest (H, W)`` to the disparity of the nearest point in the 3x3 pixels around each pixel of its lens.
 
-    Of those under the same lens, one of ``target (lenses,)``.
+    For pixels of the lenses in the mask ``target (lenses,)``.
     """
     height, width = points.status.shape
     for row in range(first_row, last_row):
@@ -134,7 +134,7 @@ def mark_nearest(
 
 
 @uncounted
-def look_along(
+def march(
     points: PointImage,
     field: LensField,
     nearest: RealArray,
@@ -144,21 +144,21 @@ def look_along(
     shift_x: float,
     shift_y: float,
 ) -> tuple[Place, float, float]:
-    """Where the line of pixels ``(x, y) + s (shift_x, shift_y)`` under ``source`` enters a surface of disparity s.
+    """First place at which the epipolar line ``(x, y) + s (shift_x, shift_y)`` under ``source`` enters a surface.
 
     Returns
     -------
     place, disparity:
-        The first such place, if it is ``found``.
+        The place, and s there; ``is_known`` is False if there is none.
     beside:
-        Disparity of the nearest outline that the line has passed by at its depth; :data:`BACKGROUND` for none.
+        Disparity of the nearest outline that the line passes at its depth; :data:`BACKGROUND` for none.
     """
     height, width = points.status.shape
     step = 1.0 / max(abs(shift_x), abs(shift_y))
     beside = BACKGROUND
     nothing = Place(False, False, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for behind in range(2):
-        # Before the lens plane the line leads away from the place of infinite distance, behind it back to there.
+        # In front of the lens plane s runs from 0 (infinity) upwards, behind it from the far end back to 0.
         k, last = 0, 1 << 30
         if behind:
             while True:
@@ -170,7 +170,7 @@ def look_along(
                 k -= 1
             last = 0
         in_front = not behind
-        before, before_shown = 0.0, 0.0
+        before, previous_disparity = 0.0, 0.0
         fresh = True
         while k <= last:
             s = k * step if k != 0 else (BACKGROUND if behind else -BACKGROUND)
@@ -188,22 +188,22 @@ def look_along(
             else:
                 passes = fresh or nearer(before, near)
                 place = place_at(points, field, source, here_x, here_y)
-                if place.found and nearer(s, place.disparity):
-                    # A smooth surface is near, or a nearer one ends here.
+                if place.is_known and nearer(s, place.disparity):
+                    # In front of a smooth surface, or beside the outline of a nearer one.
                     if passes and not alike(near, place.disparity, TUNING.one_surface) and nearer(near, beside):
                         beside = near
                     in_front = True
                 else:
-                    # It comes out from behind another surface and enters this one within a step, or it was before it.
-                    comes_out = not fresh and not alike(before_shown, place.disparity, TUNING.one_surface)
-                    if place.found and (in_front or comes_out):
-                        found, t = _enter(points, field, source, x, y, shift_x, shift_y, before, s)
-                        if found.found:
-                            return found, t, beside
+                    # The line enters the surface from in front, or from behind another one within this step.
+                    comes_out = not fresh and not alike(previous_disparity, place.disparity, TUNING.one_surface)
+                    if place.is_known and (in_front or comes_out):
+                        entry, t = _enter(points, field, source, x, y, shift_x, shift_y, before, s)
+                        if entry.is_known:
+                            return entry, t, beside
                     if passes and not fresh and nearer(near, beside):
                         beside = near
                     in_front = False
-            before, before_shown = s, np.float64(points.disparity[r, c])
+            before, previous_disparity = s, np.float64(points.disparity[r, c])
             fresh = False
             k += 1
     return nothing, 0.0, beside
@@ -221,7 +221,11 @@ def _enter(
     front: float,
     back: float,
 ) -> tuple[Place, float]:
-    """Where between the disparities ``front`` (before the surface) and ``back`` (not before it) the line enters it."""
+    """Intersection of the line with a surface, by regula falsi between the disparities ``front`` and ``back`` (behind
+    it).
+
+    Returns the place and its disparity.
+    """
     pixels = max(abs(shift_x), abs(shift_y))
     place = place_at(points, field, source, x + back * shift_x, y + back * shift_y)
     s = back
@@ -235,11 +239,11 @@ def _enter(
         if not np.isnan(low_excess):
             s = low + (high - low) * low_excess / (low_excess - high_excess)
         elif abs(place.disparity - high) < abs(high - low):
-            # At equal height the line enters where the surface is.
+            # The first step jumps to the surface's own height.
             s = place.disparity
         here = place_at(points, field, source, x + s * shift_x, y + s * shift_y)
-        if not here.found:
-            if place.found and abs(excess) * pixels <= TUNING.too_far:
+        if not here.is_known:
+            if place.is_known and abs(excess) * pixels <= TUNING.too_far:
                 break
             return here, s
         place = here

@@ -1,13 +1,12 @@
 """Forward warp of finished micro-images into others, row by row under straight cylindrical lenses. Compiled.
 
 Two neighbouring pixels of one micro-image that see one smooth surface are the ends of a piece of it. The piece is
-drawn into the other micro-image with its colour and disparity in between: no holes open up, and no colour is taken from
-half a pixel away. Where pieces overlap, the nearest wins. What the sources to the left and to the right show alike is
-blended by their distance.
+splatted into the other micro-image with interpolated colour and disparity, so there are no holes and no offsets of half
+a pixel. Where pieces overlap, the nearest wins (z-buffer). Points on which the left and the right source agree are
+blended by the distance of the lenses.
 
-A point can be reprojected only to where nothing nearer hides it, and nearer things that no source has seen are not
-known. Therefore every micro-image has a few *probes*, pixels traced beforehand; a point that lies farther away than
-what the probes around it have met is not taken.
+Occluders that no source has seen are unknown. So every micro-image has a few *probes*, pixels traced beforehand. Points
+farther away than the probes around them are rejected.
 """
 
 from __future__ import annotations
@@ -20,9 +19,9 @@ from numpy.typing import NDArray
 from lippmann.display.lens_field import LensField
 from lippmann.rendering.reprojection.point_image import (
     BACKGROUND,
+    QUEUED,
     REPROJECTED,
     TRACED,
-    WANTED,
     IntArray,
     PointImage,
     RealArray,
@@ -37,8 +36,8 @@ from lippmann.runtime.row_threads import Bands
 class Rows(NamedTuple):
     """The columns of the micro-images in every row, lens by lens from the left.
 
-    A row of pixels is a world of its own (an epipolar plane): a point of disparity s that lens c shows at panel
-    position ``c + o`` appears under lens c' at ``c' + o + (c' - c) s``.
+    Each row of pixels is an epipolar plane: a point of disparity s that lens c shows at panel position ``c + o``
+    appears under lens c' at ``c' + o + (c' - c) s``.
 
     Attributes
     ----------
@@ -75,20 +74,20 @@ class ForwardWarp:
         self._bands.lines(receive, height, self._points, self._rows, step.targets, step.sources, self._rules)
 
     def finish(self, lenses: Lenses) -> None:
-        """Others receive from these lenses now, which takes no preparation."""
+        """Prepare the micro-images of ``lenses`` as sources: nothing to do here."""
 
 
 class Scratch(NamedTuple):
-    """What was drawn into one row of a micro-image, ``(2 sides, pixels)`` each.
+    """Z-buffer of one row of a micro-image, ``(2 sides, pixels)`` each.
 
     Attributes
     ----------
     disparity:
-        Of the point at the pixel's centre.
+        That of the point at the pixel's centre.
     piece, part:
         Column of the right end of the piece that covers it (-1: none), and how far along the piece it lies, 0 to 1.
     hidden:
-        Disparity of the nearest outline that might reach the pixel.
+        Disparity of the nearest outline that may extend over the pixel.
     """
 
     disparity: NDArray[np.float64]
@@ -109,7 +108,7 @@ def receive(
 ) -> None:
     """Give the micro-images ``targets (n,)`` the points of ``sources (n, 2)``, to the left and right (-1: none).
 
-    Pixels that get a point become :data:`REPROJECTED`, missed ones :data:`WANTED`; traced ones stay as they are.
+    Pixels that get a point become :data:`REPROJECTED`, missed ones :data:`QUEUED`; traced ones stay as they are.
     """
     widest = 1
     for t in range(len(targets)):
@@ -162,7 +161,7 @@ def draw(
     side: int,
     scratch: Scratch,
 ) -> None:
-    """Draw one row of the micro-image ``source`` into that of ``target``: fills row ``side`` of ``scratch``."""
+    """Splat one row of the micro-image ``source`` into that of ``target``: fills row ``side`` of ``scratch``."""
     disparity, piece, part, hidden = scratch.disparity, scratch.piece, scratch.part, scratch.hidden
     begin = rows.first[source]
     shift = rows.center[target] - rows.center[source]
@@ -194,7 +193,7 @@ def draw(
                             disparity[side, place], part[side, place] = between, along
                             piece[side, place] = column
             else:
-                # The nearer of the two surfaces may reach up to one pixel further than its last point.
+                # The nearer surface may extend up to one pixel beyond its last point.
                 start, edge = (before, s_before) if nearer(s_before, s) else (here - 1.0, s)
                 if start > -1.0 and start <= last:
                     for place in range(max(0, int(np.ceil(start))), int(min(last, np.floor(start + 1.0))) + 1):
@@ -224,9 +223,9 @@ def probe_column(rows: Rows, row: int, lens: int, number: int, probe_rows: int) 
 def probed_limits(
     points: PointImage, rows: Rows, row: int, lens: int, probe_rows: int, limits: RealArray, entry: int
 ) -> None:
-    """What the probes above and below ``row`` say of the stretches of a micro-image before, between and after them.
+    """Set ``limits[entry]`` from the probes above and below ``row``, for the stretches before, between and after them.
 
-    ``limits[entry]``: nothing farther than this disparity is to be expected there; 0 where nothing is known.
+    Each is the disparity of the farthest point to expect there; 0 where it is unknown.
     """
     height = points.status.shape[0]
     above = (row // probe_rows) * probe_rows
@@ -247,7 +246,7 @@ def probed_limits(
                     nearest = s
                 elif nearer(farthest, s):
                     farthest = s
-        # Probes that see one surface vouch for all of it; between different ones only the nearer is sure.
+        # Probes on one surface allow its farthest point; probes on different ones only the nearest.
         limits[entry, stretch] = farthest if alike(nearest, farthest, TUNING.one_probed_surface) else nearest
 
 
@@ -263,7 +262,7 @@ def settle(
     entry: int,
     rules: Rules,
 ) -> None:
-    """Decide what the pixels of one row of a micro-image take of the points drawn from its left and right source."""
+    """Resolve the splats from the left and right source for one row of a micro-image: blend, take one, or reject."""
     s, piece, part, hidden = scratch.disparity, scratch.piece, scratch.part, scratch.hidden
     begin = rows.first[lens]
     count = rows.first[lens + 1] - begin
@@ -273,7 +272,7 @@ def settle(
         column = begin + place
         if points.status[row, column] == TRACED:
             continue
-        points.status[row, column] = WANTED
+        points.status[row, column] = QUEUED
         from_left, from_right = piece[0, place] >= 0, piece[1, place] >= 0
         if not (from_left or from_right):
             continue

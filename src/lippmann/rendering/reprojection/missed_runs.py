@@ -1,14 +1,14 @@
-"""Runs of missed pixels: a few are traced, and what lies between those that see one surface is bridged. Compiled.
+"""Runs of missed pixels: a few are traced, and the pixels between two that see one surface are interpolated. Compiled.
 
-A run is a stretch of missed pixels of one row under one lens. A lens shows only a small piece of a surface near to the
-lens plane, and shows it magnified: there no other lens helps, but a few pixels tell most.
+A run is a stretch of missed pixels of one row under one lens. A lens shows only a small part of a surface near to the
+lens plane, strongly magnified: no other lens sees the same points, but few samples suffice.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from lippmann.rendering.reprojection.point_image import BRIDGED, REPROJECTED, WANTED, IntArray, PointImage
+from lippmann.rendering.reprojection.point_image import BRIDGED, QUEUED, REPROJECTED, IntArray, PointImage
 from lippmann.rendering.reprojection.rules import Rules, alike, color_difference
 from lippmann.rendering.reprojection.tuning import TUNING
 from lippmann.runtime.numba_jit import uncounted
@@ -16,16 +16,16 @@ from lippmann.runtime.numba_jit import uncounted
 
 @uncounted
 def thin_out(first_row: int, last_row: int, points: PointImage, lens: IntArray, rules: Rules) -> None:
-    """Leave :data:`WANTED` only the first pixel of each run and one in ``run_step`` of the others.
+    """Leave :data:`QUEUED` only the first pixel of each run and one in ``run_step`` of the others.
 
-    From row to row the places shift, so that upright lines do not slip through.
+    The traced columns shift from row to row, so that vertical lines are not missed.
     """
     for row in range(first_row, last_row):
         place = 0
         for column in range(points.status.shape[1]):
-            if points.status[row, column] != WANTED or (place and lens[row, column] != lens[row, column - 1]):
+            if points.status[row, column] != QUEUED or (place and lens[row, column] != lens[row, column - 1]):
                 place = 0
-            if points.status[row, column] == WANTED:
+            if points.status[row, column] == QUEUED:
                 if place and (place + row) % rules.run_step:
                     points.status[row, column] = BRIDGED
                 place += 1
@@ -33,9 +33,9 @@ def thin_out(first_row: int, last_row: int, points: PointImage, lens: IntArray, 
 
 @uncounted
 def bridge(first_row: int, last_row: int, points: PointImage, lens: IntArray, rules: Rules) -> None:
-    """Fill what was left out between known pixels: with both where they see one surface, else with the nearer one.
+    """Fill pixels left out between traced ones: interpolate on one surface, else copy the nearer pixel.
 
-    Where reuse is careful, what lies between pixels that differ in surface, colour or fragility is wanted instead.
+    With careful rules, pixels between two that differ in surface, colour or fragility are queued for tracing instead.
     """
     width = points.status.shape[1]
     for row in range(first_row, last_row):
@@ -55,7 +55,7 @@ def bridge(first_row: int, last_row: int, points: PointImage, lens: IntArray, ru
                 or points.fragile[row, left] != points.fragile[row, last]
                 or color_difference(points.color, row, left, row, last, rules.coded) > rules.tolerance
             ):
-                points.status[row, start:right] = WANTED
+                points.status[row, start:right] = QUEUED
                 continue
             for column in range(start, right):
                 share = (column - left) / (right - left)

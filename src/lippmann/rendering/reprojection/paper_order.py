@@ -22,15 +22,15 @@ class PaperOrder:
     """Makes the micro-images of a display of any layout lens by lens, as the paper does.
 
     The first micro-image is traced. Each next one receives the points of the one before: 3D points, projected through
-    its lens to the nearest pixel with their colours as they are; where several meet, the nearest to the viewer wins.
-    Its missed pixels (status -1) are traced (status 0). A ray that hits nothing has no point, so that the background is
-    not carried: it is traced everywhere, and things that come into sight before it are found. Mirrors, highlights and
-    outlines get no care, as they get none there, nor do things hidden from all lenses before.
+    its lens to the nearest pixel, with unchanged colours. Where several meet, the nearest to the viewer wins. Missed
+    pixels (status -1) are traced (status 0). A ray without a hit has no point. So background is traced everywhere,
+    which finds objects that appear in front of it. As in the paper, mirrors, highlights, outlines and disocclusions
+    behind other points are not treated.
 
-    Under square and hexagonal lenses every row of lenses is such a display of its own, its first micro-image traced.
-    The rows go side by side, a column of lenses at a time, so that a picture takes as many calls as a row has lenses.
+    Each row of square or hexagonal lenses is processed like such a display of its own. All rows advance together, one
+    column of lenses at a time, so a picture takes as many calls as a row has lenses.
 
-    ``points`` is where the picture comes to be; nothing is known of it yet.
+    ``points`` receives the picture, and is empty at first.
     """
 
     def __init__(self, display: Display, points: PointImage, tracer: PixelTracer, bands: Bands) -> None:
@@ -44,7 +44,7 @@ class PaperOrder:
         self._starts = np.searchsorted(column[self._numbers], np.arange(columns + 1))
 
     def lens_view(self) -> None:
-        """Every micro-image from the one before; what no point reached is traced."""
+        """Reproject every micro-image from the one before, and trace its missed pixels."""
         self._pass_on(range(self._field.columns), 1)
 
     def interpolated(self) -> None:
@@ -83,18 +83,18 @@ class PaperOrder:
         return numbers
 
 
-#: Where a point lies beside the centre of its pixel, ``(H, W, 2)`` in pixels (x, y). A point that has been carried lies
-#: where it always lay: were it moved to the pixel's centre, points would drift from lens to lens.
+#: Offset of each point from the centre of its pixel, ``(H, W, 2)`` in pixels (x, y). Reprojected points keep it:
+#: snapped to pixel centres, points would drift from lens to lens.
 Beside = NDArray[np.float32]
 
 
 @uncounted
 def _carry(points: PointImage, beside: Beside, field: LensField, numbers: IntArray, step: int) -> None:
-    """Carry the points of the pixels ``numbers`` (linear, all settled) to the lenses ``step`` further on in the row.
+    """Reproject the points of the pixels ``numbers`` (linear, none missed) to the lenses ``step`` further in the row.
 
-    Each goes to the pixel nearest to its projection, if that has no traced colour. Where several meet, the nearest to
-    the viewer wins; of two at the same distance the first. What receives a point becomes :data:`REPROJECTED`. A pixel
-    that shows the background has hit nothing, and has no point to give.
+    Each goes to the pixel nearest to its projection, unless that one is traced. Where several meet, the nearest to the
+    viewer wins; of two at the same distance the first. Pixels that receive a point become :data:`REPROJECTED`.
+    Background has no points.
     """
     height, width = points.status.shape
     lenses = len(field.center)
@@ -109,10 +109,10 @@ def _carry(points: PointImage, beside: Beside, field: LensField, numbers: IntArr
         s = np.float64(points.disparity[row, column])
         x = column + beside[row, column, 0] + (field.center[target, 0] - field.center[source, 0]) * (1.0 + s)
         y = row + beside[row, column, 1] + (field.center[target, 1] - field.center[source, 1]) * (1.0 + s)
-        # Points near to the lens plane are seen by no other lens; whole numbers do not reach as far as their places.
+        # Points near to the lens plane project far outside, beyond the range of integers.
         if not (x > -1.0 and x < width and y > -1.0 and y < height):
             continue
-        # What lies on the border of two pixels belongs to the pixel after it: rounding must not decide.
+        # A point on the border of two pixels belongs to the second, independently of rounding.
         c, r = int(np.floor(x + (0.5 + 1e-5))), int(np.floor(y + (0.5 + 1e-5)))
         if c < 0 or c >= width or r < 0 or r >= height or field.lens[r, c] != target:
             continue

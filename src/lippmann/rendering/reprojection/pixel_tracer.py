@@ -1,4 +1,4 @@
-"""Tracing a list of pixels: those that no point reached."""
+"""Tracing of arbitrary lists of pixels, such as missed ones."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ Pixels = NDArray[np.uint32]
 
 
 class PixelTracer:
-    """Traces any pixels of a display's picture and enters what they hit into a point image.
+    """Traces any pixels of a display's picture and writes their points into a point image.
 
-    A pixel gets the very samples that the full renderer would give it, so that its colour is the same. The mean point
-    of several samples stands for the pixel; if they see different surfaces, the nearest, and the pixel is fragile.
+    A pixel has the same samples, and so the same colour, as in a full rendering. Its point is the mean over its
+    samples; if these hit different surfaces, the nearest point, and the pixel is fragile.
     """
 
     def __init__(
@@ -66,18 +66,18 @@ class PixelTracer:
         for start in range(0, len(numbers), self._pixels_per_call):
             part = numbers[start : start + self._pixels_per_call]
             started = time.perf_counter()
-            # For all parts alike: a kernel that is recorded with a history is another one without.
+            # For all parts: with the flag changed, the kernel would be recorded again.
             with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
-                found = self._trace(part)
+                samples = self._trace(part)
                 compiling = compile_seconds()
             self.seconds_compile += compiling
             self.seconds_trace += time.perf_counter() - started - compiling
-            self._bands.pixels(_enter, len(part), points, part, self._samples, *found)
+            self._bands.pixels(_enter, len(part), points, part, self._samples, *samples)
             done = self.rays.primary // self._samples
             self._progress(Progress("trace", min(done, points.status.size), points.status.size))
 
     def _trace(self, numbers: Pixels) -> tuple[NDArray[np.generic], ...]:
-        """Red, green, blue, disparity and whether it is fragile of all samples, pixel by pixel."""
+        """Red, green, blue, disparity and fragility of all samples, ordered by pixel."""
         pixel = mi.UInt32(aligned(numbers))
         sample = mi.UInt32(0)
         if self._samples > 1:
@@ -85,7 +85,7 @@ class PixelTracer:
             pixel = dr.gather(mi.UInt32, pixel, chosen)
         dr.make_opaque(pixel, sample)
         radiance, secondary, shadow, finite, disparity, fragile = self._kernel(pixel, sample, self._seed)
-        # All at once: a sum of an unevaluated radiance would run the path loop anew.
+        # All at once: a sum of an unevaluated radiance would trace the paths again.
         dr.eval(radiance, secondary, shadow, finite, disparity, fragile)
         lanes = len(numbers) * self._samples
         self.rays.primary += lanes
@@ -122,7 +122,7 @@ class PixelTracer:
 
 
 def _total(counts: IntArray) -> int:
-    """The sum over all lanes. For short lists a sum on the device would take longer than the tracing."""
+    """Sum over all lanes, on the CPU: for short lists a reduction on the device takes longer than the tracing."""
     return int(np.asarray(counts).sum(dtype=np.uint64))
 
 

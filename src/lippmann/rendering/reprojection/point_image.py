@@ -1,4 +1,4 @@
-"""The point image: what each pixel of the picture has hit, in which colour, and how it came by that."""
+"""The point image: colour, depth, fragility and status of each pixel of the picture."""
 
 from __future__ import annotations
 
@@ -12,26 +12,25 @@ IntArray: TypeAlias = NDArray[np.integer]
 RealArray: TypeAlias = NDArray[np.floating]
 BoolArray: TypeAlias = NDArray[np.bool_]
 
-#: Status of a pixel, as the paper keeps it: -1 is missed, 0 filled. What was filled without tracing keeps marks of its
-#: own, so that maps and counts can tell them apart.
+#: Status of a pixel: -1 missed and 0 filled, as in the paper; pixels filled without tracing have numbers of their own.
 MISSED, TRACED, REPROJECTED, INTERPOLATED = range(-1, 3)
-#: Missed pixels that are about to be traced, and those that will be filled from such ones.
-WANTED, BRIDGED = range(-2, -4, -1)
+#: Missed pixels that are queued for tracing, and those that will be interpolated between them.
+QUEUED, BRIDGED = range(-2, -4, -1)
 
 #: The layer of a picture that holds the status of its pixels.
 STATUS_LAYER = "status"
 
-#: Disparity of what a ray meets that meets nothing: infinitely far away, behind everything else. Not zero, because the
-#: sign says on which side of the lens plane a point lies; and just as single precision keeps it, to be known again.
+#: Disparity of background: infinitely far behind the lens plane. Not 0, as its sign gives the side of the lens plane;
+#: and exact in single precision, so that it can be compared.
 BACKGROUND = float(np.float32(-1e-30))
 
 
 class PointImage(NamedTuple):
     """Points of a whole picture; the pixels of one micro-image are what the paper calls that lens's point image.
 
-    A point is kept as its *disparity* g / z, the gap over its height: by that share of the lens pitch it moves within
-    the micro-image from one lens to the next. With the pixel's own light line it is the 3D point. Positive: in front of
-    the lens plane. Lines of sight are straight in it: along a plane surface, disparity is linear in the pixel.
+    A point is stored as its *disparity* g / z (gap over height), positive in front of the lens plane. From one lens to
+    the next it moves within the micro-image by that fraction of the lens pitch. Disparity and the pixel's light line
+    give the 3D point. Along a plane, disparity is linear in the pixel.
 
     Attributes
     ----------
@@ -44,7 +43,7 @@ class PointImage(NamedTuple):
         shows several surfaces.
     status:
         ``(H, W)`` int8, one of :data:`MISSED`, :data:`TRACED`, :data:`REPROJECTED`, :data:`INTERPOLATED`, or while
-        work is under way :data:`WANTED`.
+        work is under way :data:`QUEUED`.
     """
 
     color: NDArray[np.float32]
@@ -54,7 +53,7 @@ class PointImage(NamedTuple):
 
     @classmethod
     def empty(cls, height: int, width: int) -> PointImage:
-        """Nothing is known of any pixel."""
+        """A point image whose pixels are all missed."""
         return cls(
             np.zeros((height, width, 3), dtype=np.float32),
             np.full((height, width), BACKGROUND, dtype=np.float32),

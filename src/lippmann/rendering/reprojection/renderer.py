@@ -1,4 +1,4 @@
-"""A picture by reuse: from the choice of the method to the frame."""
+"""Rendering by reprojection: the choice of order and method, and the frame."""
 
 from __future__ import annotations
 
@@ -47,23 +47,22 @@ def trace_reused(
     threads: int,
     progress: ProgressCallback = silent,
 ) -> Frame:
-    """Trace some pixels of a display's picture and carry their colours over to the others.
+    """Trace some pixels of a display's picture and reproject them to the others.
 
     Parameters
     ----------
     method, order:
         As in :class:`~lippmann.rendering.request.render_request.RenderRequest`.
     careful:
-        Trace what carrying over would falsify; of no meaning in the paper's order, which does not know how.
+        Trace pixels that reprojection would falsify; ignored in the paper's order.
     samples, seed, box_filter:
-        Of the traced pixels, which get the very samples that :func:`~lippmann.rendering.film.wavefront.trace_frame`
-        gives them.
+        Those of the traced pixels, which have the same samples as in a full rendering.
     transfer:
-        How the values become codes: colours are compared as an eye sees them.
+        Transfer curve of the picture, by which colours are compared.
     memory:
         Bytes that may be taken.
     threads:
-        At work on the points; the result does not depend on them.
+        CPU threads of reprojection; the result does not depend on them.
 
     Returns
     -------

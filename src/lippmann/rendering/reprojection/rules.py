@@ -1,4 +1,4 @@
-"""What counts as alike: the small comparisons that all reuse kernels share."""
+"""Rules of reprojection, and the comparisons that its kernels share."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from lippmann.runtime.numba_jit import inlined
 
 
 class Rules(NamedTuple):
-    """What reprojection may do.
+    """Tolerances and densities of reprojection.
 
     Attributes
     ----------
     careful:
-        Leave to tracing what would be falsified: fragile points, colour edges, the pixel beside an outline, and points
+        Trace pixels that reprojection would falsify: fragile points, colour edges, pixels beside outlines, and points
         on which the two sources disagree.
     tolerance:
         Colour difference that counts as an edge or as a disagreement.
     coded:
-        Compare colours on a scale like the eye's (square root), else as they are.
+        Compare the square roots of colour values (roughly perceptual), else the values.
     probe_rows:
-        Every so many rows have probes, two in each micro-image, under straight cylindrical lenses.
+        Rows from one row with probes (two in each micro-image) to the next, under straight cylindrical lenses.
     probe_stride:
-        One pixel in so many is a probe, under all other lenses.
+        Pixels per probe under all other lenses.
     run_step:
         Pixels from one traced pixel of a run of missed ones to the next.
     """

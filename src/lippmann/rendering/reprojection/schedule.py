@@ -1,9 +1,9 @@
-"""In which order micro-images are made, and from which others each receives its points.
+"""Hierarchical order of the micro-images, and the sources of each.
 
-Key lenses some way apart come first, along both axes of the array. The steps between them receive points from the
-nearest finished lenses on either side: first between two lenses of a row, then between two of a column. Points of a
-surface at height z are seen through ``|z| / gap`` lenses, so that a surface far from the lens plane is already known
-from the keys, and a nearer one is traced where the finer steps first meet it. All lenses of a step are traced at once.
+Key lenses, several apart along both axes of the array, come first. Each finer step receives points from the nearest
+finished lenses on either side: first between two lenses of a row, then between two of a column. A surface at height z
+is seen through ``|z| / gap`` lenses. So a surface far from the lens plane is known from the keys, and a nearer one is
+traced in the finer step that first meets it. All lenses of a step are traced at once.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Step:
 
 
 def refine(columns: Lenses, rows: int, width: int) -> tuple[Lenses, list[Step]]:
-    """Keys, and the steps between them, for the lenses of some ``columns`` in all ``rows``.
+    """Key lenses, and the finer steps, for the lenses of ``columns`` in all ``rows``.
 
     Lens (i, j) has the number ``j * width + i``. The last column and the last row are keys, too.
     """
@@ -58,7 +58,7 @@ def odd_and_even(columns: int, rows: int) -> tuple[Lenses, Step]:
 
 
 def _refine_axis(places: Lenses) -> tuple[Lenses, list[Step]]:
-    """Keys of the lenses ``places`` along one axis, the last one among them, and a step for each smaller stride."""
+    """Key lenses among ``places`` along one axis, the last one included, and a step for each smaller stride."""
     count = len(places)
     done = np.union1d(np.arange(0, count, TUNING.strides[0]), [count - 1])
     keys, steps = places[done], []

@@ -1,9 +1,9 @@
-"""The search for what reprojection has falsified, from the edges outward: pixels are found and traced again.
+"""Search for falsified pixels by region growing from edges; they are traced anew. Compiled kernels.
 
-Every pixel beside an edge is traced. Where the traced colour differs from the predicted one, there is more to be found:
-all pixels around are traced next, a few in the wider surroundings, and those under the neighbouring lenses where the
-point should be seen; and so on until all predictions are right. Smooth outlines, which reprojection got right, end the
-search at once; a small thing that one pixel has given away is followed to its end.
+Every pixel beside an edge is traced. Where the traced colour differs from the reprojected one, the search goes on: all
+pixels around it are traced next, a few in the wider surroundings, and those under the neighbouring lenses that should
+see the same point. It ends when all predictions are right: at once along outlines that reprojection got right, while a
+small object that one pixel reveals is followed to its end.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from lippmann.runtime.row_threads import Bands
 
 
 class Surroundings(NamedTuple):
-    """The micro-image of a pixel and those beside it, so many ``rows`` up and down: one pixel in ``share`` of them."""
+    """A pixel's micro-image and its two neighbours, ``rows`` up and down, of which one pixel in ``share`` is traced."""
 
     rows: int
     share: int
 
 
 class Neighborhoods(NamedTuple):
-    """What is traced around edges in the first round, and in every round around pixels that were wrongly predicted."""
+    """Surroundings that are traced: of edges in the first round, of wrong predictions in every round."""
 
     of_edges: tuple[Surroundings, ...]
     of_wrong: tuple[Surroundings, ...]
@@ -40,8 +40,8 @@ class Neighborhoods(NamedTuple):
 def choose_neighborhoods(display: Display, reach: int) -> Neighborhoods:
     """Neighborhoods for a display whose micro-images are ``reach`` columns wide.
 
-    Square and hexagonal micro-images have so few pixels that one wrong pixel spoils them, and a thing near to the lens
-    plane may be under one of them only: they are searched most closely.
+    Square and hexagonal micro-images have so few pixels that one wrong pixel shows, and an object near to the lens
+    plane may be under a single one: they are searched most densely.
     """
     if display.lens_array.layout == "lenticular":
         return Neighborhoods((Surroundings(6, 3),), (Surroundings(6, 8),))
@@ -56,36 +56,36 @@ def search(
     bands: Bands,
     rules: Rules,
 ) -> None:
-    """Trace what of the finished picture ``points`` is falsified, as far as it can be found."""
+    """Trace the falsified pixels of the finished picture ``points``, as far as the search finds them."""
     sides = ((0, -1), (0, 1), (-1, 0), (1, 0))
     reach, beside = field.reach, np.stack([field.lens_beside(*side) for side in sides], axis=1)
-    wanted = np.zeros(points.status.shape, dtype=np.bool_)
+    marked = np.zeros(points.status.shape, dtype=np.bool_)
     kernel = mark_edges
-    bands.lines(kernel, len(wanted), points, field.lens, rules.tolerance, rules.coded, wanted)
-    # Where one thing ends under a lens, another may begin that only the next lens shows.
-    edges = np.flatnonzero(wanted).astype(np.uint32)
+    bands.lines(kernel, len(marked), points, field.lens, rules.tolerance, rules.coded, marked)
+    # Behind an outline, another object may begin that only the next lens shows.
+    edges = np.flatnonzero(marked).astype(np.uint32)
     for each in neighborhoods.of_edges:
-        mark_surroundings(points, reach, *each, edges, wanted)
+        mark_surroundings(points, reach, *each, edges, marked)
     traced = np.flatnonzero(points.status == TRACED).astype(np.uint32)
-    follow_points(points, field, beside, traced, rules, wanted)
+    follow_points(points, field, beside, traced, rules, marked)
     colors = points.color.reshape(-1, 3)
-    for _ in range(16):  # rounds die out by themselves; what is left then is a handful of pixels
-        numbers = np.flatnonzero(wanted).astype(np.uint32)
+    for _ in range(16):  # the search ends by itself; later rounds would find a handful of pixels
+        numbers = np.flatnonzero(marked).astype(np.uint32)
         if not len(numbers):
             return
-        wanted[:] = False
+        marked[:] = False
         predicted = colors[numbers]
         tracer.trace(numbers, points)
         wrong = wrong_predictions(points, numbers, predicted, rules.tolerance, rules.coded)
-        mark_near(points, field.lens, wrong, wanted)
+        mark_near(points, field.lens, wrong, marked)
         for each in neighborhoods.of_wrong:
-            mark_surroundings(points, reach, *each, wrong, wanted)
-        follow_points(points, field, beside, wrong, rules, wanted)
+            mark_surroundings(points, reach, *each, wrong, marked)
+        follow_points(points, field, beside, wrong, rules, marked)
 
 
 @uncounted
 def mark_edges(
-    first_row: int, last_row: int, points: PointImage, lens: IntArray, tolerance: float, coded: bool, wanted: BoolArray
+    first_row: int, last_row: int, points: PointImage, lens: IntArray, tolerance: float, coded: bool, marked: BoolArray
 ) -> None:
     """Set ``wanted (H, W)`` for untraced pixels that differ from a neighbour under the same lens.
 
@@ -104,7 +104,7 @@ def mark_edges(
                     continue
                 outline = (points.disparity[row, column] == BACKGROUND) != (points.disparity[r, c] == BACKGROUND)
                 if outline or color_difference(points.color, row, column, r, c, coded) > tolerance:
-                    wanted[row, column] = True
+                    marked[row, column] = True
                     break
 
 
@@ -112,7 +112,7 @@ def mark_edges(
 def wrong_predictions(
     points: PointImage, numbers: IntArray, predicted: RealArray, tolerance: float, coded: bool
 ) -> NDArray[np.uint32]:
-    """Those of the pixels ``numbers`` whose colour is not the ``predicted (n, 3)`` one."""
+    """The pixels among ``numbers`` whose colour differs from the ``predicted (n, 3)`` one."""
     width = points.status.shape[1]
     wrong = np.empty(len(numbers), np.uint32)
     count = 0
@@ -129,22 +129,22 @@ def wrong_predictions(
 
 
 @uncounted
-def mark_near(points: PointImage, lens: IntArray, numbers: IntArray, wanted: BoolArray) -> None:
-    """Set ``wanted`` for the untraced pixels near to the pixels ``numbers``, under the same lens."""
+def mark_near(points: PointImage, lens: IntArray, numbers: IntArray, marked: BoolArray) -> None:
+    """Set ``marked`` for the untraced pixels near to the pixels ``numbers``, under the same lens."""
     height, width = points.status.shape
     for i in range(len(numbers)):
         row, column = divmod(int(numbers[i]), width)
         for r in range(max(0, row - TUNING.around), min(height, row + TUNING.around + 1)):
             for c in range(max(0, column - TUNING.around), min(width, column + TUNING.around + 1)):
                 if points.status[r, c] != TRACED and lens[r, c] == lens[row, column]:
-                    wanted[r, c] = True
+                    marked[r, c] = True
 
 
 @compiled
 def mark_surroundings(
-    points: PointImage, reach: int, rows: int, share: int, numbers: IntArray, wanted: BoolArray
+    points: PointImage, reach: int, rows: int, share: int, numbers: IntArray, marked: BoolArray
 ) -> None:
-    """Set ``wanted`` for a few untraced pixels, one in ``share``, in the wider surroundings of the pixels ``numbers``.
+    """Set ``marked`` for a few untraced pixels, one in ``share``, in the wider surroundings of the pixels ``numbers``.
 
     These are the micro-image, which is about ``reach`` columns wide, and those beside it, so many ``rows`` up and down.
     """
@@ -161,12 +161,12 @@ def mark_surroundings(
             for c in range(max(0, (cell - 1) * reach), min(width, (cell + 2) * reach)):
                 # Five has no factor in common with the shares in use: every column and row is visited.
                 if points.status[r, c] != TRACED and (c + 5 * r) % share == 0:
-                    wanted[r, c] = True
+                    marked[r, c] = True
 
 
 @uncounted
 def follow_points(
-    points: PointImage, field: LensField, neighbors: IntArray, numbers: IntArray, rules: Rules, wanted: BoolArray
+    points: PointImage, field: LensField, neighbors: IntArray, numbers: IntArray, rules: Rules, marked: BoolArray
 ) -> None:
     """Set ``wanted (H, W)`` for untraced pixels under the ``neighbors (lenses, n)`` that should show the points of the
     pixels ``numbers``, and do not.
@@ -195,8 +195,8 @@ def follow_points(
                 for c in range(max(0, left), min(width, left + 2)):
                     if field.lens[r, c] != target:
                         continue
-                    shown = np.float64(points.disparity[r, c])
-                    if alike(s, shown, TUNING.one_point):
+                    other = np.float64(points.disparity[r, c])
+                    if alike(s, other, TUNING.one_point):
                         # What looks different from every side is not the same anywhere.
                         if (
                             points.fragile[row, column]
@@ -204,11 +204,11 @@ def follow_points(
                             or color_difference(points.color, row, column, r, c, rules.coded) <= rules.tolerance
                         ):
                             missing = False
-                    elif nearer(shown, s):
+                    elif nearer(other, s):
                         missing = False
             if not missing:
                 continue
             for r in range(max(0, top), min(height, top + 2)):
                 for c in range(max(0, left), min(width, left + 2)):
                     if field.lens[r, c] == target and points.status[r, c] != TRACED:
-                        wanted[r, c] = True
+                        marked[r, c] = True

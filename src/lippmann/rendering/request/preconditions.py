@@ -6,7 +6,7 @@ from lippmann.display import Display
 from lippmann.errors import PictureError, UsageError
 from lippmann.options.choices import LIGHT, POOLED_LIGHT, PROPERTIES, REUSING
 from lippmann.options.forms import LEFT_OUT, REUSES_NOTHING, Form
-from lippmann.rendering.request.render_request import RenderRequest, shown_value
+from lippmann.rendering.request.render_request import RenderRequest, format_value
 from lippmann.scene.scene import Scene
 
 #: Pictures number their sub-pixels in 32 bits.
@@ -76,7 +76,7 @@ def check_off_surfaces(request: RenderRequest, scene: Scene) -> None:
             (request.layers, "are told of surfaces", "layers", rule, _LEAVE),
             (denoises, f"{request.denoise} goes by the edges of surfaces", "denoise", rule, _LEAVE),
             (request.caustics == "photons", "photons land on surfaces", "caustics", rule, _LEAVE),
-            (exposed, shown_value(request.exposure), "exposure", no_light, _LEAVE),
+            (exposed, format_value(request.exposure), "exposure", no_light, _LEAVE),
         ],
         where=scene.name,
     )

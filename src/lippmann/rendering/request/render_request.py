@@ -82,7 +82,7 @@ class RenderPlan:
 
     def in_words(self) -> dict[str, str]:
         """Value and reason by name, for people."""
-        return {name: f"{shown_value(each.value)} ({each.reason})" for name, each in self.entries.items()}
+        return {name: f"{format_value(each.value)} ({each.reason})" for name, each in self.entries.items()}
 
     def lines(self) -> list[str]:
         """``name: value (reason)``, as files hold it."""
@@ -103,7 +103,7 @@ PILOT_REASONS = {
 }
 
 
-def shown_value(value: object) -> str:
+def format_value(value: object) -> str:
     """A value of a plan, for people."""
     if value is None:
         return "open"
@@ -224,7 +224,7 @@ class RenderRequest(MachineOptions, QualityOptions):
         """Rays with places of their own in a pixel: 3 for sub-pixels, else 1."""
         return 3 if self.subpixels else 1
 
-    def shown(self, linear: NDArray[np.float32]) -> NDArray[np.float32]:
+    def tone_mapped(self, linear: NDArray[np.float32]) -> NDArray[np.float32]:
         """Linear RGB ``(..., 3)`` as the display is to show it, after tone mapping."""
         return pbr_neutral(linear) if self.tone_map == "pbr-neutral" else linear
 

@@ -24,10 +24,10 @@ from lippmann.device.types import (
 )
 from lippmann.rendering.transport.tuning import TUNING
 
-#: The point met on the way from an emitter is the one that was drawn if it is nearer than this part of the way, and
-#: their normals agree to this cosine: the back of a thin body is another point.
+#: A hit is the sampled point on the caster if it lies within this share of the emitter's distance, and the normals
+#: agree to this cosine (the back of a thin body does not).
 _SAME_POINT, _SAME_SIDE = 1e-5, 0.5
-#: Boxes about shapes that give no points are wider than these by this part of their diagonal.
+#: Margin of the boxes around shapes without surface sampling, in diagonals.
 _MARGIN = 1e-3
 
 
@@ -40,12 +40,12 @@ class Casters:
     emitters, shapes:
         Indices into the scene's; every pair of them may make caustics.
     boxes:
-        ``(len(shapes), 6)``: least and greatest corners of the boxes of shapes that give no points (instances, curves);
-        not numbers for others.
+        ``(len(shapes), 6)``: least and greatest corners of the boxes of shapes without surface sampling (instances,
+        curves); NaN for others.
     areas:
         ``(len(shapes),)``: of the shapes, or of their boxes.
     points:
-        ``len(shapes)``: what spreads points evenly over each; for those with boxes :func:`no_point`.
+        ``len(shapes)`` functions that sample points uniformly on each; :func:`no_point` for those with boxes.
     """
 
     emitters: NDArray[np.uint32]
@@ -66,7 +66,7 @@ class Casters:
 
 
 def find_casters(scene: MitsubaScene) -> Casters:
-    """Emitters other than the environment, and shapes with lobes that may be sharp; all instances may show such."""
+    """Emitters other than the environment, and shapes with lobes that may be sharp; instances always count."""
     environment = scene.environment()
     emitters = [number for number, each in enumerate(scene.emitters()) if each is not environment]
     shapes, boxes, areas, points = [], [], [], []
@@ -92,12 +92,12 @@ def find_casters(scene: MitsubaScene) -> Casters:
 
 
 def hides_caustics(scene: MitsubaScene) -> bool:
-    """Whether a scene has mirrors, glass or smooth gloss, and an emitter so small that paths hardly find it by them."""
+    """Whether a scene has sharp surfaces, and an emitter so small that paths by way of these hardly find it."""
     return _has_small_emitter(scene) and has_sharp_surfaces(scene)
 
 
 def has_sharp_surfaces(scene: MitsubaScene) -> bool:
-    """Whether a scene has mirrors, clear glass or smooth gloss; those of instances are not told."""
+    """Whether a scene has mirrors, clear glass or smooth gloss, instances apart."""
     return any(_may_be_sharp(shape.bsdf()) for shape in scene.shapes())
 
 
@@ -125,8 +125,8 @@ def _box_about(shape: mi.Shape) -> NDArray[np.float64]:
 class CasterPoints:
     """Points on the casters of a wavefront, toward which emitters are sampled.
 
-    A shape's own point is where light meets it. For a shape that gives none it lies on the box about it, where light
-    leaves the box if nothing is in its way: light from an emitter to the shape comes on a ray that leaves the box once.
+    Shapes with surface sampling are sampled at their surface. For the others the point lies on their box, where the ray
+    leaves the box: each ray from an emitter leaves a convex box once.
 
     Parameters
     ----------
@@ -156,28 +156,28 @@ class CasterPoints:
             self.p, self._n = dr.select(self._boxed, p, self.p), dr.select(self._boxed, n, self._n)
 
     def reference(self) -> SurfaceInteraction3f:
-        """The points, as emitters want them for sampling a direction."""
+        """The points as reference points for emitter sampling."""
         found = dr.zeros(mi.SurfaceInteraction3f, dr.width(self.p))
         found.p, found.n = self.p, mi.Normal3f(self._n)
         return found
 
     def cosine(self, si: SurfaceInteraction3f, toward: Vector3f) -> Float:
-        """Area of a thin beam over that of its trace on the sampled surface; 0 for beams that enter a box.
+        """Cosine between the sampled surface's normal and ``toward``; 0 for rays that enter a box.
 
-        ``si`` is where light from ``toward`` meets the caster.
+        ``si`` is where light from ``toward`` hits the caster.
         """
         leaves = dr.maximum(-dr.dot(self._n, toward), 0)
         return dr.select(self._boxed, leaves, dr.abs(dr.dot(si.n, toward)))
 
     def is_met(self, si: SurfaceInteraction3f, distance: Float) -> Bool:
-        """Whether light met the caster for which its emitter was sampled, from an emitter at ``distance``."""
+        """Whether ``si`` is the sampled caster (point), seen from an emitter at ``distance``."""
         near = dr.squared_norm(si.p - self.p) < dr.square(_SAME_POINT * distance)
         near &= dr.dot(si.n, self._n) > _SAME_SIDE
         return dr.select(self._boxed, (si.instance == self._shape) | (si.shape == self._shape), near)
 
 
 def _point_on_box(low: Vector3f, high: Vector3f, sample: Point2f, face: Float) -> tuple[Vector3f, Vector3f]:
-    """A point spread evenly over a box, and the outward unit normal there."""
+    """A uniformly sampled point on a box, and the outward unit normal there."""
     sides = high - low
     areas = mi.Vector3f(sides.y * sides.z, sides.z * sides.x, sides.x * sides.y)
     place = face * (2 * dr.sum(areas))

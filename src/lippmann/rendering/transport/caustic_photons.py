@@ -38,25 +38,25 @@ _NONE = Photons.dark(0)
 
 
 def no_photons() -> PhotonMap:
-    """A map in place of paths to which nothing comes."""
+    """An empty photon map: caustics are left out."""
     return PhotonMap((_NONE, _NONE), 1.0)
 
 
 def emissions(samples: int) -> int:
-    """Emissions of each half for so many samples in all: noise and blur of caustics fall with the cost of paths."""
+    """Emissions of each half for ``samples`` samples in all, so that noise and blur of caustics fall alike."""
     return round(OF_POWER * math.pow(samples, 2 / 3))
 
 
 class CausticPhotons:
     """Photons of a picture's caustics in passes, each for the next samples of every pixel.
 
-    Passes know nothing of each other, and their radii shrink (Knaus and Zwicker 2011, with alpha = 2/3), so that the
-    mean over them comes to have neither noise nor blur.
+    Passes are independent, and their radii shrink (Knaus and Zwicker 2011, alpha = 2/3), so that both noise and blur of
+    the mean over them vanish.
 
     Parameters
     ----------
     scene, features, casters:
-        What they are shot in.
+        The scene, its features and its casters.
     samples:
         Of all pixels together for which the photons of a pass are.
     pass_samples:
@@ -64,9 +64,9 @@ class CausticPhotons:
     seed:
         0 to 2**32 - 1: the same gives the same photons.
     region:
-        Corners ``(2, 3)`` of the box that is seen: emitters and casters are given photons by what they bring there.
+        Corners ``(2, 3)`` of the visible box: pairs get photons by what they bring there.
     kept:
-        Passes whose photons are kept for others that ask, at least 1.
+        Passes whose photon maps are cached, at least 1.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class CausticPhotons:
 
     @property
     def are_none(self) -> bool:
-        """Whether a few emissions of each emitter and caster brought nothing that is seen, or missed."""
+        """Whether the pilot's photons all missed the visible box."""
         return self._chances is None
 
     def of_pass(self, number: int) -> PhotonMap:
@@ -101,7 +101,7 @@ class CausticPhotons:
         if self._chances is None:
             return no_photons()
         if not self._radius and number > 0:
-            self.of_pass(0)  # which tells the radius
+            self.of_pass(0)  # sets the radius
         if number not in self._maps:
             while len(self._maps) >= self._kept:
                 del self._maps[next(iter(self._maps))]
@@ -116,17 +116,17 @@ class CausticPhotons:
         return self._maps[number]
 
     def _pilot(self, casters: Casters) -> NDArray[np.float64] | None:
-        """Shares of the emissions of each emitter and caster: as the roots of the second moments of what they bring."""
+        """Share of the emissions of each pair, by the root second moment of its photons' flux; None for no photons."""
         if casters.pairs == 0:
             return None
         count = min(max(self._emissions // casters.pairs, FEWEST_OF_PAIR), MOST_OF_PAIR) * casters.pairs
         even = np.full(casters.pairs, 1 / casters.pairs)
         photons, pair = self._shooter.shoot(count, even, named_seed("pilot of photons", self._seed))
-        seen = photons.are_inside(self._region)
-        if not seen.any():
+        is_visible = photons.are_inside(self._region)
+        if not is_visible.any():
             return None
-        power = photons.power[seen].astype(np.float64)
-        roots = np.sqrt(np.bincount(pair[seen], np.square(power).sum(axis=1), minlength=casters.pairs))
+        power = photons.power[is_visible].astype(np.float64)
+        roots = np.sqrt(np.bincount(pair[is_visible], np.square(power).sum(axis=1), minlength=casters.pairs))
         return np.asarray(TUNING.uniform_share * even + (1 - TUNING.uniform_share) * roots / roots.sum())
 
 
@@ -137,7 +137,7 @@ def radius_of_pass(number: int) -> float:
 
 
 def _radius(photons: Photons, neighbours: float) -> float:
-    """The distance to the neighbour of that number, of the middle one of some photons."""
+    """Median distance of some photons to their neighbour number ``neighbours``."""
     from scipy.spatial import cKDTree
 
     number = int(min(max(2, round(neighbours)), max(2, len(photons) // 2)))

@@ -1,7 +1,7 @@
-"""What stands in front of the lens plane and is cut by the panel's edge, found by rays along the edge.
+"""Window violations: objects in front of the lens plane that the panel's edge cuts, found by rays along the edge.
 
-Behind the panel an edge is a window's frame, which may cut anything. In front of it the two eyes see something that the
-panel's own border hides, although it lies nearer: the depth there falls apart.
+Behind the panel the edge is a window's frame, which may cut anything. In front of it the border occludes something that
+stereopsis places nearer than the border: the cues conflict.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ class CutEdges:
 def find_cut_edges(
     built: BuiltScene | BuiltClassic, display: Display, world_from_display: Matrix, threads: int
 ) -> CutEdges | None:
-    """What the panel's edge cuts in front of the lens plane, in the middle and the outermost views; None for nothing.
+    """Objects that the panel's edge cuts in front of the lens plane, in the middle and outermost views; None for none.
 
-    A point at height z counts where it moves, from the first view to the last, by more than the display resolves.
-    Splats and a volume count where they stop half of the light. ``threads`` of the CPU trace those.
+    A point at height z counts if it moves by more than the display resolves from the first view to the last. Splats and
+    volumes count from the depth at which they absorb half of the light; ``threads`` CPU threads trace those.
     """
     side, _ = slopes = zone_slopes(display)
     views = [(0.0, 0.0), (-side, 0.0), (side, 0.0)]
@@ -55,8 +55,8 @@ def find_cut_edges(
         [edge + display.aperture_distance * steps, np.full((*steps.shape[:-1], 1), display.aperture_distance)], axis=-1
     )
     directions = np.concatenate([-steps, np.full((*steps.shape[:-1], 1), -1.0)], axis=-1)
-    seen, points = first_hits(built, world_from_display, origins, directions)
-    heights = np.where(seen, transform_points(inverse(world_from_display), points)[:, 2], -np.inf)
+    hit, points = first_hits(built, world_from_display, origins, directions)
+    heights = np.where(hit, transform_points(inverse(world_from_display), points)[:, 2], -np.inf)
     least = display.resolved_size / (2.0 * side)
     for half_stopped in half_stopped_by(built, world_from_display, origins, directions, least, threads):
         heights = np.maximum(heights, half_stopped)

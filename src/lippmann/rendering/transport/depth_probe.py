@@ -1,4 +1,4 @@
-"""How deep a camera sees into a scene: a grid of rays that tells where the first surfaces lie."""
+"""Visible depth range of a camera, from a grid of primary rays."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ Reals = NDArray[np.float64]
 
 #: Rays along each side of the view.
 SIDE = 128
-#: Shares of the rays that meet something nearer than the near depth, and nearer than the far one: neither a few pixels
-#: nor a floor that runs to the horizon decides.
+#: Quantiles of the hit distances that count as the near and the far depth, robust against a few pixels and against a
+#: floor that runs to the horizon.
 NEAR_SHARE, FAR_SHARE = 0.01, 0.9
 
 
 def probe_depth(built: BuiltScene | BuiltClassic, view: CameraView) -> VisibleDepth | None:
-    """Depths that ``view`` shows, along the camera's axis in world units; None where it shows nothing."""
+    """Near and far depth of ``view`` along the camera's axis in world units; None if no ray hits."""
     across = (np.arange(SIDE) + 0.5) * (2 / SIDE) - 1
     plane = np.zeros((SIDE, SIDE, 3))
     plane[..., 0], plane[..., 1] = across * view.half_width, across[:, None] * view.half_height
     toward = np.array((0.0, 0.0, -1.0))
     origins, directions = (plane, toward) if view.is_parallel else (np.zeros(3), plane + toward)
-    seen, points = first_hits(built, view.world_from_camera, origins, directions)
-    if not seen.any():
+    hit, points = first_hits(built, view.world_from_camera, origins, directions)
+    if not hit.any():
         return None
-    depths = np.sort(-transform_points(inverse(view.world_from_camera), points[seen])[:, 2])
+    depths = np.sort(-transform_points(inverse(view.world_from_camera), points[hit])[:, 2])
     near, far = np.quantile(depths, (NEAR_SHARE, FAR_SHARE))
     return VisibleDepth(float(near), float(far))
 

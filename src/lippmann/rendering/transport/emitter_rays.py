@@ -1,4 +1,4 @@
-"""Rays from emitters, and the surface points that they meet: one surface away from the light."""
+"""Rays from emitters, and the surface points that they hit: light vertices one bounce away from the emitter."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class LitPoints:
     position, normal, shading:
         ``(n, 3)``: the point, and the unit geometric and shading normals on the side that is lit; world space.
     glow:
-        ``(n, 3)``: radiance that the point scatters, over the density of such points per area.
+        ``(n, 3)``: radiance that the point scatters, divided by the pdf of such points per area.
     reach:
-        ``(n,)``: density of such points per area at that of one per area of a path's own points.
+        ``(n,)``: pdf of such points per area.
     sampled:
-        ``(n,)``: pdf with which emitter sampling at the point finds where its light comes from.
+        ``(n,)``: pdf with which emitter sampling at the point gives the ray's origin.
     scattered:
-        ``(n,)``: ``cos / pi`` with which a path that scatters at the point goes there; 0 for emitters without size.
+        ``(n,)``: ``cos / pi``, the pdf with which Lambertian scattering at the point gives it; 0 for delta emitters.
     """
 
     position: Floats
@@ -52,15 +52,15 @@ class LitPoints:
 class EmitterRays:
     """Rays from the emitters of a scene that have a place: surfaces, points and spots.
 
-    Rays from surfaces start evenly over them, by the cosine about their normal, on both sides where both shine; from
-    emitters without size evenly in all directions.
+    Rays from surfaces start uniformly over the area, cosine-distributed about the normal, on both sides of two-sided
+    emitters. Rays from delta emitters are uniform over all directions.
 
     Parameters
     ----------
     scene:
         A ``mi.Scene``.
     sampler:
-        Of next-event estimation in it.
+        The light sampler of next-event estimation.
     """
 
     def __init__(self, scene: MitsubaScene, sampler: LightSampler) -> None:
@@ -79,7 +79,7 @@ class EmitterRays:
                 place = int(np.flatnonzero(numbers == registry_numbers(mi.EmitterPtr(shape.emitter())))[0])
                 areas[place], starts[place] = area, point
         self._has_size = areas > 0
-        #: Which of the scene's emitters send rays, by their index.
+        #: Indices of the scene's emitters that send rays.
         self.senders = np.flatnonzero(self._has_size | has_place)
         self._starts = [starts.get(int(place), no_point) for place in self.senders]
         self._two_sided = self._has_size & [bool(getattr(each, "two_sided", False)) for each in scene.emitters()]
@@ -88,9 +88,10 @@ class EmitterRays:
         self._density[self._two_sided] /= 2
 
     def densities(self, chances: NDArray[np.float64]) -> Floats:
-        """Densities by the number of an emitter in Dr.Jit's registry, with the chances of the :attr:`senders`.
+        """Ray densities, indexed by an emitter's number in Dr.Jit's registry; ``chances`` are those of the
+        :attr:`senders`.
 
-        Negative for those that shine on both sides.
+        Negative for two-sided emitters.
         """
         values = np.zeros(len(self._density))
         values[self.senders] = (np.where(self._two_sided, -1, 1) * self._density)[self.senders] * chances
@@ -99,14 +100,14 @@ class EmitterRays:
     def meet(
         self, chosen: NDArray[np.int64], chances: NDArray[np.float64], seed: int
     ) -> tuple[LitPoints, NDArray[np.bool_]]:
-        """Points that scatter light of rays from emitters, and which of the rays met one.
+        """Light vertices, and a mask of the rays that hit one.
 
         Parameters
         ----------
         chosen:
-            For each ray which of the :attr:`senders` it starts from.
+            Index into :attr:`senders` for each ray.
         chances:
-            Share of all rays that each sender has.
+            Share of the rays of each sender.
         seed:
             0 to 2**32 - 1: the same gives the same rays.
         """
@@ -151,7 +152,7 @@ class EmitterRays:
         # A surface of one side reflects nothing on the other.
         mirrored = mi.Vector3f(-si.wi.x, -si.wi.y, si.wi.z)
         lit &= dr.max(bsdf.eval(mi.BSDFContext(), si, mirrored, lit)) > 0
-        # What comes from there, by the emitter's own word, and the pdf of emitter sampling.
+        # Emitted radiance toward the point, and the pdf of emitter sampling.
         back = scene.ray_intersect(si.spawn_ray(-along), mi.RayFlags.All, False, lit & has_size)
         ds = mi.DirectionSample3f(scene, si=back, ref=si)
         of_surface = dr.select(ds.emitter == emitter, mi.Color3f(emitter.eval(back, lit & has_size)), 0)

@@ -80,7 +80,7 @@ class Surfaces(Protocol):
         ...
 
     def first_point(self, ray: Ray3f) -> tuple[Bool, Point3f]:
-        """Whether :meth:`first_hit` is one, and its point: without looking at the surface."""
+        """Whether ``ray`` hits a surface, and where; cheaper than :meth:`first_hit`."""
         ...
 
     def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool]:
@@ -130,7 +130,7 @@ class PhysicalSurfaces:
         )
 
     def first_point(self, ray: Ray3f) -> tuple[Bool, Point3f]:
-        """Whether :meth:`first_hit` is one, and its point: without looking at the surface."""
+        """As :meth:`Surfaces.first_point`."""
         ray, pi = self._first(ray)
         return pi.is_valid(), ray(pi.t)
 
@@ -248,7 +248,7 @@ class WhittedSurfaces:
         return self._first_hit(self._mirror(mi.Vector3f(ray.o)), self._mirror(mi.Vector3f(ray.d)))
 
     def first_point(self, ray: Ray3f) -> tuple[Bool, Point3f]:
-        """Whether :meth:`first_hit` is one, and its point: without looking at the surface."""
+        """As :meth:`Surfaces.first_point`."""
         o, d = self._mirror(mi.Vector3f(ray.o)), self._mirror(mi.Vector3f(ray.d))
         closest = self._built.geometry.closest(o, d, mi.Bool(True), coherent=True)
         return closest.index != NONE, mi.Point3f(self._mirror(o + d * closest.t))

@@ -1,8 +1,8 @@
-"""Gaussian splats and volumes in front of surfaces: what stands between a ray's beginning and the first surface there.
+"""Gaussian splats and volumes, composited between the ray's origin and the first surface.
 
-They are composited on the CPU (:mod:`lippmann.device.splats`, :mod:`lippmann.device.volumes`); behind them lies the
-radiance of surfaces and background, by any other integrator. They give no light to surfaces, take none from them, and
-are seen in no mirror.
+They are composited on the CPU (:mod:`lippmann.device.splats`, :mod:`lippmann.device.volumes`) over the radiance of
+surfaces and background, which any other integrator estimates. Splats and volumes do not light surfaces, are not lit by
+them, and do not appear in mirrors.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ LIGHT = (-0.45, 0.6, 1.0)
 
 
 class _InFront:
-    """Light of what is composited, and of what ``behind`` brings from behind it.
+    """Integrator that composites something over the radiance of another one.
 
     Parameters
     ----------
     behind:
-        Radiance of surfaces and background.
+        Integrator of surfaces and background.
     built:
         The scene on the device.
     """
@@ -49,9 +49,9 @@ class _InFront:
         self._surfaces = PhysicalSurfaces(built) if len(built.mitsuba.shapes()) else None
 
     def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Spectrum, RayCounts]:
-        """Radiance along ``ray``, and the rays traced for what lies behind.
+        """Radiance along ``ray``, and the rays traced by the integrator behind.
 
-        All is evaluated at once; lanes that are not active are composited, too.
+        Evaluates its result. Inactive lanes are composited, too.
         """
         radiance, counts = self._behind.sample(ray, stream, active)
         end = mi.Float(dr.inf)
@@ -63,9 +63,9 @@ class _InFront:
         lanes = max(dr.width(ray), dr.width(radiance), dr.width(end))
         colors, transmittances = self._composite(_rows(ray.o, lanes), _rows(ray.d, lanes), _rows(end, lanes))
         color, transmittance = mi.Color3f(np.ascontiguousarray(colors.T)), upload(transmittances)
-        shown = self._over(color, transmittance, radiance)
+        composited = self._over(color, transmittance, radiance)
         # Where nothing is in front the radiance stays what it was, to the last bit.
-        return mi.Spectrum(dr.select(transmittance < 1, shown, radiance)), counts
+        return mi.Spectrum(dr.select(transmittance < 1, composited, radiance)), counts
 
     def _composite(self, origins: Floats, directions: Floats, ends: Floats) -> tuple[Floats, Floats]:
         """Colours ``(n, 3)`` and transmittances ``(n,)`` of rays ``(n, 3)`` up to the distances of their surfaces."""

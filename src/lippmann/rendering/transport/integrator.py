@@ -42,14 +42,14 @@ class FirstHit:
 class PixelSample:
     """One sample of each lane's pixel.
 
-    ``seen`` is what of ``radiance`` is seen light: emitters and sky that are met by sharp events alone. ``excess`` is
-    what of that rests on single chains. ``covered`` is 1 where the primary ray meets a surface, else 0. Each is None
-    where it is not told.
+    ``specular`` is the part of ``radiance`` that comes from emitters and sky by specular chains alone. ``excess`` is
+    the part of ``specular`` that rests on single bright chains. ``covered`` is 1 where the primary ray hits a surface,
+    else 0. Each is None where the integrator does not separate it.
     """
 
     radiance: Spectrum
     counts: RayCounts
-    seen: Spectrum | None = None
+    specular: Spectrum | None = None
     excess: Spectrum | None = None
     covered: Float | None = None
 

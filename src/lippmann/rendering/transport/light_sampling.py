@@ -122,9 +122,9 @@ class WeightedLightSampler:
 
     def _sample_emitter(self, number: Float, active: Bool) -> tuple[UInt32, Float, Float]:
         """Index of an emitter, ``number`` in [0, 1) made uniform again, and the emitter's probability."""
-        wanted = number * self._total
+        target = number * self._total
         index = binary_search(
-            self._first, self._last, lambda place: dr.gather(mi.Float, self._cumulative, place, active) < wanted
+            self._first, self._last, lambda place: dr.gather(mi.Float, self._cumulative, place, active) < target
         )
         probability = dr.gather(mi.Float, self._weights, index, active) * self._normalization
         before = dr.gather(mi.Float, self._cumulative, index - 1, active & (index > 0)) * self._normalization

@@ -1,17 +1,18 @@
 """Light vertices: surface points that emitters light directly, to which paths from the eye are joined.
 
-What a small emitter lights brightly, such as the wall beside it, lights the rest of a room in turn, and paths that
-scatter by the surfaces alone happen upon it seldom. Rays from the emitters find it at once. So each vertex of a path is
-joined to one of the points that such rays meet (the bidirectional strategy of two light vertices; Veach 1997, chapter
-10.2), drawn from a store that all pixels share (Davidovic et al. 2014, light vertex cache). The same light comes by
-next-event estimation at points that a path meets itself, and by paths that meet the emitter: the three share it by MIS.
+A wall beside a small emitter is bright and lights the rest of the room in turn. BSDF sampling seldom hits such a wall;
+rays from the emitter hit it at once. So each vertex of a path is joined to one of the points that such rays hit (the
+bidirectional strategy of two light vertices; Veach 1997, chapter 10.2), sampled from a store that all pixels share
+(Davidovic et al. 2014, light vertex cache). Next-event estimation at the path's own vertices and paths that hit the
+emitter sample the same light, so MIS combines the three.
 
-Only light that points scatter as Lambertian surfaces do is taken, so that a store holds numbers alone. With ``reach``
-the density of light vertices per area over that of the path's own points there, the weights of the three are as
+Only the Lambertian part of the scattering at light vertices is used, so that a store holds numbers alone. ``reach`` is
+the density per area of light vertices over that of the path's own vertices there. The MIS pdfs of the three strategies
+are, per steradian at the point:
 
-* ``reach``, in units of density per steradian about the point: of points met by rays from emitters,
+* ``reach``: light vertices,
 * the pdf of emitter sampling at the point,
-* ``cos / pi``, in place of the pdf by which the scattering there is sampled.
+* ``cos / pi``: BSDF sampling there.
 """
 
 from __future__ import annotations
@@ -49,17 +50,17 @@ Floats = NDArray[np.float32]
 
 @dataclass
 class JointLight:
-    """Light of a point that light vertices bring, too; state of the path loop.
+    """The light at a path vertex that light vertices sample, too; state of the path loop.
 
     Attributes
     ----------
     share:
-        Of the light.
+        Lambertian share in [0, 1] of the light.
     reach:
-        1 over the density per area with which the path came to the point, times the cosine between the point's
-        geometric normal and the way to the emitter; 0 where light vertices bring nothing.
+        Reciprocal of the pdf per area of the path's vertex, times the cosine between its geometric normal and the
+        direction to the emitter; 0 where light vertices sample nothing.
     cosine:
-        The same of the shading normal.
+        The cosine with the shading normal.
     """
 
     share: Spectrum
@@ -68,7 +69,7 @@ class JointLight:
 
 
 class Arrival:
-    """How a path came to a surface, for light there that light vertices bring, too.
+    """A path vertex as light vertices need it for MIS.
 
     Attributes
     ----------
@@ -89,7 +90,7 @@ class Arrival:
         self.half = half
 
     def joint(self, si: SurfaceInteraction3f, scattered: Color3f, wo: Vector3f, direction: Vector3f) -> JointLight:
-        """Of what the surface scatters from ``wo``, ``direction`` in the world: the BSDF times the cosine."""
+        """The joint light from ``wo`` (world-space ``direction``); ``scattered`` is the BSDF times the cosine."""
         share = lambertian_share(si, self.albedo, scattered, wo)
         return JointLight(share, self.reach * dr.abs(dr.dot(si.n, direction)), dr.abs(wo.z))
 
@@ -103,10 +104,10 @@ class Arrival:
         is_direct: Bool,
         active: Bool,
     ) -> Spectrum:
-        """MIS weight of an emitter sample at ``si`` that was taken with ``pdf`` and scatters as said.
+        """MIS weight of an emitter sample at ``si`` with ``pdf``; ``scattered`` is the BSDF times the cosine.
 
-        ``plain`` is the weight where light vertices bring nothing, as they do where the way to the emitter is not
-        ``is_direct``: rays from emitters do not pass holes and panes.
+        ``plain`` is the weight without light vertices. It holds where the way to the emitter is not ``is_direct``: rays
+        from emitters do not pass holes and panes.
         """
         joint = self.joint(si, mi.Color3f(scattered), si.to_local(ds.d), ds.d)
         joint.reach = dr.select(is_direct, joint.reach, 0)
@@ -115,9 +116,9 @@ class Arrival:
 
 
 def reach_of(si: SurfaceInteraction3f, bsdf: BSDFPtr, d: Vector3f, pdf: Float, active: Bool) -> Float:
-    """1 over the density per area with which a path comes to ``si`` along ``d``, which it samples with ``pdf``.
+    """Reciprocal of the pdf per area of a path vertex ``si`` that was sampled along ``d`` with ``pdf`` per steradian.
 
-    0 where ``pdf`` is, and on surfaces that let light straight through, which hold no light vertices.
+    0 where ``pdf`` is 0, and on surfaces that let light straight through, which hold no light vertices.
     """
     arrival = pdf * dr.abs(dr.dot(si.n, d))
     is_whole = active & ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null)
@@ -125,7 +126,7 @@ def reach_of(si: SurfaceInteraction3f, bsdf: BSDFPtr, d: Vector3f, pdf: Float, a
 
 
 class LightVertices:
-    """Two sets of light vertices that know nothing of each other, one for either half of a picture's samples.
+    """Two independent sets of light vertices, one for each half of a picture's samples.
 
     Parameters
     ----------
@@ -134,7 +135,7 @@ class LightVertices:
     halves:
         The points.
     rays:
-        From emitters, of each half, which met these points and nothing else that counts; above 0.
+        Rays from emitters of each half, those without a light vertex included; above 0.
     densities:
         See :meth:`~lippmann.rendering.transport.emitter_rays.EmitterRays.densities`.
     """
@@ -144,7 +145,7 @@ class LightVertices:
     ) -> None:
         self._scene = scene
         kept = np.array([len(half) for half in halves])
-        # A join draws one of the points that are kept, which are as dense as all rays together.
+        # A join samples one of the stored points, so each stands for rays / points rays.
         scales = rays / np.maximum(kept, 1)
         self._count = upload(kept.astype(np.uint32))
         self._first = upload(np.array([0, kept[0]], np.uint32))
@@ -178,32 +179,29 @@ class LightVertices:
         Parameters
         ----------
         joint:
-            What of it light vertices bring, too.
+            The part that light vertices sample, too.
         plain:
-            The weight where they bring nothing.
+            The weight without light vertices.
         other:
-            Pdf of the other of emitter sampling and scattering; both per steradian at the point, see the module.
+            Pdf of the other strategy (emitter or BSDF sampling), per steradian at the point; see the module.
         """
         reach = joint.reach * self._densities_at(ds, half, active)
         return plain + dr.select(reach > 0, joint.share * (mis_weight(own, other, reach) - plain), 0)
 
     def _densities_at(self, ds: DirectionSample3f, half: UInt32, active: Bool) -> Float:
-        """Density of light vertices per projected area at a point that is lit as ``ds`` says, in 1 per area.
-
-        0 where no rays come from there.
-        """
+        """Density of light vertices per projected area at a point lit from ``ds``; 0 where no rays come from there."""
         number = dr.reinterpret_array(mi.UInt32, ds.emitter)
-        told = dr.gather(mi.Float, self._densities, number + half * self._emitters, active)
-        active = active & (ds.delta | (told < 0) | (dr.dot(ds.n, ds.d) < 0))
-        density = dr.abs(told)
+        signed_density = dr.gather(mi.Float, self._densities, number + half * self._emitters, active)
+        active = active & (ds.delta | (signed_density < 0) | (dr.dot(ds.n, ds.d) < 0))
+        density = dr.abs(signed_density)
         return dr.select(active, dr.select(ds.delta, density / dr.square(ds.dist), density), 0)
 
     def join(
         self, si: SurfaceInteraction3f, bsdf: BSDFPtr, choice: Float, half: UInt32, active: Bool, through: bool
     ) -> tuple[Spectrum, UInt32]:
-        """Radiance toward ``si.wi`` by way of a light vertex that ``choice`` draws, and the shadow rays traced.
+        """Radiance toward ``si.wi`` by way of the light vertex that ``choice`` selects, and the shadow rays traced.
 
-        Not ``through`` the surface, only those on the side of ``si.wi`` count.
+        Without ``through``, only light vertices on the side of ``si.wi`` count.
         """
         count = dr.gather(mi.UInt32, self._count, half, active)
         active = active & (count > 0)
@@ -232,7 +230,7 @@ class LightVertices:
 
 
 class LightVertexPasses:
-    """Light vertices of a picture in passes, each for the next samples of every pixel; they know nothing of each other.
+    """Light vertices of a picture in independent passes, each for the next samples of every pixel.
 
     Parameters
     ----------
@@ -243,7 +241,7 @@ class LightVertexPasses:
     seed:
         0 to 2**32 - 1: the same gives the same light vertices.
     region:
-        Corners ``(2, 3)`` of the box that is seen: emitters send rays by what they bring there.
+        Corners ``(2, 3)`` of the visible box: emitters get rays by what they bring there.
     """
 
     def __init__(

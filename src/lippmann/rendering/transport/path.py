@@ -3,8 +3,9 @@
 The integrator differs from Mitsuba's own ``path`` in what integral images and glTF scenes need. Straight-through
 surfaces (alpha masks, thin glass) do not count as a bounce, and shadow rays pass through their holes. The background
 that a camera ray sees may differ from the environment that lights the scene. Rays are counted, and samples are
-stratified per pixel. What else a path may do, from absorption in coloured glass to caustics by photons, is a technique
-of :mod:`.path_techniques`. Without any the expectation is that of Mitsuba's ``path`` with ``max_depth = depth + 1``.
+stratified per pixel. Everything else, from absorption in coloured glass to caustics by photons, is a technique of
+:mod:`.path_techniques`. Without techniques the expectation is that of Mitsuba's ``path`` with ``max_depth = depth +
+1``.
 
 Ray depth counts surfaces, the primary ray's hit being 1: at depth 1 a surface shows its direct light.
 """
@@ -37,9 +38,9 @@ from lippmann.rendering.transport.path_techniques import (
     Absorption,
     LightVertexJoins,
     PhotonGathering,
-    SeenLightApart,
     Technique,
     Techniques,
+    WithoutSpecularLight,
 )
 from lippmann.rendering.transport.path_vertex import LastVertex, Scattering, Vertex
 from lippmann.rendering.transport.path_weights import (
@@ -91,13 +92,13 @@ class PathIntegrator:
         self.shadow_rays = shadow_rays or ShadowRays(scene, features.has_null)
         emitters, self._environment = scene.emitters(), scene.environment()
         self.without_size = WithoutSize(emitters)
-        # A single delta emitter: more than one sample of it tells nothing more.
+        # All samples of a single delta emitter are the same.
         self._single_delta = len(emitters) == len(self.without_size) == 1
         self._clamp = Clamp(self.light.most_indirect)
         self.absorption = Techniques(*self._absorption())
         self._techniques = Techniques(*self._absorption(), *self._sharing())
-        apart = SeenLightApart(len(self.without_size) > 0)
-        self._techniques_without_seen = Techniques(*self._absorption(), *self._sharing(), apart)
+        apart = WithoutSpecularLight(len(self.without_size) > 0)
+        self._techniques_without_specular = Techniques(*self._absorption(), *self._sharing(), apart)
 
     def _absorption(self) -> list[Technique]:
         return [Absorption(self.features)] if self.features.has_absorption else []
@@ -114,7 +115,7 @@ class PathIntegrator:
         return techniques
 
     def lit_by(self, light: PreparedLight) -> PathIntegrator:
-        """The same paths with other light."""
+        """The same integrator with other prepared light."""
         return PathIntegrator(self.scene, self.features, self.depth, self.name, light, self.shadow_rays)
 
     def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Spectrum, RayCounts]:
@@ -124,16 +125,16 @@ class PathIntegrator:
 
     @syntax
     def sample_with_hit(
-        self, ray: Ray3f, stream: SampleStream, active: Bool, without_seen: bool = False
+        self, ray: Ray3f, stream: SampleStream, active: Bool, without_specular: bool = False
     ) -> tuple[Spectrum, RayCounts, FirstHit]:
         """As :meth:`sample`, with the first hit. Every surface that is not purely diffuse is view-dependent.
 
-        Light that is met by sharp events alone is left out ``without_seen``, that of emitters without size included,
-        but for sky behind nothing: at outlines samples of both sides belong together.
+        ``without_specular`` leaves out light from emitters and sky by specular chains alone, delta emitters included.
+        Sky that the primary ray sees stays: at outlines samples of both sides belong together.
         """
         scene = self.scene
         context = mi.BSDFContext()
-        techniques = self._techniques_without_seen if without_seen else self._techniques
+        techniques = self._techniques_without_specular if without_specular else self._techniques
 
         o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)  # current ray
         active = mi.Bool(active)
@@ -235,16 +236,17 @@ class PathIntegrator:
         states: list[Any],
         half: UInt32,
     ) -> Spectrum:
-        """Radiance that a path meets after ``depth`` surfaces, by MIS against emitter sampling at its last vertex.
+        """Emitted radiance where a path ends after ``depth`` surfaces, by MIS against emitter sampling at its last
+        vertex.
 
         Parameters
         ----------
         si:
-            What the path meets; the environment where it is not valid.
+            The intersection; the environment where it is not valid.
         last:
             Its last scattering vertex.
         techniques, states:
-            Techniques that may bring the same light.
+            Techniques that may sample the same light.
         half:
             Of the picture, see :class:`~lippmann.device.sobol.SampleStream`.
         """
@@ -257,18 +259,18 @@ class PathIntegrator:
         emission = ds.emitter.eval(si) * weight
         if self.features.background is None:
             return emission
-        shown = mi.Spectrum(self.features.background)
+        background = mi.Spectrum(self.features.background)
         if self.light.gain is not None:
-            shown /= self.light.gain  # a colour that is to be seen as it was said
-        return dr.select((depth == 0) & ~si.is_valid(), shown, emission)
+            background /= self.light.gain  # the background is not exposed
+        return dr.select((depth == 0) & ~si.is_valid(), background, emission)
 
     @property
     def has_surroundings(self) -> bool:
-        """Whether rays that meet nothing show something."""
+        """Whether rays that hit no surface carry radiance."""
         return self._environment is not None or self.features.background is not None
 
     def limited(self, met: Spectrum, depth: UInt32) -> Spectrum:
-        """What a path brings that it met after ``depth`` surfaces, with the limit on indirect light."""
+        """A path's contribution after ``depth`` surfaces, clamped where it is indirect."""
         return self._clamp.limited(met, depth > 1)
 
     def first_emitter_samples(self, sample: UInt32) -> UInt32:
@@ -287,8 +289,7 @@ class PathIntegrator:
         """Radiance toward ``si.wi`` from the emitter that ``point`` samples, that sample, and the shadow rays traced.
 
         The radiance is divided by the pdf of the sample, and weighted by MIS against BSDF sampling, as one of
-        ``samples`` emitter samples at this surface; and against light vertices, where ``arrival`` tells how the path
-        came here.
+        ``samples`` emitter samples at this surface; and against light vertices where ``arrival`` is given.
         """
         ds, light = self.light_sampler.sample_direction(si, point, active)
         lit = active & (ds.pdf != 0) & (dr.max(light) > 0)
@@ -303,5 +304,5 @@ class PathIntegrator:
 
     def visibility(self, si: SurfaceInteraction3f, ds: DirectionSample3f, active: Bool) -> tuple[Spectrum, UInt32]:
         """Transmittance in [0, 1] from the emitter sample ``ds`` to the surface, and the shadow rays traced."""
-        found: tuple[Spectrum, UInt32] = self.shadow_rays.transmittance(si.spawn_ray_to(ds.p), ds.p, active)
-        return found
+        result: tuple[Spectrum, UInt32] = self.shadow_rays.transmittance(si.spawn_ray_to(ds.p), ds.p, active)
+        return result

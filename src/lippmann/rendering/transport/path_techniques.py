@@ -1,8 +1,8 @@
-"""What a path does beside plain next-event estimation and BSDF sampling, each technique an object with hooks.
+"""Techniques beside plain next-event estimation and BSDF sampling, each an object with hooks.
 
-The path loop (:mod:`.path`) calls every hook of every technique in turn; one that has nothing to do there hands on what
-it is given. Per-lane state of a technique is a value that :meth:`Technique.begin` makes and :meth:`Technique.scatter`
-makes anew after each vertex; it is state of the loop, so that all of it has to change on the way.
+The path loop (:mod:`.path`) calls every hook of every technique in turn. A hook without work returns its argument.
+:meth:`Technique.begin` makes the per-lane state of a technique, :meth:`Technique.scatter` replaces it after each
+vertex. It is loop state, so each of its values must change from vertex to vertex.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ class Technique:
     Attributes
     ----------
     reads:
-        What it asks a vertex for by name; worked out before its hooks are called, as one of them is in a loop.
+        Cached properties of a vertex that the hooks use. They are evaluated before the hooks, one of which runs in a
+        loop.
     """
 
     reads: tuple[str, ...] = ()
@@ -51,25 +52,25 @@ class Technique:
         return ()
 
     def travel(self, state: Any, si: SurfaceInteraction3f, throughput: Spectrum) -> Spectrum:
-        """Throughput of a path that has come to ``si``, whether that is valid or not."""
+        """Throughput of a path that has arrived at ``si``, which need not be valid."""
         return throughput
 
     def weigh_emission(
         self, state: Any, half: UInt32, ds: DirectionSample3f, weight: Float, emitter_pdf: Float, active: Bool
     ) -> Float | Spectrum:
-        """MIS weight of the emitter ``ds`` that a path has met, which was ``weight`` without the technique."""
+        """MIS weight of the emitter ``ds`` that BSDF sampling hit; ``weight`` is that without the technique."""
         return weight
 
     def meet_emitter(self, state: Any, depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
-        """The part of what a path meets at ``si`` that is left to it."""
+        """The part of the ``emission`` at ``si`` that the path keeps."""
         return emission
 
     def arrive(self, state: Any, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
-        """Radiance and number of shadow rays of a path, with what the technique adds at a vertex."""
+        """Radiance and shadow rays of a path with the technique's contribution at a vertex added."""
         return radiance, shadow
 
     def sample_emitter(self, state: Any, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
-        """The part of the light of an emitter sample that is left to the path."""
+        """The part of an emitter sample's ``light`` that the path keeps."""
         return light
 
     def scatter(self, state: Any, vertex: Vertex, scattering: Scattering) -> Any:
@@ -105,7 +106,7 @@ class _Caustics:
     """State of :class:`PhotonGathering`.
 
     ``is_seen``: all events were sharp. ``sharp``: sharp events since the last rough one, straight-through surfaces
-    excluded. ``by_photons``: share of the light met by sharp events from that one on that photons bring.
+    excluded. ``by_photons``: share in [0, 1] of the light behind these events that photons bring instead of the path.
     """
 
     is_seen: Bool
@@ -114,7 +115,7 @@ class _Caustics:
 
 
 class PhotonGathering(Technique):
-    """Caustics by photons, in place of paths that meet their emitters.
+    """Caustics by photon density estimation, in place of paths that hit the emitter.
 
     Parameters
     ----------
@@ -123,7 +124,7 @@ class PhotonGathering(Technique):
     depth:
         Surfaces of a path.
     environment:
-        Emitter whose light stays with paths; None where there is none.
+        The environment emitter, whose light stays with paths; None without one.
     """
 
     def __init__(self, photons: PhotonMap, depth: int, environment: Emitter | None) -> None:
@@ -139,14 +140,14 @@ class PhotonGathering(Technique):
         return dr.select(is_caustic, emission * (1 - state.by_photons), emission)
 
     def arrive(self, state: _Caustics, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
-        """Adds the photons about the vertex.
+        """Adds the photons around the vertex.
 
-        All of them as the Lambertian part of the surface scatters them; as the rest of its scattering does, one in the
-        place of all, where its lobes are wide enough for that.
+        The Lambertian part of the BSDF scatters all of them. The rest of the BSDF scatters one chosen photon that
+        stands for all, where its lobes are wide enough.
         """
         si, stream = vertex.si, vertex.stream
         lands = vertex.active & (vertex.has_wide_lobes | (dr.max(vertex.albedo) > 0))
-        found = self._photons.gather(
+        gathered = self._photons.gather(
             si,
             facing_normal(si),
             vertex.lobe,
@@ -158,11 +159,11 @@ class PhotonGathering(Technique):
             stream.key + stream.index,
             TUNING.photons_of_cell,
         )
-        light = vertex.albedo * found.irradiance * dr.inv_pi
-        wo = si.to_local(found.toward)
-        wide = lands & vertex.has_wide_lobes & (dr.max(found.flux) > 0) & (wo.z * si.wi.z > 0)
+        light = vertex.albedo * gathered.irradiance * dr.inv_pi
+        wo = si.to_local(gathered.toward)
+        wide = lands & vertex.has_wide_lobes & (dr.max(gathered.flux) > 0) & (wo.z * si.wi.z > 0)
         rest = vertex.bsdf.eval(mi.BSDFContext(), si, wo, wide) / dr.abs(wo.z) - vertex.albedo * dr.inv_pi
-        light = dr.select(lands, light, 0) + dr.select(wide, rest * found.flux, 0)
+        light = dr.select(lands, light, 0) + dr.select(wide, rest * gathered.flux, 0)
         return radiance + vertex.throughput * light, shadow
 
     def sample_emitter(self, state: _Caustics, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
@@ -184,11 +185,10 @@ class PhotonGathering(Technique):
         )
 
 
-class SeenLightApart(Technique):
-    """Leaves out light that is met by sharp events alone, which chains bring (:mod:`.seen_light`).
+class WithoutSpecularLight(Technique):
+    """Leaves out light by specular chains alone, which :mod:`.specular_chains` adds.
 
-    That of emitters without size is left out as well, if there are such; sky behind nothing is not. State: whether all
-    events were sharp.
+    Delta emitters are left out as well; sky that the primary ray sees is not. State: whether all events were sharp.
     """
 
     def __init__(self, has_without_size: bool) -> None:
@@ -224,7 +224,7 @@ class _Joint:
 
 
 class LightVertexJoins(Technique):
-    """Joins each vertex of a path to a light vertex; light that comes both ways is shared by MIS.
+    """Joins each vertex of a path to a light vertex, with MIS against the other ways to sample the same light.
 
     Parameters
     ----------
@@ -233,9 +233,9 @@ class LightVertexJoins(Technique):
     depth:
         Surfaces of a path.
     has_absorption:
-        Whether a path may travel in coloured glass, to which nothing is joined.
+        Whether a path may travel inside coloured glass, where no vertex is joined.
     clamp:
-        Limit on what one join brings.
+        Limit on the contribution of one join.
     """
 
     def __init__(self, vertices: LightVertices, depth: int, has_absorption: bool, clamp: Clamp) -> None:

@@ -48,7 +48,7 @@ class LastVertex:
 
     @classmethod
     def eye(cls) -> LastVertex:
-        """Before the first surface: all light that is met counts."""
+        """The eye: BSDF sampling has MIS weight 1 there."""
         return cls(mi.Point3f(0), mi.Float(1), mi.Bool(True), mi.UInt32(1))
 
 
@@ -68,13 +68,13 @@ class Vertex:
     throughput:
         Of the path up to here.
     stream, dimension:
-        Random numbers, and the first dimension that is the vertex's own.
+        Random numbers, and the first sample dimension of this vertex.
     states:
         Of the path's techniques.
     is_in_clear:
         Whether the ray came through a medium that absorbs nothing.
     arrival:
-        By what emitter samples are weighed against light vertices; None for nothing.
+        Weighs emitter samples against light vertices by MIS; None without light vertices.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class Vertex:
         """Whether emitters are sampled here."""
         return self.active & mi.has_flag(self.bsdf.flags(), mi.BSDFFlags.Smooth)
 
-    # Each is worked out where it is first asked for: outside the loop over emitter samples, see Technique.reads.
+    # Evaluated at first use: outside the loop over emitter samples, see Technique.reads.
     @cached_property
     def lobe(self) -> Vector3f:
         return sharp_lobe(self.si, self.bsdf, self.active)
@@ -126,7 +126,7 @@ class Scattering:
 
     @cached_property
     def is_rough(self) -> Bool:
-        """Whether the path turns from seeing an image to gathering light."""
+        """Whether the event is neither sharp nor straight through."""
         return self.is_event & ~follows_sharply(self._vertex.si, self._vertex.lobe, self.bs)
 
     @property

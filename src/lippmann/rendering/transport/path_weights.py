@@ -1,4 +1,4 @@
-"""Weights of a path's samples, and the chances by which it goes on and samples emitters."""
+"""MIS weights, Russian roulette, emitter samples per vertex, and the clamp on indirect light."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def mis_weight(pdf: Float, *others: Float) -> Float:
 
 
 def roulette_survival(throughput: Spectrum, eta: Float) -> Float:
-    """Probability that Russian roulette lets a path go on, by its throughput and the product of its relative indices.
+    """Survival probability of a path in Russian roulette, from its throughput and the product of relative indices.
 
-    The root of its unitless throughput, at most 0.95. By the throughput itself, hardly any path of a room with grey
-    walls goes on, and what the few bring that do weighs so much that two long pictures agree by 0.5 dB less.
+    The root of the unitless throughput, at most 0.95. With the throughput itself hardly any path survives in a room
+    with grey walls, and the few survivors have large weights: 0.5 dB less PSNR at equal samples.
     """
     survival: Float = dr.minimum(dr.sqrt(dr.max(throughput)) * eta, 0.95)
     return survival
@@ -32,8 +32,8 @@ def roulette_survival(throughput: Spectrum, eta: Float) -> Float:
 def first_emitter_samples(sample: UInt32) -> tuple[UInt32, UInt32]:
     """Count of emitter samples at the first non-specular surface of a pixel's path number ``sample``, and their start.
 
-    The start is the index of the first of them in the pixel's sequence of points, which all paths of the pixel share
-    without gaps.
+    The start is the index of the first emitter sample in the pixel's sequence of points. The paths of a pixel use this
+    sequence one after another, without gaps.
     """
     early = sample < TUNING.early_samples
     before = TUNING.early_emitter_samples * TUNING.early_samples
@@ -43,13 +43,13 @@ def first_emitter_samples(sample: UInt32) -> tuple[UInt32, UInt32]:
 
 
 class Clamp:
-    """Limit on what indirect light brings at once; None for no limit."""
+    """Clamp on single contributions of indirect light; None for no limit."""
 
     def __init__(self, most: Float | None) -> None:
         self._most = most
 
     def limited(self, light: Spectrum, is_indirect: Bool | None = None) -> Spectrum:
-        """``light`` with no component above the limit, its hue unchanged; where it is indirect, if that is told."""
+        """``light`` scaled so that no component exceeds the limit; only where ``is_indirect``, if that is given."""
         if self._most is None:
             return light
         clamped = light * dr.minimum(1, self._most / dr.maximum(dr.max(light), 1e-20))

@@ -1,7 +1,7 @@
-"""Photons of caustics in cells, and the irradiance that they bring to a point.
+"""Photon map of caustics: photons in a hashed grid, and the irradiance that they bring to a point.
 
-Photons are sorted by cell, so that a look-up goes through short runs of them, and sums never depend on the order of
-threads. Cells are hashed into buckets; a bucket may hold photons of other cells, which are told apart one by one.
+Photons are sorted by cell, so that a look-up reads short runs, and sums never depend on the order of threads. Cells are
+hashed into buckets. A bucket may hold photons of several cells, so the cell of each photon is compared.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from lippmann.rendering.transport.tuning import TUNING
 
 Floats = NDArray[np.float32]
 
-#: Least slope of a plane, and least area in faces of a cell, by which light in a cell is divided.
+#: Lower bounds of the area of a plane in a cell: slope of the plane, and area in faces of the cell.
 _LEAST_SLOPE, _LEAST_AREA = 0.01, 0.05
 _PRIMES = (73856093, 19349663, 83492791)
-#: Bits for each bucket that tell which wide cells have photons in reach; how many there are at least in all; and the
-#: width of these cells in radii: one look-up in fifty is made for nothing.
+#: Bitmap of wide cells with photons in reach: bits per bucket, fewest bits in all, and width of a wide cell in radii.
+#: One look-up in fifty then finds no photon.
 _NEAR_BITS, _FEWEST_BITS, _NEAR_WIDTH = 16, 1 << 10, 4
-#: What a photon is in reach of, in radii: a look-up's, and rounding.
+#: Reach of a photon in radii: the radius of a look-up, and rounding.
 _IN_REACH = 1.01
 
 
@@ -43,7 +43,7 @@ class Photons:
         ``(n, 3)``: the point, the unit geometric normal on the side that the light comes from, and the unit direction
         that it comes from; world space.
     power:
-        ``(n, 3)``: flux that each stands for.
+        ``(n, 3)``: flux of each.
     surfaces:
         ``(n,)``: sharp events between the emitter and the point.
     """
@@ -110,7 +110,7 @@ class Gathered:
 
 
 class PhotonMap:
-    """Two sets of photons that know nothing of each other, one for either half of a picture's samples.
+    """Two independent sets of photons, one for each half of a picture's samples.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ class PhotonMap:
         self._r = dr.opaque(mi.Float, radius)
 
     def may_reach(self, p: Point3f, active: Bool) -> Bool:
-        """Whether photons may be in reach of a look-up: of most points in a large world none are."""
+        """Whether photons may be in reach of a look-up at ``p``: in a large world most points have none."""
         cell = _mixed_number(dr.floor(p / (_NEAR_WIDTH * self._r))) & self._last_near
         word = dr.gather(mi.UInt32, self._near, cell >> 5, active)
         return (word >> (cell & 31) & 1) != 0
@@ -167,7 +167,7 @@ class PhotonMap:
         half: UInt32,
         surfaces: UInt32,
         choice: Float,
-        seen: Bool,
+        by_kernel: Bool,
         active: Bool,
         part: UInt32 | int = 0,
         most: int = 1 << 31,
@@ -181,41 +181,41 @@ class PhotonMap:
         normal:
             Its geometric normal on the side that is seen.
         lobe:
-            Of its narrow lobe (:func:`~lippmann.rendering.transport.sharp_events.sharp_lobe`): light that it reflects
-            sharply is no caustic here.
+            Normal of its narrow lobe (:func:`~lippmann.rendering.transport.sharp_events.sharp_lobe`): photons that it
+            reflects sharply are not counted.
         half:
             0 or 1: which photons.
         surfaces:
-            The most sharp events that a photon may have had.
+            Most sharp events of a photon that counts.
         choice:
-            Uniform in [0, 1): by which one photon is chosen.
-        seen:
-            Whether the point is seen; else the mean over the part of its tangent plane that lies in its cell will do,
-            which costs a tenth.
+            Uniform random number in [0, 1) that chooses one photon.
+        by_kernel:
+            Whether an Epanechnikov kernel is used, as for points that the eye sees; else the mean over the part of the
+            tangent plane in the point's cell, at a tenth of the cost.
         part, most:
-            No more than ``most`` photons of a bucket of cells are looked at: every second, fourth, ... one, from number
-            ``part`` on, which counts so many times. Over successive parts the mean is that of all photons.
+            At most ``most`` photons of a bucket are read: every second, fourth, ... one from number ``part`` on, with
+            that weight. The mean over successive parts is that of all photons.
         """
         r = self._r
         p = mi.Point3f(si.p)
         base = dr.floor(p / r) - 1
-        # How far the tangent plane's slab reaches from the centre of a cell that it touches.
+        # Largest distance of a cell's centre from the tangent plane whose slab touches the cell.
         reach = r * (TUNING.farthest_from_plane + 0.5 * dr.sum(dr.abs(normal)))
         total = mi.Color3f(0)
         weights = mi.Float(0)  # of the photons met so far; one of them is chosen by reservoir sampling
         chosen = mi.Vector3f(0, 0, 1)
         color = mi.Color3f(0)
         # The own cell is the fourteenth of those around it.
-        corner = dr.select(seen, mi.UInt32(0), 13)
-        end_corner = dr.select(seen, mi.UInt32(27), 14)
-        density = dr.select(seen, 2 / (dr.pi * r * r), 1 / _area_in_cell(p - (base + 1) * r, normal, r))
+        corner = dr.select(by_kernel, mi.UInt32(0), 13)
+        end_corner = dr.select(by_kernel, mi.UInt32(27), 14)
+        density = dr.select(by_kernel, 2 / (dr.pi * r * r), 1 / _area_in_cell(p - (base + 1) * r, normal, r))
         first = mi.UInt32(part)
         first_bucket = half * (self._last_bucket + 2)
         looking = active & self.may_reach(p, active)
         while dr.hint(
             looking,
             label="cells",
-            exclude=[si, p, r, normal, lobe, surfaces, seen, base, end_corner, reach, first, first_bucket],
+            exclude=[si, p, r, normal, lobe, surfaces, by_kernel, base, end_corner, reach, first, first_bucket],
         ):
             cell = base + mi.Vector3f(mi.Float(corner % 3), mi.Float(corner // 3 % 3), mi.Float(corner // 9))
             from_center = (cell + 0.5) * r - p
@@ -228,12 +228,14 @@ class PhotonMap:
             step = mi.UInt32(1) << (32 - dr.lzcnt((dr.maximum(end - number, 1) - 1) // most))
             number += (first - number) & (step - 1)
             inside = looking & touches & (number < end)
-            while dr.hint(inside, label="photons", exclude=[si, p, r, normal, lobe, surfaces, seen, step, cell, end]):
+            while dr.hint(
+                inside, label="photons", exclude=[si, p, r, normal, lobe, surfaces, by_kernel, step, cell, end]
+            ):
                 q = dr.gather(mi.Vector4f, self._position, number, inside).xyz
                 apart = q - p
                 distance2 = dr.squared_norm(apart)
-                near = inside & (~seen | (distance2 < r * r))
-                if dr.hint(near, exclude=[si, r, normal, lobe, surfaces, seen, step, cell, q, apart, distance2]):
+                near = inside & (~by_kernel | (distance2 < r * r))
+                if dr.hint(near, exclude=[si, r, normal, lobe, surfaces, by_kernel, step, cell, q, apart, distance2]):
                     # Two of the cells may share a bucket.
                     fits = near & dr.all(dr.floor(q / r) == cell)
                     n = dr.gather(mi.Vector4f, self._normal, number, near).xyz
@@ -244,19 +246,19 @@ class PhotonMap:
                     fits &= brought.w <= mi.Float(surfaces)
                     wo = si.to_local(d)
                     fits &= ~is_sharp(si, lobe, wo)
-                    share_of_power = dr.select(seen, 1 - distance2 / (r * r), 1)
+                    share_of_power = dr.select(by_kernel, 1 - distance2 / (r * r), 1)
                     power = dr.select(fits, mi.Color3f(brought.xyz) * (share_of_power * mi.Float(step)), 0)
                     # dr.mean would write the number of lanes into the kernel, and make one for each.
                     weight = (power.x + power.y + power.z) / 3
                     weights += weight
                     share = dr.select(weight > 0, weight / weights, 0)
-                    taken = choice < share
-                    choice = dr.select(taken, choice / share, (choice - share) / (1 - share))
-                    chosen = dr.select(taken, d, chosen)
+                    is_chosen = choice < share
+                    choice = dr.select(is_chosen, choice / share, (choice - share) / (1 - share))
+                    chosen = dr.select(is_chosen, d, chosen)
                     # Photons know the true surface; it is shaded by its interpolated normal.
                     power *= dr.minimum(dr.abs(wo.z) / dr.dot(d, normal), TUNING.steepest)
                     total += power
-                    color = dr.select(taken, power / weight, color)
+                    color = dr.select(is_chosen, power / weight, color)
                 number += step
                 inside &= number < end
             corner += 1
@@ -277,7 +279,7 @@ def _mixed_number(cell: Point3f) -> UInt32:
 
 
 def _mark_near(near: NDArray[np.bool_], position: Floats, radius: float) -> None:
-    """Mark the hashes of the wide cells from whose points photons are in reach."""
+    """Mark the hashes of the wide cells that hold points with photons in reach."""
     width = np.float32(_NEAR_WIDTH) * np.float32(radius)
     for corner in itertools.product((-1, 1), repeat=3):
         cell = np.floor((position + np.float32(_IN_REACH * radius) * np.array(corner, np.float32)) / width)

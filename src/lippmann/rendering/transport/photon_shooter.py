@@ -1,4 +1,4 @@
-"""Shoots photons from emitters by way of sharp surfaces: :mod:`.caustic_photons` says which, and for what."""
+"""Shoots photons from emitters along specular chains; see :mod:`.caustic_photons` for their use."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ class PhotonShooter:
         self._emitter_numbers = mi.UInt32(casters.emitters)
 
     def shoot(self, count: int, chances: NDArray[np.float64], seed: int) -> tuple[Photons, NDArray[np.int64]]:
-        """``count`` emissions of pairs drawn by ``chances``: photons that landed, and their pairs."""
-        # Every pair gets its number of emissions, not a chance of them.
+        """Photons of ``count`` emissions, shared among the pairs by ``chances``, and the pair of each photon."""
+        # Each pair gets a fixed number of emissions, not a random one.
         each = np.maximum(1, np.round(chances * count)).astype(np.int64)
         pair = np.repeat(np.arange(len(each)), each)
         landed: list[Photons] = []
@@ -70,7 +70,7 @@ class PhotonShooter:
     def _lit_points(
         self, pair: NDArray[np.int64], stream: SampleStream
     ) -> tuple[CasterPoints, DirectionSample3f, Spectrum]:
-        """For each pair a point on the caster, a direction to the emitter, and radiance over the direction's pdf."""
+        """Point on the caster, sampled direction to the emitter, and radiance over pdf, for each pair."""
         numbers, scene = upload(pair.astype(np.uint32)), self._scene
         caster, source = divide(numbers, len(self._casters.emitters))
         emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, self._emitter_numbers, source))
@@ -81,10 +81,10 @@ class PhotonShooter:
     def _wavefront(
         self, pair: NDArray[np.int64], each: NDArray[np.int64], first: int, seed: int
     ) -> tuple[Photons, NDArray[np.int64]]:
-        """Photons that land, by the surfaces that they have met, and the lane of each."""
+        """Photons of one wavefront that land on rough surfaces, and the lane of each."""
         lanes, features = len(pair), self._features
         share = upload((1.0 / each[pair]).astype(np.float32))
-        # What differs from wavefront to wavefront is opaque to the compiler, so that all share their kernels.
+        # Opaque to the compiler, so that all wavefronts share a kernel.
         index = dr.arange(mi.UInt32, lanes) + dr.opaque(mi.UInt32, first)
         stream = SampleStream.of_pixels(mi.UInt32(0), index, dr.opaque(mi.UInt32, seed))
         ray, power = self._emitted(pair, share, stream)
@@ -103,12 +103,12 @@ class PhotonShooter:
         return photons, np.array(lit, dtype=np.int64)[lanes_of_photons]
 
     def _emitted(self, pair: NDArray[np.int64], share: mi.Float, stream: SampleStream) -> tuple[Ray3f, Color3f]:
-        """Rays that meet the casters, and the flux that comes along each; 0 where something is in the way."""
+        """Rays from emitters to the casters, and the flux along each; 0 where the way is blocked."""
         scene = self._scene
         point, ds, light = self._lit_points(pair, stream)
         active = (ds.pdf > 0) & (dr.max(light) > 0)
         power = mi.Color3f(light) * share
-        # From the emitter to the point: tells whether one sees the other, and what surface is met there.
+        # From the emitter to the point: tests visibility, and finds the surface there.
         ray = mi.Ray3f(point.p + ds.d * (ds.dist * (1 - 1e-3)), -ds.d)
         si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
         for _ in range(_MOST_CROSSINGS if self._features.has_null else 0):
@@ -128,9 +128,9 @@ class PhotonShooter:
     def _follow(
         self, ray: Ray3f, power: Color3f, active: Bool, stream: SampleStream, landed: _Landed, surfaces: int
     ) -> None:
-        """Follows light along sharp events, and notes where it lands after one or more.
+        """Follows light along sharp events, and records where it lands after one or more.
 
-        Each turn is one surface: all of them are one kernel, and lanes whose light has ended wait for no others.
+        Each iteration is one surface.
         """
         scene, features = self._scene, self._features
         o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
@@ -158,7 +158,7 @@ class PhotonShooter:
         stream: SampleStream,
         dimension: UInt32,
     ) -> tuple[Point3f, Vector3f, Spectrum, UInt32, Color3f | None, Bool]:
-        """The ray after one event of light that follows sharp ones alone."""
+        """The next ray of a photon, and its state after the event; inactive where the event is not sharp."""
         bsdf = si.bsdf()
         lobe = sharp_lobe(si, bsdf, active)
         context = mi.BSDFContext(mi.TransportMode.Importance)
@@ -184,12 +184,12 @@ class PhotonShooter:
 
 
 def _absorbed(power: Color3f, absorption: Color3f | None, si: SurfaceInteraction3f) -> Color3f:
-    """What is left of light on its way to ``si``."""
+    """``power`` after Beer-Lambert absorption on the way to ``si``."""
     return power if absorption is None else power * dr.exp(-absorption * dr.select(si.is_valid(), si.t, 0))
 
 
 class _Landed:
-    """Photons of one kernel: at most one of each lane at each surface."""
+    """Table of landed photons of one kernel: at most one per lane and surface."""
 
     def __init__(self, lanes: int, surfaces: int) -> None:
         self._lanes = lanes
@@ -201,7 +201,7 @@ class _Landed:
         dr.eval(self._events, self._values)
 
     def note(self, si: SurfaceInteraction3f, power: Color3f, events: UInt32, turn: UInt32, active: Bool) -> None:
-        """Light of that flux has come to ``si``, the surface of that number after the first."""
+        """Record light with flux ``power`` that arrives at ``si``, surface number ``turn`` after the first."""
         bsdf = si.bsdf()
         active = active & (dr.max(power) > 0)
         lambert = lambertian(si, bsdf, active)
@@ -213,7 +213,7 @@ class _Landed:
             dr.scatter(values, mi.Vector3f(vector), row, active)
 
     def photons(self) -> tuple[Photons, NDArray[np.int64]]:
-        """Those that landed, and their lanes."""
+        """The landed photons, and the lane of each."""
         events = np.array(self._events)
         rows = np.flatnonzero(events)
         lanes = rows % self._lanes

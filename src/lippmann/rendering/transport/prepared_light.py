@@ -1,4 +1,4 @@
-"""What an integrator knows of a picture's light before its first path."""
+"""The prepared light of a picture: what an integrator is given before its first path."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ class PreparedLight:
     gain:
         Factor on the radiance, the background's apart; None for 1.
     most_indirect:
-        What one indirect contribution may bring at most, before ``gain``; None for no limit.
+        Clamp on one indirect contribution, before ``gain``; None for no limit.
     photons:
-        Photons of caustics in place of paths that would have to find them; None for paths.
+        Photon map of caustics; None where paths have to find them.
     photon_passes:
-        Gives ``photons`` for each part of a picture's samples; None where they are the same for all.
+        Makes ``photons`` for each run of a picture's samples; None where all samples share one map.
     light_vertices, vertex_passes:
-        The same of points lit by emitters, to which paths are joined; None where paths find all light themselves.
+        The same of light vertices, to which paths are joined; None without joins.
     chains:
-        Chains of sharp events of each path, see :mod:`.seen_light`; None for none.
+        Specular chains per path, see :mod:`.specular_chains`; None for none.
     choices:
-        What the picture's file says of it.
+        Decisions and measured values for the picture's metadata.
     """
 
     sampler: LightSampler | None = None
@@ -50,7 +50,7 @@ class PreparedLight:
     choices: Mapping[str, object] = field(default_factory=dict)
 
     def at(self, sample: int) -> tuple[PreparedLight, int | None]:
-        """The light of sample number ``sample`` of each pixel, and how many samples from there on it serves.
+        """The light for sample number ``sample`` of each pixel, and how many samples from there on use it.
 
         None for all.
         """

@@ -48,9 +48,9 @@ class RaySource(Protocol):
 
 
 def pixel_number(source: RaySource, column: UInt32, row: UInt32) -> UInt32:
-    """Index of pixels that seeds their random numbers: row by row over the whole picture, also in a window of it.
+    """Pixel index that seeds the random numbers: row by row over the whole picture, also for a window of it.
 
-    A pixel thus has the same samples whichever part of the picture it is rendered with.
+    So a pixel has the same samples whichever part of the picture is rendered.
     """
     if isinstance(source, WindowRays | SubpixelRays | SinglePixelRays):
         return source.number(column, row)
@@ -83,7 +83,7 @@ class OnePicture(RaySource):
     """A ray source with a single view."""
 
     def tiles(self) -> Iterator[tuple[slice, slice]]:
-        """Rows and columns of each view: here one, the whole picture."""
+        """Rows and columns of each view; here a single one, the whole picture."""
         yield slice(0, self.height), slice(0, self.width)
 
 
@@ -126,7 +126,7 @@ class DisplayRays(OnePicture):
 
 
 class WindowRays(OnePicture):
-    """Rays of a window of a display's pixels, which keep the random numbers that they have in the whole picture."""
+    """Rays of a window of a display's pixels, with the random numbers of the whole picture."""
 
     def __init__(self, source: DisplayRays, window: PixelWindow) -> None:
         self.display = source.display
@@ -134,7 +134,7 @@ class WindowRays(OnePicture):
         self.window = window
         self.width, self.height, self.channels = window.width, window.height, source.channels
         self._source = source
-        # Opaque to the compiler, so that windows of one size share their kernels.
+        # Opaque to the compiler, so that windows of one size share a kernel.
         self._left, self._top = (dr.opaque(mi.UInt32, first) for first in (window.left, window.top))
 
     def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
@@ -206,9 +206,9 @@ class SinglePixelRays(ChosenRays):
 class SubpixelRays(OnePicture):
     """Rays of the sub-pixels of a display or of a window, as the pixels of a picture three times as wide.
 
-    A sub-pixel has the rays and the random numbers that it has in ``source``, and is rendered in all three colours, of
-    which the display shows one. Columns ``3 x`` to ``3 x + 2`` are the sub-pixels of the pixel in column x, from left
-    to right as they lie on the panel.
+    A sub-pixel has the rays and the random numbers that it has in ``source``, but all three colours are kept; the
+    display shows one of them. Columns ``3 x`` to ``3 x + 2`` are the sub-pixels of the pixel in column x, from left to
+    right on the panel.
     """
 
     channels = 1
@@ -232,7 +232,7 @@ class SubpixelRays(OnePicture):
         return pixel_number(self._source, pixel, row) * 3 + color
 
     def own_colors(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Pixels of the display, ``(..., H, W, 3)``, from ``(..., H, 3 W, 3)``: the own colour of each sub-pixel."""
+        """Pixels of the display, ``(..., H, W, 3)``, from ``(..., H, 3 W, 3)``: each sub-pixel keeps its own colour."""
         subpixels = values.reshape(*values.shape[:-2], values.shape[-2] // 3, 3, 3)
         return np.stack([subpixels[..., self._colors.index(c), c] for c in range(3)], axis=-1)
 
@@ -264,7 +264,7 @@ class QuiltRays:
     view_size:
         Width and height of a view in pixels.
     window:
-        Part of each view that its tile holds; by default all of it.
+        Part of each view that is traced; all of it by default.
     """
 
     channels = 1
@@ -343,7 +343,7 @@ class CameraRays(OnePicture):
 
 
 def _without_scale(world_from_camera: Matrix) -> Matrix:
-    """The frame of a camera: a file's nodes may carry scales, but its field is told in world units."""
+    """The camera frame without the scales of a file's nodes: its field of view is in world units."""
     matrix = np.array(world_from_camera, dtype=np.float64)
     matrix[:3, :3] /= np.linalg.norm(matrix[:3, :3], axis=0)
     return matrix

@@ -1,4 +1,4 @@
-"""Features of a built scene that need more than the plain path loop."""
+"""Features of a built scene that the plain path loop does not handle."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def make_scene_features(
     background:
         Linear RGB that camera rays see where nothing is hit; by default the environment itself.
     has_null:
-        Whether some surface lets rays straight through. True is always right, and costs time.
+        Whether some surface lets rays straight through. True is always correct, but slower.
     absorption:
         Absorption coefficients per world unit, by the index of a shape in ``scene.shapes()``.
     """

@@ -1,7 +1,7 @@
-"""Shadow rays: how much of an emitter's light reaches a surface past everything between the two.
+"""Shadow rays: transmittance between a surface and an emitter.
 
-Surfaces that let rays straight through (alpha masks, thin glass) dim shadow rays instead of blocking them, so that in
-scenes with such the nearest hit of each ray is found and asked, again and again. In others any hit will do.
+Surfaces that let rays straight through (alpha masks, thin glass) attenuate shadow rays instead of blocking them. In
+scenes with such surfaces the nearest hits are found and evaluated one after another; in others any hit blocks.
 """
 
 from __future__ import annotations

@@ -3,10 +3,10 @@
 Light that comes from an emitter by sharp events alone and then meets a rough surface is a *caustic* there; paths from
 the eye hardly ever find small emitters so. All other light is left to them.
 
-Whether an event is sharp follows from the surface and the two directions alone, not from the lobe that a direction was
-drawn from: so the division is exact however light is sampled. Lobes without width (delta) are sharp by themselves. A
-surface with a narrow lobe tells that lobe's normal, as the attribute :data:`~lippmann.device.pbr.gltf_bsdf.SHARP_LOBE`:
-reflection is sharp where the half vector lies near it, and all that goes through such a surface is.
+Whether an event is sharp follows from the surface and the two directions alone, not from the sampled lobe. So the
+division of light into sharp and rough is exact however light is sampled. Delta lobes are sharp. A surface with a narrow
+lobe has that lobe's normal as the attribute :data:`~lippmann.device.pbr.gltf_bsdf.SHARP_LOBE`: a reflection is sharp
+where the half vector lies near this normal, and every transmission through such a surface is sharp.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ MOST_EVENTS = 6
 
 def sharp_lobe(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Vector3f:
     """Unit normal of a surface's narrow lobe in the frame of ``si``, on the side of ``si.wi``; 0 where it has none."""
-    told = active & bsdf.has_attribute(SHARP_LOBE, active)
-    return dr.select(told, mi.Vector3f(bsdf.eval_attribute_3(SHARP_LOBE, si, told)), 0)
+    has_word = active & bsdf.has_attribute(SHARP_LOBE, active)
+    return dr.select(has_word, mi.Vector3f(bsdf.eval_attribute_3(SHARP_LOBE, si, has_word)), 0)
 
 
 def is_sharp(si: SurfaceInteraction3f, lobe: Vector3f, wo: Vector3f) -> Bool:
@@ -38,21 +38,21 @@ def is_sharp(si: SurfaceInteraction3f, lobe: Vector3f, wo: Vector3f) -> Bool:
 
 
 def follows_sharply(si: SurfaceInteraction3f, lobe: Vector3f, bs: BSDFSample3f) -> Bool:
-    """Whether a sampled direction goes on sharply: by a lobe without width, or by ``lobe`` (:func:`sharp_lobe`)."""
+    """Whether a sampled event is sharp: by a delta lobe, or by ``lobe`` (:func:`sharp_lobe`)."""
     has_no_width = (bs.sampled_type & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
     return has_no_width | is_sharp(si, lobe, bs.wo)
 
 
 def has_wide_lobes(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Bool:
-    """Whether all that a surface reflects but sharply can be told from photons, by its own word."""
-    told = active & bsdf.has_attribute(WIDE_LOBES, active)
-    return told & (bsdf.eval_attribute_1(WIDE_LOBES, si, told) > 0)
+    """Whether the BSDF says that photons can estimate all of its reflection but the sharp part."""
+    has_word = active & bsdf.has_attribute(WIDE_LOBES, active)
+    return has_word & (bsdf.eval_attribute_1(WIDE_LOBES, si, has_word) > 0)
 
 
 def lambertian_share(si: SurfaceInteraction3f, albedo: Color3f, scattered: Color3f, wo: Vector3f) -> Color3f:
-    """Share in [0, 1] of a part of that ``albedo`` in ``scattered``, which is the BSDF for ``wo`` times the cosine.
+    """Share in [0, 1] of a Lambertian part with that ``albedo`` in ``scattered``, the BSDF for ``wo`` times the cosine.
 
-    What comes through the surface is no part of it.
+    0 for transmission.
     """
     lambert = albedo * (dr.abs(wo.z) * dr.inv_pi)
     return dr.select((si.wi.z * wo.z > 0) & (scattered > 0), dr.clip(lambert / scattered, 0, 1), 0)
@@ -64,13 +64,12 @@ def facing_normal(si: SurfaceInteraction3f) -> Vector3f:
 
 
 def lambertian(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Color3f:
-    """Albedo of the part of a surface's scattering that is the same in all directions; 0 where there is none.
+    """Albedo of the Lambertian part of a BSDF; 0 without one.
 
-    It is the surface's own word (:data:`~lippmann.device.pbr.gltf_bsdf.LAMBERTIAN`), or the reflectance of a surface
-    that scatters in no other way.
+    From the attribute :data:`~lippmann.device.pbr.gltf_bsdf.LAMBERTIAN`, or the reflectance of a purely diffuse BSDF.
     """
-    told = active & bsdf.has_attribute(LAMBERTIAN, active)
-    value = dr.select(told, mi.Color3f(bsdf.eval_attribute_3(LAMBERTIAN, si, told)), 0)
+    has_word = active & bsdf.has_attribute(LAMBERTIAN, active)
+    value = dr.select(has_word, mi.Color3f(bsdf.eval_attribute_3(LAMBERTIAN, si, has_word)), 0)
     kinds = bsdf.flags() & int(mi.BSDFFlags.All)
-    plain = active & ~told & (kinds == int(mi.BSDFFlags.DiffuseReflection))
+    plain = active & ~has_word & (kinds == int(mi.BSDFFlags.DiffuseReflection))
     return dr.select(plain, mi.Color3f(bsdf.eval_diffuse_reflectance(si, plain)), value)

@@ -1,4 +1,4 @@
-"""Properties of the first surface, without light: for tests of geometry and as ground truth of light fields."""
+"""Properties of the first surface (normal, position, depth, albedo), for geometry tests and as ground truth."""
 
 from __future__ import annotations
 

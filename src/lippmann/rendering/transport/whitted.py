@@ -24,7 +24,7 @@ from lippmann.device.whitted.materials import LEAST, Finish
 from lippmann.device.whitted.scene import BuiltClassic
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 
-#: Rays that may wait on the stack of a lane. A path would need 2^32 rays to exceed it.
+#: Entries of each lane's stack of pending rays; a binary tree of 2^32 rays needs no more.
 MAX_STACK = 32
 #: Rays of less weight are not followed: a thousandth of a step of an 8-bit picture.
 MIN_WEIGHT = 4e-6

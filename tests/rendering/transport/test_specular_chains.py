@@ -203,8 +203,8 @@ def test_their_highlights_go_past_a_denoiser():
     integrator, source = described(replace(scene, lights=[light]))
     batches = FullInBatches(chained(integrator, 8), source, seed=1, memory=1 << 30, for_denoiser=True)
     batches.add(16)
-    assert batches.seen().max() > 1
-    assert (batches.picture() - batches.seen()).max() < 1
+    assert batches.specular().max() > 1
+    assert (batches.picture() - batches.specular()).max() < 1
 
 
 @pytest.mark.long
@@ -280,18 +280,18 @@ def test_seen_light_is_told_apart_and_is_all_that_is_seen(all_events):
     for batches in both:
         batches.add(16)
     frame = trace_frame(integrator, source, cut_wavefronts(SIDE, SIDE, 16, memory=2**30), seed=5, for_denoiser=True)
-    picture, seen, halves = both[0].picture(), both[0].seen(), both[0].seen_halves()
+    picture, specular, halves = both[0].picture(), both[0].specular(), both[0].specular_halves()
     assert np.array_equal(picture, both[1].picture())
-    assert both[1].seen() is None
-    assert both[1].seen_halves() is None
-    assert seen == pytest.approx(np.mean(halves, axis=0), rel=1e-5, abs=1e-7)
+    assert both[1].specular() is None
+    assert both[1].specular_halves() is None
+    assert specular == pytest.approx(np.mean(halves, axis=0), rel=1e-5, abs=1e-7)
     assert not np.array_equal(*halves)
-    assert frame.seen.mean() == pytest.approx(seen.mean(), rel=0.1)
-    assert np.all(seen <= picture * (1 + 1e-5) + 1e-6)
-    matt = seen[SIDE // 2 + 5 : SIDE // 2 + 7, SIDE // 2 + 5 : SIDE // 2 + 7]
+    assert frame.specular.mean() == pytest.approx(specular.mean(), rel=0.1)
+    assert np.all(specular <= picture * (1 + 1e-5) + 1e-6)
+    matt = specular[SIDE // 2 + 5 : SIDE // 2 + 7, SIDE // 2 + 5 : SIDE // 2 + 7]
     assert np.abs(matt).max() == 0
-    assert seen.max() > 2  # brighter than anything matt
-    share = seen.sum() / picture.sum()
+    assert specular.max() > 2  # brighter than anything matt
+    share = specular.sum() / picture.sum()
     assert 0.05 < share < 0.95
 
 
@@ -304,7 +304,7 @@ def test_what_one_chain_brings_beyond_a_limit_is_excess(all_events):
     from lippmann.device.kernel_ops import divide
     from lippmann.device.sobol import SampleStream
     from lippmann.rendering.transport.ray_source import PixelRays
-    from lippmann.rendering.transport.seen_light import seen_light
+    from lippmann.rendering.transport.specular_chains import specular_light
 
     integrator, source = all_events
     most, of_pixel, chains = 4.0, 64, 3
@@ -314,7 +314,7 @@ def test_what_one_chain_brings_beyond_a_limit_is_excess(all_events):
         row, column = divide(pixel, SIDE)
         stream = SampleStream.of_pixels(pixel, sample, dr.opaque(mi.UInt32, 1))
         pixels = PixelRays(source, column, row, mi.UInt32(0))
-        light, excess, _ = seen_light(
+        light, excess, _ = specular_light(
             integrator, pixels, stream, dr.opaque(mi.UInt32, per_lane), mi.Bool(True), dr.opaque(mi.Float, most)
         )
         return np.array(mi.Color3f(light)).T, np.array(mi.Color3f(excess)).T
@@ -339,7 +339,7 @@ def test_of_many_chains_each_counts_as_a_whole(all_events):
     from lippmann.rendering.film.sample_batches import FullInBatches
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.film.wavefront_plan import cut_wavefronts
-    from lippmann.rendering.transport.seen_light import most_of_chain
+    from lippmann.rendering.transport.specular_chains import most_of_chain
 
     assert 5 < most_of_chain(8.0) < 6
     assert 20 < most_of_chain(64.0) < 30
@@ -356,12 +356,14 @@ def test_of_many_chains_each_counts_as_a_whole(all_events):
     assert FullInBatches(integrator, source, memory=1 << 30).excess() is None
     assert many.excess().max() == 0
     assert limited.excess().max() == frame.excess.max() == 0  # the gain leaves less than 5.7
-    excess, seen = (np.stack([part(each) for each in few]) for part in (FullInBatches.excess, FullInBatches.seen))
+    excess, specular = (
+        np.stack([part(each) for each in few]) for part in (FullInBatches.excess, FullInBatches.specular)
+    )
     bright = excess.max(axis=-1) > 0
     assert 5 < bright.sum() < 0.01 * bright.size
-    assert np.all(excess <= seen * (1 + 1e-5))
+    assert np.all(excess <= specular * (1 + 1e-5))
     # Of single hits, by one of a pixel's chains, is left what counts of them.
-    assert (seen - excess).max(axis=-1)[bright].min() == pytest.approx(most_of_chain(8.0) / 8, rel=0.1)
+    assert (specular - excess).max(axis=-1)[bright].min() == pytest.approx(most_of_chain(8.0) / 8, rel=0.1)
 
 
 def test_sky_at_outlines_stays_with_paths(engine):
@@ -389,6 +391,6 @@ def test_sky_at_outlines_stays_with_paths(engine):
     plan = cut_wavefronts(SIDE, SIDE, 4, memory=2**30)
     plain = trace_frame(integrator, source, plan, for_denoiser=True)
     further = trace_frame(chained(integrator, 4), source, plan, for_denoiser=True)
-    assert plain.seen is None
-    assert np.abs(further.seen).max() == 0
+    assert plain.specular is None
+    assert np.abs(further.specular).max() == 0
     assert further.pixels == pytest.approx(plain.pixels, rel=1e-5)

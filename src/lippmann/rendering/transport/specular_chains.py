@@ -1,18 +1,17 @@
-"""Light that the eye sees by sharp events alone: emitters, and the sky in mirrors, gloss and through clear glass.
+"""Specular light: emitters and sky that the eye sees by specular chains alone (paths L S* E, mirrors, gloss, glass).
 
-Emitters without size, which no ray meets, are sampled at each sharp surface, and count where the half vector makes the
+Small emitters, and emitters mirrored in small curved objects, cover a small part of a pixel, so few of its paths hit
+them. A specular chain is much cheaper than a path: it samples no emitters, looks up no photons and ends at the first
+rough surface. So each path leaves this light out, and several chains through other points of the pixel estimate it,
+with the same expectation. Sky that the primary ray sees stays with the path.
+
+Delta emitters, which no ray can hit, are sampled at each sharp surface. They count where the half vector makes the
 event sharp.
 
-Small emitters seen so, and emitters mirrored in small curved things, fill a small part of a pixel, and few paths of the
-pixel meet them. They have no noise of transport, and a chain of sharp events is cheap beside a path: no emitters are
-sampled along it, no photons are looked up, and it ends at the first rough surface. So chains through other points of
-the pixel stand for what a path would have met of such light: all meet the same by the same chances, so their mean has
-its expectation. Sky behind nothing stays with the path.
-
-Where one chain alone makes a pixel bright, it more likely had luck than that the pixel is that bright: what it brings
-beyond :func:`most_of_chain` is told apart as *excess*. A picture that leaves it out is darker where images of emitters
-were not found, and its error smaller (docs/research/seen-light.md). The limit grows with the chains of a pixel, so that
-with ever more of them nothing is left out.
+A pixel that one chain alone makes bright is more likely an outlier than that bright. The part of a chain's contribution
+beyond :func:`most_of_chain` is its *excess*. A picture without excess is biased, darker where images of emitters were
+missed, but has a smaller error (docs/research/seen-light.md). The limit grows with the number of chains, so that the
+bias vanishes.
 """
 
 from __future__ import annotations
@@ -47,32 +46,33 @@ from lippmann.rendering.transport.tuning import TUNING
 
 #: Sample dimensions used at one vertex.
 _DIMENSIONS_PER_VERTEX = 2
-#: Sample dimension, from a vertex's first, of the emitter without size that is sampled there.
+#: Sample dimension, from a vertex's first, of the delta emitter that is sampled there.
 _EMITTER_DIMENSION = 1 << 24
 
 
 def sample_pixel(
     integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, active: Bool, samples: Float | None = None
 ) -> PixelSample:
-    """One sample of ``pixel`` per lane; seen light by chains, where the integrator has them.
+    """One sample of ``pixel`` per lane; specular light by chains where the integrator has some.
 
-    Where ``samples`` are given, those of the pixel so far, these included, it is told apart, and so is coverage.
+    With ``samples``, the number of samples of the pixel up to and including these, specular light, its excess and
+    coverage are returned separately, too.
     """
     ray = pixel.ray(stream)
     light = integrator.light
     if light.chains is None:
         radiance, counts, hit = integrator.sample_with_hit(ray, stream, active)
         return PixelSample(radiance, counts, covered=None if samples is None else _covered(hit))
-    rest, counts, hit = integrator.sample_with_hit(ray, stream, active, without_seen=True)
+    rest, counts, hit = integrator.sample_with_hit(ray, stream, active, without_specular=True)
     chains = mi.Float(light.chains)
     scale = dr.rcp(chains) if light.gain is None else light.gain / chains
     most = None if samples is None else most_of_chain(samples * chains) / (scale * chains)
-    seen, excess, traced = seen_light(integrator, pixel, stream, light.chains, active, most)
-    seen *= scale
+    specular, excess, traced = specular_light(integrator, pixel, stream, light.chains, active, most)
+    specular *= scale
     counts = RayCounts(counts.secondary + traced.secondary, counts.shadow + traced.shadow)
     if samples is None:
-        return PixelSample(rest + seen, counts)
-    return PixelSample(rest + seen, counts, seen, excess * scale, _covered(hit))
+        return PixelSample(rest + specular, counts)
+    return PixelSample(rest + specular, counts, specular, excess * scale, _covered(hit))
 
 
 def _covered(hit: FirstHit) -> Float:
@@ -80,12 +80,12 @@ def _covered(hit: FirstHit) -> Float:
 
 
 def most_of_chain(chains: Float) -> Float:
-    """Linear value, white being 1, up to which one of so many ``chains`` of a pixel counts."""
+    """Largest contribution of one of ``chains`` chains of a pixel that is no excess; linear, white is 1."""
     return TUNING.most_of_chain * chains**TUNING.most_power
 
 
 @syntax
-def seen_light(
+def specular_light(
     integrator: PathIntegrator,
     pixel: PixelRays,
     stream: SampleStream,
@@ -93,9 +93,9 @@ def seen_light(
     active: Bool,
     most: Float | None = None,
 ) -> tuple[Spectrum, Spectrum, RayCounts]:
-    """Sum of the light that so many chains of each lane's pixel meet, before the gain; and the rays traced.
+    """Sum of the light of ``chains`` chains through each lane's pixel, its excess over ``most``, and the rays traced.
 
-    Between them stands what of the sum is from single chains beyond ``most``.
+    All before the gain.
     """
     light = mi.Spectrum(0)
     excess: Any = None if most is None else mi.Spectrum(0)
@@ -132,9 +132,9 @@ def seen_light(
 def _chain(
     integrator: PathIntegrator, ray: Ray3f, stream: SampleStream, path: UInt32, active: Bool
 ) -> tuple[Spectrum, UInt32, UInt32 | None]:
-    """What one chain meets, as the path of number ``path`` would weigh it, and the rays and shadow rays traced.
+    """Light of one chain with the MIS weights of the path number ``path``, and the rays and shadow rays traced.
 
-    Shadow rays are None where no emitter is without size.
+    Shadow rays are None in scenes without delta emitters.
     """
     scene, techniques = integrator.scene, integrator.absorption
     context = mi.BSDFContext()
@@ -188,7 +188,7 @@ def _chain(
         active = continues & (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
         pi = scene.ray_intersect_preliminary(onward, coherent=False, active=active)
         rays += dr.select(active, mi.UInt32(1), mi.UInt32(0))
-        # Before its first event, where nothing is met, a chain has met nothing but sky.
+        # A chain that leaves the scene counts as sky, but not before its first event.
         active &= _may_show_light(pi) | (integrator.has_surroundings & ~pi.is_valid() & (depth > 0))
     return light, rays, shadow
 
@@ -196,7 +196,7 @@ def _chain(
 def _without_size(
     integrator: PathIntegrator, si: SurfaceInteraction3f, bsdf: BSDFPtr, lobe: Vector3f, point: Point2f, active: Bool
 ) -> tuple[Spectrum, UInt32]:
-    """Radiance toward ``si.wi`` by a sharp event from an emitter without size, and the shadow rays traced."""
+    """Radiance toward ``si.wi`` by a sharp event from a sampled delta emitter, and the shadow rays traced."""
     ds, radiance = integrator.without_size.sample_direction(si, point, active)
     wo = si.to_local(ds.d)
     lit = active & is_sharp(si, lobe, wo) & (dr.max(radiance) > 0)
@@ -207,11 +207,11 @@ def _without_size(
 
 
 def _may_show_light(pi: PreliminaryIntersection3f) -> Bool:
-    """Whether what a chain has met may emit, or let it go on: most are rough surfaces that do neither."""
+    """Whether the hit may emit or continue the chain: most surfaces are rough and do neither."""
     bsdf = pi.shape.bsdf()
     return pi.is_valid() & (pi.shape.is_emitter() | _has_no_width(bsdf) | bsdf.has_attribute(SHARP_LOBE, pi.is_valid()))
 
 
 def _has_no_width(bsdf: BSDFPtr) -> Bool:
-    """Whether a surface has lobes without width, or lets rays straight through."""
+    """Whether a BSDF has delta lobes, or lets rays straight through."""
     return (bsdf.flags() & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0

@@ -1,4 +1,4 @@
-"""Blur of the caustics that a picture shows: by the photons about the first rough surface along camera rays."""
+"""Blur (bias) of the caustics that camera rays see, estimated at the first rough surface from the photons there."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from lippmann.rendering.transport.sharp_events import (
 )
 
 
-class ShownBlur:
-    """Radiance, of either sign, that look-ups of twice the radius add to the caustics that rays of ``integrator`` show.
+class VisibleBlur:
+    """Change of the radiance of visible caustics, of either sign, when photons are looked up with twice the radius.
 
-    It is that of Lambertian lobes; the gloss of the same surfaces is taken to be blurred no more.
+    Only for Lambertian lobes; the glossy lobes of the same surfaces are assumed to be blurred no more than these.
     """
 
     def __init__(self, integrator: PathIntegrator, photons: PhotonMap) -> None:
@@ -31,12 +31,12 @@ class ShownBlur:
 
     @syntax
     def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> Spectrum:
-        """One sample of it along ``ray`` (world space) per lane."""
+        """One sample per lane of the change along ``ray`` (world space)."""
         paths = self._paths
         context = mi.BSDFContext()
         o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
         active = mi.Bool(active)
-        shown = mi.Spectrum(0)
+        added = mi.Spectrum(0)
         throughput = mi.Spectrum(1)
         depth, crossings = mi.UInt32(0), mi.UInt32(0)
         while dr.hint(active, label="sharp", exclude=[paths, context, stream]):
@@ -45,7 +45,7 @@ class ShownBlur:
             active &= si.is_valid() & (depth < paths.depth)
             bsdf = si.bsdf(toward)
             lobe = sharp_lobe(si, bsdf, active)
-            shown += throughput * self._light(si, bsdf, lobe, depth, stream, active)
+            added += throughput * self._light(si, bsdf, lobe, depth, stream, active)
 
             dimension = (depth * 2 + crossings) * DIMENSIONS_PER_VERTEX + 1
             bs, weight = bsdf.sample(context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), active)
@@ -58,7 +58,7 @@ class ShownBlur:
             active &= (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
             onward = si.spawn_ray(si.to_world(bs.wo))
             o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
-        return paths.exposed(shown)
+        return paths.exposed(added)
 
     def _light(
         self,
