@@ -1,4 +1,4 @@
-"""What is to be traced, and what came of it."""
+"""A rendering job, and its result."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from lippmann.rendering.transport.ray_source import DisplayRays, OnePicture, Qui
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """What is to be traced.
+    """A scene, its rays and the integrator to trace them with.
 
     Attributes
     ----------
     session:
         The scene on the device, the request, and the machine's share.
     integrator, source:
-        What is gathered along which rays.
+        The integrator, and the rays of the picture.
     display_from_world:
         ``(4, 4)`` affine map to the display's frame (mm).
     is_part:
-        Of a picture that is denoised in parts, which is put together and assessed elsewhere.
+        Whether the source is a tile of a picture that is assembled and assessed elsewhere.
     """
 
     session: Session
@@ -41,12 +41,12 @@ class Job:
 
     @property
     def request(self) -> RenderRequest:
-        """How the picture is to be made."""
+        """The resolved request."""
         return self.session.request
 
     @property
     def progress(self) -> ProgressCallback:
-        """Whom to tell how far it is."""
+        """The callback of progress reports."""
         return self.session.watch.progress
 
     @property
@@ -60,18 +60,18 @@ class Job:
 
 @dataclass(frozen=True)
 class Traced:
-    """What came of a job.
+    """The result of a job.
 
     Attributes
     ----------
     samples:
-        How many each pixel had.
+        Samples per pixel.
     estimate:
-        How good the picture is by its own account; where it is None, ``notes`` say why.
+        Estimated PSNR; where it is None, ``notes`` say why.
     options, seconds:
-        How it was done, and what stages of its own that took.
+        Metadata of the method, and the seconds of its own stages.
     errors:
-        Those of the pixels, where they are known.
+        Squared errors of the pixels; None where they are unknown.
     """
 
     frame: Frame

@@ -1,4 +1,4 @@
-"""What a picture's file says of its light: exposure, light that is missing or cut off, and what its error may hide."""
+"""Notes in a picture's metadata about its light: exposure, missing or clamped light, and doubts about the error."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from lippmann.scene.values.description import Color
 if TYPE_CHECKING:
     from lippmann.rendering.film.wavefront import RayTotals
 
-#: Pictures that show less than this share of anything carry a warning.
+#: Least share of pixels that show the scene; pictures below it carry a warning.
 LEAST_SHARE = 0.01
 
 
 def stated_error(estimate: Estimate | None, choices: Mapping[str, object]) -> dict[str, object] | None:
-    """The estimate as files hold it; None where light is missing that no difference between samples tells of.
+    """The estimate as metadata; None where the samples miss light that their differences cannot reveal.
 
     Parameters
     ----------
     estimate:
         None where there is none.
     choices:
-        What was chosen for the picture, by the names of its options, and found: ``caustics`` here.
+        Decisions for the picture by option name; ``caustics`` counts here.
     """
     if estimate is None or _misses_caustics(choices):
         return None
@@ -36,10 +36,7 @@ def stated_error(estimate: Estimate | None, choices: Mapping[str, object]) -> di
 
 
 def is_among_mirrors(choices: Mapping[str, object]) -> bool:
-    """Whether sharp surfaces may mirror emitters so small that samples miss them.
-
-    Caustics tell that are not left to paths.
-    """
+    """Whether sharp surfaces may reflect emitters so small that samples miss them: wherever photons bring caustics."""
     return choices.get("caustics", "paths") != "paths"
 
 

@@ -1,4 +1,4 @@
-"""From a scene in front of a display to a traced frame, by the method that was asked for."""
+"""The rendering methods: from a job to a traced frame."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ SAMPLES_LAYER = "samples"
 
 
 def trace(job: Job) -> Traced:
-    """The picture by the method of ``job.request``, with the samples of each pixel among its maps."""
+    """Render by the method of ``job.request``; the number of samples per pixel is among the maps."""
     traced = RECIPES[job.request.method](job)
     traced.frame.maps.setdefault(SAMPLES_LAYER, _samples_of_pixels(traced))
     return traced
 
 
 def trace_samples(job: Job) -> Traced:
-    """Every pixel's own samples: a given number, or as many as a goal takes; denoised where that is asked for."""
+    """Full rendering: a given number of samples or as many as a goal needs; denoised if requested."""
     why = why_no_estimate(job.request)
     if why is not None:
         return trace_unjudged(job, why)
@@ -61,11 +61,11 @@ def trace_unjudged(job: Job, *notes: str) -> Traced:
 
 
 def trace_reused(job: Job) -> Traced:
-    """Points of one micro-image reprojected into the others; denoised where that is asked for."""
+    """Reprojection of traced points between micro-images; denoised if requested."""
     return _denoised_whole(job, _reused(job))
 
 
-#: How each method makes a picture. Pooled light differs from full rendering in what the denoiser shares.
+#: The function of each method. ``pooled`` differs from ``full`` in that the denoiser shares light between micro-images.
 RECIPES: dict[Method, Callable[[Job], Traced]] = {
     "full": trace_samples,
     "pooled": trace_samples,
@@ -75,10 +75,10 @@ RECIPES: dict[Method, Callable[[Job], Traced]] = {
 
 
 def _samples_of_pixels(traced: Traced) -> NDArray[np.uint32]:
-    """``(H, W)``; pixels that were filled from others have had none."""
+    """Samples per pixel ``(H, W)``; 0 for reprojected pixels."""
     status = traced.frame.maps.get(STATUS_LAYER)
     if status is None:
-        # One number for all takes no memory, however large the picture is.
+        # A broadcast number takes no memory.
         return np.broadcast_to(np.uint32(traced.samples), traced.frame.pixels.shape[:2])
     return np.where(status == TRACED, np.uint32(traced.samples), np.uint32(0))
 
@@ -102,7 +102,7 @@ def one_stream(job: Job, *notes: str) -> Traced:
 
 
 def _fixed_samples(job: Job) -> Traced:
-    """So many samples, band by band."""
+    """A fixed number of samples, in bands of rows."""
     frame, errors = trace_in_batches(
         job.integrator,
         job.source,
@@ -118,7 +118,7 @@ def _fixed_samples(job: Job) -> Traced:
 
 
 def _in_rounds(job: Job) -> Traced:
-    """As many samples as the goal takes, denoised unless the noise is to stay."""
+    """As many samples as the goal needs, denoised if requested."""
     batches = _batches(job)
     denoiser = None if job.request.denoise == "none" else guided_denoiser(job)
     picture = batches if denoiser is None else _denoised(job, batches, denoiser)
@@ -184,7 +184,7 @@ def _batches(job: Job) -> FullInBatches:
 
 
 def _denoised_part(job: Job) -> Traced:
-    """So many samples without their noise, for a picture that is put together and assessed elsewhere."""
+    """A denoised tile with a fixed number of samples; its picture is assembled and assessed elsewhere."""
     batches = _batches(job)
     batches.add(job.request.samples, job.progress)
     denoiser = guided_denoiser(job)
@@ -197,7 +197,7 @@ def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Den
 
 
 def _estimator(job: Job) -> PictureEstimator:
-    """Judges a display's picture by its micro-images, a quilt by its views."""
+    """The error estimator of the picture, by micro-image for a display and by view for a quilt."""
     source = job.source
     parts: Display | Parts
     if isinstance(source, QuiltRays):

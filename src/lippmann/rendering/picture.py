@@ -1,4 +1,4 @@
-"""A scene in the native pixels of a display: the whole picture, from the request to the integral image."""
+"""Rendering of a whole picture in the native pixels of a display: from the request to the integral image."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ from lippmann.optics.lens import lens_notes
 from lippmann.options.choices import REUSING
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.request.plan import resolve
-from lippmann.rendering.request.region_of_interest import even_background, scene_corners
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.session import Session, open_session
+from lippmann.rendering.session import Session, even_background, open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.placement import Placement
 from lippmann.scene.scene import Scene
@@ -89,7 +88,7 @@ def render_picture(
 
 
 def choose_exposure(scene: Scene, display: Display, request: RenderRequest) -> float:
-    """The exposure in stops that a picture of ``scene`` gets by itself, without the picture.
+    """The automatic exposure in stops of a picture of ``scene``, without rendering it.
 
     Raises
     ------
@@ -107,11 +106,12 @@ def choose_exposure(scene: Scene, display: Display, request: RenderRequest) -> f
 
 
 def traced_window(session: Session, display: Display, placement: Placement) -> PixelWindow | None:
-    """The pixels that can see the scene, where the others are known without rays; None where all are traced.
+    """The window of pixels that can see the scene, if the others show an even background; None where all are traced.
 
-    Pictures that may be denoised alone: of others every pixel has the samples that tiles rendered apart have.
+    Only for denoised pictures: others may be rendered in tiles, and each pixel has the same samples then.
     """
     from lippmann.device.pbr import BuiltScene
+    from lippmann.device.pbr.scene import scene_corners
 
     built, request = session.built, session.request
     if request.method in REUSING or request.denoise == "none" or not isinstance(built, BuiltScene):
@@ -122,7 +122,7 @@ def traced_window(session: Session, display: Display, placement: Placement) -> P
 
 
 def _widen(frame: Frame, window: PixelWindow, display: Display, background: Color | None) -> None:
-    """Put the background about what was traced; maps are 0 there."""
+    """Pad the traced window to the whole picture with background; maps are 0 there."""
     size = display.panel.height, display.panel.width
     pixels = np.empty((*size, 3), dtype=np.float32)
     pixels[...] = background
@@ -134,7 +134,7 @@ def _widen(frame: Frame, window: PixelWindow, display: Display, background: Colo
 
 
 def placed_options(request: RenderRequest, placement: Placement) -> dict[str, object]:
-    """What a picture's file says of its samples' places and of the display's."""
+    """Metadata of pixel filter, tone mapping and placement."""
     return {
         "pixel_filter": request.pixel_filter,
         "placement": placement.mode,

@@ -15,9 +15,8 @@ from lippmann.image import Provenance
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.picture import placed_options
 from lippmann.rendering.request.plan import resolve
-from lippmann.rendering.request.region_of_interest import even_background, scene_corners
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.session import open_session
+from lippmann.rendering.session import even_background, open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Color
@@ -71,6 +70,7 @@ def render_quilt(
     placement = session.place(display)
 
     from lippmann.device.pbr import BuiltScene
+    from lippmann.device.pbr.scene import scene_corners
     from lippmann.rendering.job import Job
     from lippmann.rendering.methods import trace
     from lippmann.rendering.transport.ray_source import QuiltRays

@@ -1,7 +1,7 @@
-"""How every render begins: the engine runs, the scene lies on the device, the display stands in it.
+"""Rendering sessions: the running engine, the scene on the device, the display's placement, and the provenance.
 
-Pictures, quilts, previews, forecasts and tiles open a session, take their rays and their integrator from it, and let it
-write down how they were made. Mitsuba is loaded by :func:`open_session`: modules that need it are imported after that.
+Pictures, quilts, previews, forecasts and tiles open a session, get their integrator from it, and let it record how they
+were made. :func:`open_session` loads Mitsuba: modules that need it are imported after that.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.light_statements import light_notes, stated_error, visible_share, warn_of_emptiness
 from lippmann.rendering.request.plan import follow
-from lippmann.rendering.request.region_of_interest import even_background
 from lippmann.rendering.request.render_request import Choice, RenderRequest
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
@@ -38,7 +37,7 @@ from lippmann.scene.camera_placement import CameraView, VisibleDepth
 from lippmann.scene.matrices import rotation_of
 from lippmann.scene.placement import Placement, place
 from lippmann.scene.scene import Scene
-from lippmann.scene.values.description import Matrix
+from lippmann.scene.values.description import Color, Matrix
 
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
@@ -56,7 +55,7 @@ T = TypeVar("T")
 
 @dataclass
 class Stopwatch:
-    """Seconds by stage, reported as each stage begins and ends."""
+    """Seconds by stage; progress is reported as each stage begins and ends."""
 
     progress: ProgressCallback = silent
     seconds: dict[str, float] = field(default_factory=dict)
@@ -371,6 +370,13 @@ def _without_pooling(request: RenderRequest, built: BuiltScene | BuiltClassic) -
             fix='use method="full"',
         )
     return request
+
+
+def even_background(built: BuiltScene | BuiltClassic, request: RenderRequest) -> Color | None:
+    """The colour of all rays that hit nothing; None if they differ, as before an environment."""
+    if request.integrator not in POOLED_LIGHT or getattr(built, "has_media", False):
+        return None  # a medium may surround the scene
+    return getattr(built, "background", None)
 
 
 def memory_limit(request: RenderRequest) -> int:

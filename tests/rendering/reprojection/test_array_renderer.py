@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import groupby
 from types import FunctionType, SimpleNamespace
 
 import numpy as np
@@ -338,25 +337,3 @@ def test_with_care_neighbors_that_disagree_are_traced(flat_tracer, sheet):
     tracer = flat_tracer(display, [sheet(2.0, noise)])
     points = make(display, tracer, rules(), "interpolated")
     assert mean_error(points, tracer.full()) < 1e-3
-
-
-# ---- Lenses and their pixels -----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", DISPLAYS)
-def test_reach_is_the_longest_stretch_of_one_lens_in_a_row(name):
-    from lippmann.display.lens_field import LensField
-
-    field = LensField.of(DISPLAYS[name])
-    assert field.reach == max(len(list(pixels)) for row in field.lens for _, pixels in groupby(row))
-
-
-def test_corresponding_pixels_lie_at_the_same_place():
-    from lippmann.display.lens_field import LensField
-
-    field = LensField.of(DISPLAYS["square"])
-    numbers = np.arange(96 * 96)
-    lens = field.lens.ravel().astype(np.int64)
-    right = np.where(lens % 12 < 11, lens + 1, -1)
-    there = field.corresponding(numbers, right)
-    assert np.array_equal(there, np.where(right >= 0, numbers + 8, -1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,6 +25,7 @@ from lippmann.errors import SceneError, UsageError
 from lippmann.options.light import LightOptions
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
+from lippmann.scene.matrices import transform_points
 from lippmann.scene.mitsuba_source import MitsubaSource, with_sky
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Color, Matrix, SceneDescription
@@ -275,3 +277,15 @@ def has_null(surface: BSDF) -> bool:
     import mitsuba as mi
 
     return bool(mi.has_flag(surface.flags(), mi.BSDFFlags.Null))
+
+
+def scene_corners(built: BuiltScene, display_from_world: Matrix) -> Matrix:
+    """``(8, 3)`` corners in mm of a box around everything that a ray can hit, emitters included."""
+    box = built.mitsuba.bbox()
+    low, high = np.array(box.min, dtype=np.float64), np.array(box.max, dtype=np.float64)
+    if built.splats is not None:
+        low, high = np.minimum(low, built.splats.bounds[0]), np.maximum(high, built.splats.bounds[1])
+    if built.volume is not None:
+        low, high = np.minimum(low, built.volume.bounds[0]), np.maximum(high, built.volume.bounds[1])
+    corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
+    return transform_points(display_from_world, corners)

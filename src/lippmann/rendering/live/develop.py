@@ -1,4 +1,4 @@
-"""From linear light to the 8-bit codes that a page shows."""
+"""Tone mapping and 8-bit sRGB coding of live pictures."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def develop(values: Floats, pixels: PixelSet, request: RenderRequest) -> Codes:
     """Codes ``(height, width, 3)`` of the picture of pixels whose linear radiance is ``values`` ``(n, 3)``."""
     if pixels.channels == 3:
         return develop_picture(pixels.arrange(values), pixels, request)
-    # Each pixel is coded once, and its three codes are copied as one number; the last stands for places past the panel.
+    # Each pixel is coded once, and its three codes are copied as one 32-bit number; the last entry is black.
     codes = np.zeros((len(values) + 1, 4), np.uint8)
     codes[:-1, :3] = encode_light(values, request)
     picture = codes.view(np.uint32)[:, 0][pixels.number[..., 0]]
@@ -27,7 +27,7 @@ def develop(values: Floats, pixels: PixelSet, request: RenderRequest) -> Codes:
 
 
 def develop_picture(picture: Floats, pixels: PixelSet, request: RenderRequest) -> Codes:
-    """Codes of a linear picture ``(height, width, 3)``, black where no pixel is seen."""
+    """Codes of a linear picture ``(height, width, 3)``, black where no pixel is visible."""
     codes = encode_light(picture, request)
     codes[pixels.number < 0 if pixels.channels == 3 else (pixels.number < 0)[..., 0]] = 0
     return codes

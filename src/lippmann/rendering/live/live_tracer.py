@@ -1,9 +1,9 @@
-"""Samples along the rays of chosen native pixels, by kernels that are recorded once and stay warm.
+"""Samples along the rays of arbitrary native pixels, by kernels that are recorded once.
 
-The rays and the random numbers of a pixel are those that it has in a render: sample number i of a picture in one stream
-is the one of :func:`lippmann.rendering.film.wavefront.trace_frame`; the two streams of a picture in batches are those
-of :class:`lippmann.rendering.film.sample_batches.FullInBatches`. Placement, light, exposure, seed and the pixels are
-inputs of the kernel, so that none of them needs another one.
+A pixel has the rays and random numbers of a render: with one stream those of
+:func:`lippmann.rendering.film.wavefront.trace_frame`, with two streams those of
+:class:`lippmann.rendering.film.sample_batches.FullInBatches`. Placement, light, exposure, seed and pixels are inputs of
+the kernel, so that changing them needs no other kernel.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Rows = list[list[Float64]]
 #: Integrators of physically based light.
 LiveIntegrator = PathIntegrator | VolumePathIntegrator
 
-#: Launches after which no more recordings were seen to be needed.
+#: Launches that warm a kernel up; later ones need no recording.
 _WARMING_LAUNCHES = 4
 
 
@@ -46,7 +46,7 @@ class Samples:
     sums:
         ``(streams, n, 3)`` float32: sums of linear radiance over the samples of each stream.
     height:
-        ``(n,)`` float32: z in mm, in the display's frame, of what the first sample meets; NaN where it meets nothing.
+        ``(n,)`` float32: z in mm, in the display's frame, of the first sample's hit; NaN without a hit.
     """
 
     sums: Floats
@@ -54,16 +54,16 @@ class Samples:
 
 
 class Lanes:
-    """The lanes of a wavefront: so many samples of some pixels in each of so many streams, in this order.
+    """The lanes of a wavefront, ordered pixel, stream, sample.
 
     Parameters
     ----------
     pixels:
         The pixels of a picture.
     part:
-        Which of them.
+        The slice of them that is traced.
     streams, samples:
-        Streams, and samples in each.
+        Number of streams, and of samples in each.
     first:
         Number of the first sample.
     """
@@ -76,16 +76,16 @@ class Lanes:
         stream = np.tile(np.repeat(np.arange(streams, dtype=np.uint32), samples), len(column))
         sample = np.tile(np.arange(first, first + samples, dtype=np.uint32), len(column) * streams)
         places = (values if each == 1 else np.repeat(values, each) for values in (column, row, channel))
-        # Held here, since the device reads them in place.
+        # Kept alive, as the device reads them in place.
         self._host = [aligned(values) for values in (*places, stream, sample)]
         self.arrays = [mi.UInt32(values) for values in self._host]
 
     def sums(self, values: Floats) -> Floats:
-        """Sums ``(pixels, streams)`` of the values of lanes."""
+        """Sums over samples, ``(pixels, streams)``, of one value per lane."""
         return np.asarray(values.reshape(self._shape).sum(axis=2))
 
     def firsts(self, values: Floats) -> Floats:
-        """The values ``(pixels,)`` of each pixel's first lane."""
+        """The value of each pixel's first lane, ``(pixels,)``, from one per lane."""
         return np.asarray(values.reshape(self._shape)[:, 0, 0])
 
 
@@ -100,10 +100,10 @@ class PlacedDisplay:
     def __init__(self, world_from_display: Matrix) -> None:
         matrix = np.asarray(world_from_display, np.float64)
         display_from_world = inverse(matrix)
-        #: Rows of the map to the world, and that which gives the height in the display's frame.
+        #: Rows of world_from_display, and the z row of its inverse.
         self.rows = opaque_rows(matrix)
         self.height = [dr.opaque(mi.Float, float(value)) for value in display_from_world[2]]
-        #: From world directions of normals to the display's frame.
+        #: Rotation of normals from the world to the display's frame.
         self.rotation = rotation_of(matrix)[:3, :3].T.astype(np.float32)
 
 
@@ -125,12 +125,12 @@ class _PixelTracer:
     def __init__(self, display: Display, reads: object, *, subpixels: bool, box_filter: bool) -> None:
         self._source, self._box_filter = DisplayRays(display, np.eye(4), subpixels), box_filter
         self.kernel = Frozen(self._sample_pixels, reads, changes=True)
-        # The first launches change how scenes of several emitters lie on the device.
+        # In scenes of several emitters the first launches change the layout of arrays on the device.
         for _ in range(_WARMING_LAUNCHES):
             self._launch(_two_lanes(), PlacedDisplay(np.eye(4)), seed=0)
 
     def _launch(self, lanes: Lanes, placed: PlacedDisplay, *, seed: int) -> list[Floats]:
-        """What :meth:`_sample` gives for each lane."""
+        """Values of :meth:`_sample` for each lane."""
         values = self.kernel(*lanes.arrays, dr.opaque(mi.UInt32, seed), placed.rows, placed.height)
         return [np.asarray(each) for each in values]
 
@@ -149,7 +149,7 @@ class _PixelTracer:
         stream = SampleStream.of_pixels(number, sample, seed, stream_of)
         jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
         ray = world_ray_by(rows, *self._source.light_rays(column, row, channel, jitter))
-        # All of the lanes' width, also where all lanes see the same.
+        # Broadcast values of width 1 to all lanes.
         zero = mi.Float(sample) * 0
         return tuple(mi.Float(part) + zero for part in self._sample(ray, stream, height_row))
 
@@ -161,12 +161,12 @@ class LiveTracer(_PixelTracer):
     """Traces radiance and depth of pixels by an ``integrator``."""
 
     def __init__(self, display: Display, integrator: LiveIntegrator, *, subpixels: bool, box_filter: bool) -> None:
-        # In a list, that the kernel may read another one's arrays.
+        # In a list, so that the recorded kernel can read another integrator's arrays.
         self._integrator = [integrator]
         super().__init__(display, self._integrator, subpixels=subpixels, box_filter=box_filter)
 
     def trace_by(self, integrator: LiveIntegrator) -> None:
-        """Gather light by another integrator of the same scene and depth."""
+        """Replace the integrator by another one of the same scene and depth."""
         self._integrator[0] = integrator
 
     def trace(self, lanes: Lanes, placed: PlacedDisplay, *, seed: int) -> Samples:

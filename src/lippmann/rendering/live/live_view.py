@@ -1,4 +1,4 @@
-"""What a live frame shows, and the frame."""
+"""Views and frames of the live renderer."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class LiveView:
-    """What is looked at, how it is placed and lit. Equal views show the same picture.
+    """Eye or window, placement and light of a picture. Equal views show the same picture.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class LiveView:
     window:
         Where ``eye`` is None: the native pixels shown; None for the whole panel.
     row_step:
-        Where ``eye`` is None: one of so many rows is traced and stands for those around it, while something moves.
+        Where ``eye`` is None: one row in ``row_step`` is traced and repeated, while something moves.
     request:
         As of a render. ``placement``, ``exposure``, ``subpixels``, ``tone_map``, ``pixel_filter``, ``seed``,
         ``integrator`` (auto, path or direct) and ``depth`` count. Samples and method are the live renderer's own.
@@ -107,7 +107,7 @@ class PlacedView:
     pixels: PixelSet
 
     def light_up(self, exposure: float) -> None:
-        """Give the scene the light and the exposure of this view, if another one was traced meanwhile."""
+        """Set the scene's light and exposure to those of this view, if another view was traced in between."""
         if self.kernels.lit_for is self:
             return
         self.kernels.light(self.view.light, rotation_of(self.placement.world_from_display))

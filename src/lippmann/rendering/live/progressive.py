@@ -1,8 +1,8 @@
-"""A view at rest: light gathers, step by step, and its noise is taken out now and then.
+"""Progressive rendering of a view at rest, with denoising in between.
 
-Two streams of samples make two half-buffers, as in :mod:`lippmann.rendering.denoise.dual_buffer`. Each half judges what
-the denoiser made of the other: where that is wrong, the samples themselves are shown
-(:mod:`lippmann.rendering.denoise.noisy_blend`). The share of the samples grows with their number.
+Two streams of samples make two half-buffers, as in :mod:`lippmann.rendering.denoise.dual_buffer`. Each is denoised and
+checked against the other; where the denoised value has the larger estimated error, the noisy one replaces it
+(:mod:`lippmann.rendering.denoise.noisy_blend`). So the picture converges.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from lippmann.runtime.engine_lock import exclusive
 
 Floats = NDArray[np.float32]
 
-#: Seconds that a step of sampling takes, about: as long as a frame may be late.
+#: Target duration of a sampling step in seconds: the delay that it may cause to a frame.
 _STEP_SECONDS = 0.06
-#: Most samples of a pixel: its noise is below a code's step then.
+#: Most samples per pixel: the noise is then below one code.
 _MOST_SAMPLES = 1 << 14
-#: Samples of the feature buffers, and those of a pixel from which on the halves judge each other.
+#: Samples of the feature buffers, and least samples per pixel for denoising by halves.
 _FEATURE_SAMPLES, _JUDGED_FROM = 8, 8
 
 
@@ -41,8 +41,7 @@ class Progressive:
         self._kernels, self._pixels = view.kernels, view.pixels
         self._count = len(view.pixels.column)
         self._sums = np.zeros((STREAMS, self._count, 3), np.float32)
-        #: Samples that all pixels have in each stream; how many pixels have the coming ones already, and how many these
-        #: are.
+        #: Samples per pixel of each stream; of the round in progress, the pixels that are done and its samples.
         self._taken, self._begun, self._coming = 0, 0, 0
         self._features: tuple[Floats, Floats] | None = None
         self._denoised_at = 0
@@ -78,7 +77,7 @@ class Progressive:
         return self._denoise(seconds) if self.samples >= 1.7 * self._denoised_at else None
 
     def _sample(self, seconds: dict[str, float]) -> None:
-        """Samples of all pixels, or of as many as the time allows; these get no second one before the others."""
+        """Take samples of all pixels, or of as many as the time allows; a round ends when all pixels have them."""
         started = time.perf_counter()
         if not self._begun:
             self._coming = max(1, self._next // self._count)
@@ -92,7 +91,7 @@ class Progressive:
             self._taken += self._coming
         spent = time.perf_counter() - started
         seconds["trace"] = seconds.get("trace", 0.0) + spent
-        # As many samples as a step's time allows, twice those of the last at most: the first launch may have compiled.
+        # As many as the step's time allows, at most twice the last number: the first launch may have compiled.
         least = min(self._count, self._most, 1 << 16)  # smaller wavefronts leave threads idle
         self._next = max(least, min(int(count * _STEP_SECONDS / spent), 2 * count, self._most))
 
@@ -108,7 +107,7 @@ class Progressive:
         seconds["features"] = time.perf_counter() - started
 
     def _denoise(self, seconds: dict[str, float]) -> LiveFrame | None:
-        """One of the steps that take the noise out; the picture after the last."""
+        """One step of denoising; the picture after the last one."""
         started = time.perf_counter()
         if self._task is None:
             if self._features is None:

@@ -1,4 +1,4 @@
-"""Live frames: a scene stays on the device, its kernels stay warm, and pictures come as fast as rays can be traced."""
+"""Interactive rendering: the scene and its kernels stay on the device between frames."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float32]
 
-#: Lanes of a step of a frame: on two cores about as long as a whole frame of an eye, so that such frames come between.
+#: Lanes of a step of a frame: on two cores as long as a whole frame of an eye, so that such frames can interleave.
 STEP_LANES = 1 << 18
 
 
@@ -48,7 +48,7 @@ class LiveRenderer:
     scene, display:
         What is shown, and on what.
     machine:
-        Its ``device``, ``threads`` and ``memory`` count.
+        A request of which ``device``, ``threads`` and ``memory`` count.
     progress:
         Told how the scene is built.
 
@@ -69,7 +69,7 @@ class LiveRenderer:
         self._machine = machine or RenderRequest()
         self._progress = progress
         self._display = display
-        # Of the eyes of some pages, and of a whole panel that moves and that rests.
+        # Caches for the eyes of some pages, and for the whole panel in motion and at rest.
         self._map = lru_cache(4)(EyeMap)
         self._visible = lru_cache(4)(lambda map, eye: map.seen_by(eye))
         self._window = lru_cache(2)(window_pixels)
@@ -89,12 +89,12 @@ class LiveRenderer:
 
     @exclusive()
     def set_scene(self, scene: Scene) -> None:
-        """Show another scene, or the same one with another environment or background.
+        """Replace the scene, or the environment or background of the same one.
 
         Raises
         ------
         UsageError, SceneError, MemoryLimitError, EngineError
-            The scene cannot be shown; the renderer keeps the one that it has.
+            The scene cannot be rendered live; the renderer keeps the previous one.
         """
         self._kernels = self._open(scene)
         self._scene = scene
@@ -153,10 +153,10 @@ class LiveRenderer:
         yield LiveFrame(codes, 1, False, stand.placement, exposure, seconds)
 
     def refine_steps(self, view: LiveView) -> Iterator[LiveFrame | None]:
-        """Short steps that gather light for a view that rests, without end.
+        """Endless short steps of progressive rendering for a view at rest.
 
-        Each adds samples, or takes out the noise of those that there are; it gives the picture so far, or None where
-        that stayed as it was. Between them steps of other pictures may be made; see :meth:`frame_steps`.
+        Each takes samples or denoises. It gives the picture so far, or None if that did not change. Steps of other
+        pictures may come between; see :meth:`frame_steps`.
         """
         return self._refine_steps(self._kernels, self._display, view)
 
@@ -175,17 +175,16 @@ class LiveRenderer:
 
     @exclusive()
     def heights(self, view: LiveView) -> Floats:
-        """Depth of what each place of a view's picture shows: z in mm in the display's frame.
+        """Depth of each pixel of a view's picture: z in mm in the display's frame.
 
         Returns
         -------
-        ``(height, width)`` float32; NaN where nothing is seen. Compare with the display's ``resolvable_depth`` for what
-        blurs.
+        ``(height, width)`` float32; NaN without a hit. Depths beyond the display's ``resolvable_depth`` are blurred.
         """
         if self._latest is None or self._latest.view != view:
             self.frame(view)
         assert self._latest is not None
-        # Where sub-pixels have rays of their own the green one stands for the pixel.
+        # The green sub-pixel stands for the pixel where sub-pixels have rays of their own.
         number = self._latest.pixels.number[..., self._latest.pixels.channels // 2]
         with_nothing = np.append(self._height, np.float32(np.nan))
         return np.asarray(with_nothing[number], np.float32)
@@ -270,7 +269,7 @@ def _resting(request: RenderRequest) -> RenderRequest:
 
 
 def _plain(request: RenderRequest, integrator: str, depth: int | None) -> RenderRequest:
-    """The request of a picture of every pixel's own samples."""
+    """The request of a plain full rendering with one sample per pixel."""
     if request.integrator not in ("auto", *POOLED_LIGHT):
         rule = f"live pictures show the light of {' and '.join(POOLED_LIGHT)}"
         raise UsageError(f"'{request.integrator}' does not apply", parameter="integrator", rule=rule)

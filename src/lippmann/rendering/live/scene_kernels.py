@@ -1,4 +1,4 @@
-"""A scene on the device with its warm kernels, one for each kind of picture."""
+"""A scene on the device with its recorded kernels, one for each kind of picture."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ from lippmann.rendering.film.memory_model import BYTES_PER_LANE, PREFERRED_LANES
 from lippmann.rendering.live.live_tracer import FeatureTracer, LiveIntegrator, LiveTracer
 from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
 from lippmann.rendering.preparation.pilot import make_light_sampler, trace_pilot
-from lippmann.rendering.request.region_of_interest import even_background
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.session import Session, make_integrator
+from lippmann.rendering.session import Session, even_background, make_integrator
 from lippmann.rendering.transport.first_surface import make_surfaces
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.prepared_light import PreparedLight
@@ -29,13 +28,13 @@ from lippmann.scene.placement import Placement
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
 
-#: Most kernels of a kind that are kept: pages of a studio may show a scene on several displays.
+#: Kernels that are cached: pages of a studio may show a scene on several displays.
 _MOST_KERNELS = 8
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """What a tracer's kernel depends on."""
+    """The key of a tracer's kernel."""
 
     display: Display
     integrator: str
@@ -50,7 +49,7 @@ class SceneKernels:
     Parameters
     ----------
     session:
-        The scene, built with the light that its file says.
+        The scene, built with the light of its file.
     """
 
     def __init__(self, session: Session) -> None:
@@ -62,7 +61,7 @@ class SceneKernels:
         self._features: dict[_Kind, FeatureTracer] = {}
         self._exposure: float | None = None
         self._bounds_in = bounds_by_hull(session.scene)
-        #: Whose light and exposure the scene has now.
+        #: The view whose light and exposure the scene has now.
         self.lit_for: object = None
 
     @property
@@ -71,11 +70,11 @@ class SceneKernels:
         return max(SMALLEST_LANES, min(PREFERRED_LANES, self.session.memory // BYTES_PER_LANE))
 
     def place(self, display: Display, request: RenderRequest) -> Placement:
-        """Where a display stands by a resolved request."""
+        """The display's placement for a resolved request."""
         return replace(self.session, request=request).find_place(display, self._bounds_in)
 
     def can_light(self, light: LightOptions) -> bool:
-        """Whether a change of light needs no other scene on the device."""
+        """Whether ``light`` can be set without building the scene again."""
         return self._updates.can_apply(light)
 
     def light(self, light: LightOptions, world_from_viewer: np.ndarray) -> None:
@@ -106,8 +105,8 @@ class SceneKernels:
     def expose(self, display: Display, request: RenderRequest, placement: Placement, *, measure: bool) -> float:
         """Set the exposure of a resolved request, and return it in stops.
 
-        Where it is "auto" it is measured for the placement if ``measure`` is set, or was not yet; so are the weights by
-        which emitters are sampled.
+        An "auto" exposure is measured for this placement if ``measure`` is set or none was measured before. The same
+        holds for the emitter weights.
         """
         integrator = self._integrator(request)
         if not isinstance(integrator, PathIntegrator):

@@ -6,10 +6,9 @@ import numpy as np
 
 from lippmann.display import Display
 from lippmann.display.lens_field import LensField
-from lippmann.rendering.reprojection.averaging import average_neighbors
 from lippmann.rendering.reprojection.backward_warp import BackwardWarp
 from lippmann.rendering.reprojection.forward_warp import ForwardWarp
-from lippmann.rendering.reprojection.missed_runs import bridge, thin_out
+from lippmann.rendering.reprojection.missed_pixels import average_neighbors, bridge, thin_out
 from lippmann.rendering.reprojection.pixel_tracer import Pixels, PixelTracer
 from lippmann.rendering.reprojection.point_image import MISSED, QUEUED, PointImage
 from lippmann.rendering.reprojection.rules import Rules

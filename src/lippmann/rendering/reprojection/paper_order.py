@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.display.lens_field import LensField
-from lippmann.rendering.reprojection.averaging import average_neighbors
+from lippmann.rendering.reprojection.missed_pixels import average_neighbors
 from lippmann.rendering.reprojection.pixel_tracer import Pixels, PixelTracer
 from lippmann.rendering.reprojection.point_image import BACKGROUND, MISSED, REPROJECTED, IntArray, PointImage
 from lippmann.rendering.reprojection.rules import Rules, nearer

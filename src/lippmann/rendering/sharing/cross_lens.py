@@ -21,12 +21,12 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.kernel_ops import divide
+from lippmann.device.kernel_ops import divide, upload
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Array, UInt32
 from lippmann.display import Display
 from lippmann.display.lens_field import lens_centers, lens_numbers
-from lippmann.rendering.sharing.device_pixels import light_of_pixels, upload
+from lippmann.rendering.sharing.device_pixels import light_of_pixels
 from lippmann.rendering.sharing.tuning import TUNING
 
 if TYPE_CHECKING:
@@ -106,8 +106,9 @@ class _Picture:
             return tuple(dr.opaque(kind, value) for value in values)
 
         self._light_type = mi.Color3f if light.shape[2] == 3 else mi.Color1f
-        self._light, self._normal, self._height, self._centers = upload(light, normal, height, centers)
-        self._lens = mi.Int32(np.ascontiguousarray(lens, dtype=np.int32).ravel())
+        parts = light, normal, height, centers
+        self._light, self._normal, self._height, self._centers = (upload(part) for part in parts)
+        self._lens = upload(lens)
         self._size = opaque(mi.Int32, *height.shape)
         self._lenses = opaque(mi.Int32, *centers.shape[:2])
         self._reach = opaque(mi.Int32, *reach)

@@ -21,11 +21,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.kernel_ops import divide
+from lippmann.device.kernel_ops import divide, upload
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Color3f, UInt32
 from lippmann.display.view_cone import cone_tangent
-from lippmann.rendering.sharing.device_pixels import light_of_pixels, upload
+from lippmann.rendering.sharing.device_pixels import light_of_pixels
 from lippmann.rendering.sharing.tuning import TUNING
 
 if TYPE_CHECKING:
@@ -85,7 +85,9 @@ class _Views:
         pixels_per_mm: float,
         reach: int,
     ) -> None:
-        self._light, self._normal, self._height, self._slopes = upload(light, normal, height, slopes)
+        self._light, self._normal, self._height, self._slopes = (
+            upload(part) for part in (light, normal, height, slopes)
+        )
         size = height.shape[1] // columns, height.shape[0] // (len(slopes) // columns)
         self._width, self._height_of_view = (dr.opaque(mi.Int32, value) for value in size)
         self._columns, self._count, self._reach = (dr.opaque(mi.Int32, n) for n in (columns, len(slopes), reach))

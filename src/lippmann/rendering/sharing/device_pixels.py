@@ -1,4 +1,4 @@
-"""Pictures on the device, and kernels over their pixels in parts that take little memory."""
+"""Kernels over the pixels of a picture, in parts that take little memory."""
 
 from __future__ import annotations
 
@@ -7,15 +7,10 @@ from collections.abc import Callable
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from lippmann.device.types import Array, Float, UInt32
+from lippmann.device.types import Array, UInt32
 from lippmann.rendering.film.memory_model import PREFERRED_LANES
-
-
-def upload(*arrays: ArrayLike) -> list[Float]:
-    """Each array in one row on the device, in single precision."""
-    return [mi.Float(np.ascontiguousarray(values, dtype=np.float32).ravel()) for values in arrays]
 
 
 def light_of_pixels(mean_light: Callable[[UInt32], Array], shape: tuple[int, ...]) -> NDArray[np.float32]:

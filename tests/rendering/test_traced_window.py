@@ -13,8 +13,7 @@ import lippmann
 from lippmann.display import Display, LensArray, Panel
 from lippmann.display.box_window import panel_window, view_window
 from lippmann.options.placement import PlacementOptions
-from lippmann.rendering.request import region_of_interest
-from lippmann.rendering.request.region_of_interest import scene_corners
+from lippmann.rendering.session import even_background
 from lippmann.scene.placement import place
 from lippmann.scene.studio_light import BACKDROP
 
@@ -39,6 +38,7 @@ def ball():
 def placed(scene, display, options):
     at = place(scene.bounds, display, options=options, bounds_in=scene.bounds_in)
     from lippmann.device.pbr import build
+    from lippmann.device.pbr.scene import scene_corners
 
     return at, scene_corners(build(scene), at.display_from_world)
 
@@ -165,7 +165,7 @@ def test_only_an_even_background_is_known_without_rays(ball):
     from lippmann.rendering.request.render_request import RenderRequest
 
     built = build(ball)
-    assert region_of_interest.even_background(built, RenderRequest(integrator="path")) == BACKDROP
-    assert region_of_interest.even_background(built, RenderRequest(integrator="normal")) is None
+    assert even_background(built, RenderRequest(integrator="path")) == BACKDROP
+    assert even_background(built, RenderRequest(integrator="normal")) is None
     lit = lippmann.load_scene(trimesh.creation.box(), environment=None, background=(0.1, 0.2, 0.3))
-    assert region_of_interest.even_background(build(lit), RenderRequest(integrator="direct")) == (0.1, 0.2, 0.3)
+    assert even_background(build(lit), RenderRequest(integrator="direct")) == (0.1, 0.2, 0.3)

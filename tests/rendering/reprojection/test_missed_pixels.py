@@ -13,7 +13,7 @@ LENS = np.repeat([0, 1], [9, 3])
 
 def thinned(row, known=()):
     """A picture whose given row holds wanted pixels, thinned out; ``known`` ones have been traced."""
-    from lippmann.rendering.reprojection.missed_runs import thin_out
+    from lippmann.rendering.reprojection.missed_pixels import thin_out
     from lippmann.rendering.reprojection.point_image import QUEUED, TRACED, PointImage
     from lippmann.rendering.reprojection.rules import choose_rules
 
@@ -39,7 +39,7 @@ def test_the_first_pixel_of_each_run_and_one_in_four_are_traced():
 
 @pytest.mark.parametrize(("far", "expected"), [(0.5, [0.25, 0.5, 0.75]), (0.05, [0.0, 0.0, 1.0])])
 def test_the_others_are_blended_on_one_surface_and_copied_between_two(far, expected):
-    from lippmann.rendering.reprojection.missed_runs import bridge
+    from lippmann.rendering.reprojection.missed_pixels import bridge
     from lippmann.rendering.reprojection.point_image import REPROJECTED, TRACED
     from lippmann.rendering.reprojection.rules import choose_rules
 
