@@ -20,8 +20,10 @@ import statistics
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any
+from unittest.mock import patch
 
 from harness import median_ratio, save, saved
 
@@ -73,18 +75,15 @@ def _measure(case: Case, name: str) -> Iterator[dict[str, Any]]:
         scene = lippmann.load_scene(scene_name)
         images: dict[str, Any] = {}
         seconds: dict[str, list[float]] = {way: [] for way in ways}
-        clock = time.perf_counter
         for run in range(-case.warm_up, case.runs):
-            # All stages of a render are timed by this; what Dr.Jit says of compiling is by the clock.
-            time.perf_counter = clock if run < 0 or not case.warm_up else time.process_time
             for way in ways:
-                images[way] = lippmann.render(
-                    scene, display, tone_map="none", threads=case.threads, **case.light, **WAYS[way]
-                )
+                with _processor_time() if run >= 0 and case.warm_up else nullcontext():
+                    images[way] = lippmann.render(
+                        scene, display, tone_map="none", threads=case.threads, **case.light, **WAYS[way]
+                    )
                 if run >= 0:
                     spent = images[way].provenance.seconds
                     seconds[way].append(spent["trace"] + spent["reuse"])
-        time.perf_counter = clock
         full = images["full"]
         for way in ways[1:]:
             share = median_ratio(seconds[way], seconds["full"])
@@ -97,6 +96,18 @@ def _measure(case: Case, name: str) -> Iterator[dict[str, Any]]:
                 "pixel_shares": dict(images[way].provenance.pixel_shares),
                 **_quality(full, images[way]),
             }
+
+
+@contextmanager
+def _processor_time() -> Iterator[None]:
+    """All stages of a render are timed by the processor's seconds; warm kernels take none to compile."""
+    from lippmann.rendering.film import wavefront
+    from lippmann.rendering.reprojection import pixel_tracer
+
+    with patch.object(time, "perf_counter", time.process_time), ExitStack() as patches:
+        for module in (wavefront, pixel_tracer):
+            patches.enter_context(patch.object(module, "compile_seconds", lambda: 0.0))
+        yield
 
 
 def _quality(full: Any, image: Any) -> dict[str, float]:
