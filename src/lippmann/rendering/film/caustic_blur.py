@@ -29,7 +29,7 @@ from lippmann.rendering.transport.visible_caustics import VisibleBlur
 
 Floats = NDArray[np.float32]
 
-#: Share of the pixels whose bias is measured: samples per pixel over the first number, but at least so many pixels.
+#: The bias is measured for a share of the pixels, samples per pixel over 256, but for at least 4096 pixels.
 SAMPLES_OF_PIXEL, FEWEST_PIXELS = 256, 1 << 12
 
 

@@ -33,26 +33,26 @@ def prepare_light(
     stands_alone: bool = True,
     weighs_emitters: bool = True,
 ) -> PreparedLight:
-    """The light of the picture of ``source``, for an integrator of the same paths (:meth:`PathIntegrator.lit_by`).
+    """The prepared light of a picture, for :meth:`PathIntegrator.lit_by`.
 
     Parameters
     ----------
     paths:
-        Paths in the scene, whatever their light.
+        A path integrator of the scene; its own light is ignored.
     request:
-        How the picture is to be made.
+        The resolved request.
     source:
-        Rays of the whole picture: parts of one picture must be given the same.
+        Rays of the whole picture, also where a part of it is rendered.
     memory:
-        Bytes that the photons may take, and light vertices.
+        Bytes for photons and for light vertices.
     background:
-        What rays see that meet nothing, see :func:`~lippmann.rendering.preparation.exposure.measure_exposure`.
+        Colour of rays without a hit; see :func:`~lippmann.rendering.preparation.exposure.measure_exposure`.
     own_exposure:
-        Stops of the camera itself, which a fixed exposure comes on top of.
+        The camera's own exposure in stops, to which a fixed exposure is added.
     stands_alone:
-        Nothing lies in front of what the integrator shows, such as splats: whole pixels are its own.
+        Whether nothing, such as splats, is composited over the integrator's radiance.
     weighs_emitters:
-        Emitters are sampled by what they bring to the picture, not by the scene's own weights.
+        Whether emitters are sampled by their contribution to the picture, not by the scene's weights.
 
     Raises
     ------

@@ -66,11 +66,11 @@ def share_views(pixels: Floats, source: QuiltRays, guides: Guides) -> Floats:
 
 
 class _Views:
-    """What the views of a quilt show, on the device; numbers are opaque, for one kernel.
+    """The pixels of a quilt on the device; numbers are opaque, so that all quilts share a kernel.
 
     ``light`` and ``normal`` are ``(H, W, 3)``, ``height`` ``(H, W)`` z in millimetres, of a quilt of ``columns`` views
-    in a row; ``slopes`` (N) says for every view, the leftmost camera's first, how far aside its camera stands over how
-    far away. What view k sees at height z at some place, view j sees ``(s_k - s_j) z / (1 - z / D)`` millimetres to the
+    in a row; ``slopes`` (N) holds for every view, from the leftmost camera, its sideways offset over its distance.
+    A point that view k sees at height z, view j sees ``(s_k - s_j) z / (1 - z / D)`` millimetres to the
     right of it in its picture. Views up to ``reach`` to the side share.
     """
 
