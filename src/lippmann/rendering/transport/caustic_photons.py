@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from lippmann.device.sobol import named_seed
 from lippmann.device.types import MitsubaScene
 from lippmann.rendering.transport.casters import Casters
-from lippmann.rendering.transport.photon_map import PhotonMap, Photons
+from lippmann.rendering.transport.photon_map import PhotonMap, Photons, are_inside
 from lippmann.rendering.transport.photon_shooter import PhotonShooter
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.tuning import TUNING
@@ -122,7 +122,7 @@ class CausticPhotons:
         count = min(max(self._emissions // casters.pairs, FEWEST_OF_PAIR), MOST_OF_PAIR) * casters.pairs
         even = np.full(casters.pairs, 1 / casters.pairs)
         photons, pair = self._shooter.shoot(count, even, named_seed("pilot of photons", self._seed))
-        is_visible = photons.are_inside(self._region)
+        is_visible = are_inside(photons.position, self._region)
         if not is_visible.any():
             return None
         power = photons.power[is_visible].astype(np.float64)

@@ -57,13 +57,9 @@ class Photons:
     def __len__(self) -> int:
         return len(self.surfaces)
 
-    def are_inside(self, region: NDArray[np.float64] | None) -> NDArray[np.bool_]:
-        """``(n,)``: which lie in the box with these corners ``(2, 3)``; all where it is None."""
-        return are_inside(self.position, region)
-
     def inside(self, region: NDArray[np.float64] | None) -> Photons:
         """Those that lie in a box."""
-        return self.chosen(self.are_inside(region))
+        return self.chosen(are_inside(self.position, region))
 
     def chosen(self, which: NDArray[np.generic]) -> Photons:
         """Some of them, by a mask or by numbers."""
