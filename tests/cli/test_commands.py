@@ -137,7 +137,7 @@ def test_replay_through_a_real_lens(lippmann, picture, tmp_path):
     )
     for words, says in (
         ((picture, "--optics"), "gives no lens"),
-        ((sheet, "--optics", "--filter", "linear"), "--filter: given beside --optics"),
+        ((sheet, "--optics", "--filter", "linear"), "--filter: given beside optics"),
     ):
         done = lippmann("replay", *words, "-o", tmp_path / "none.png")
         assert done.code == 2

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.errors import PictureError, UsageError
+from lippmann.errors import PictureError
 from lippmann.image.encoding import display_codes
 from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.picture import Picture
@@ -181,33 +181,7 @@ class IntegralImage(Picture):
         values: FloatArray = self.pixels[..., channels][row, column]
         return values
 
-    # ---- Replay and files -----------------------------------------------------------------------------------------
-
-    def replay(
-        self,
-        eye: tuple[float, float, float] | None = None,
-        *,
-        size: tuple[int, int] | None = None,
-        filter: Resampling = "nearest",
-        subpixels: bool | None = None,
-        optics: bool = False,
-    ) -> FloatArray:
-        """Linear RGB ``(height, width, 3)`` that an eye at ``eye`` (mm, display frame) sees.
-
-        Parameters, defaults and errors are those of :func:`lippmann.viewing.replay.replay`; with ``optics`` those of
-        :func:`lippmann.viewing.optical_replay.replay_optics`, which takes the place of ``filter`` and ``subpixels``.
-        """
-        from lippmann.viewing.replay import replay
-
-        if optics:
-            from lippmann.viewing.optical_replay import replay_optics
-
-            if (filter, subpixels) != ("nearest", None):
-                rule = "the lens says which sub-pixels are seen, and how much of each"
-                parameter = "subpixels" if filter == "nearest" else "filter"
-                raise UsageError("given beside optics", parameter=parameter, rule=rule, fix="leave it out")
-            return replay_optics(self, eye, size=size)
-        return replay(self, eye, size=size, filter=filter, subpixels=subpixels)
+    # ---- Refocusing and files -------------------------------------------------------------------------------------
 
     def refocus(self, plane: float, *, size: tuple[int, int] | None = None) -> FloatArray:
         """Linear RGB ``(height, width, 3)`` focused on the plane z = ``plane`` mm.

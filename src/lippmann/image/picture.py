@@ -7,10 +7,11 @@ from collections.abc import Mapping
 
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
+from lippmann.errors import UsageError
 from lippmann.image.encoding import linear_values
 from lippmann.image.provenance import Provenance
 from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, Values
-from lippmann.image.views import view_grid
+from lippmann.image.views import Resampling, view_grid
 
 
 class Picture(ABC):
@@ -62,3 +63,29 @@ class Picture(ABC):
     def views_note(self) -> str:
         """A sentence on how the views deviate from exact ones; empty if they do not."""
         return view_grid(self.display).note
+
+    def replay(
+        self,
+        eye: tuple[float, float, float] | None = None,
+        *,
+        size: tuple[int, int] | None = None,
+        filter: Resampling = "nearest",
+        subpixels: bool | None = None,
+        optics: bool = False,
+    ) -> FloatArray:
+        """Linear RGB ``(height, width, 3)`` that an eye at ``eye`` (mm, display frame) sees.
+
+        Parameters, defaults and errors are those of :func:`lippmann.viewing.replay.replay`; with ``optics`` those of
+        :func:`lippmann.viewing.optical_replay.replay_optics`, which takes the place of ``filter`` and ``subpixels``.
+        """
+        from lippmann.viewing.replay import replay
+
+        if optics:
+            from lippmann.viewing.optical_replay import replay_optics
+
+            if (filter, subpixels) != ("nearest", None):
+                rule = "the lens says which sub-pixels are seen, and how much of each"
+                parameter = "subpixels" if filter == "nearest" else "filter"
+                raise UsageError("given beside optics", parameter=parameter, rule=rule, fix="leave it out")
+            return replay_optics(self, eye, size=size)
+        return replay(self, eye, size=size, filter=filter, subpixels=subpixels)

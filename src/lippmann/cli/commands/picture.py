@@ -190,7 +190,6 @@ def replay(
     from lippmann.runtime.atomic_write import check_writable
     from lippmann.viewing.quilt_views import quilt_display, replay_quilt
     from lippmann.viewing.replay import default_eye, path_of_eye
-    from lippmann.viewing.replay import replay as replay_picture
     from lippmann.viewing.stereo import head_path, stereo_pair, write_pair
     from lippmann.viewing.video_file import check_animation_path, write_animation
 
@@ -233,21 +232,14 @@ def replay(
     position = default_eye(target) if eye is None else triple(eye, "--eye")
     pixels, framed = _size_of(size, target, console)
 
-    if optics and filter != "nearest":
-        rule = "the lens says which sub-pixels are seen, and how much of each"
-        raise UsageError("given beside --optics", where="--filter", rule=rule, fix="leave it out")
     if optics and quilt is not None:
         rule = "a quilt is seen without lenses"
         raise UsageError("this is a quilt", where="--optics", rule=rule, fix="weave it for its display first")
 
     def seen_by(place: tuple[float, float, float]) -> FloatArray:
-        if optics:
-            from lippmann.viewing.optical_replay import replay_optics
-
-            return framed(replay_optics(image, place, size=pixels))
         if quilt is not None:
             return framed(replay_quilt(quilt, target, place, size=pixels, linear=filter == "linear"))
-        return framed(replay_picture(image, place, size=pixels, filter=filter))
+        return framed(image.replay(place, size=pixels, filter=filter, optics=optics))
 
     def seen_from(place: tuple[float, float, float]) -> FloatArray:
         return seen_by(place) if stereo is None else stereo_pair(seen_by, place, *stereo)
