@@ -48,6 +48,8 @@ def render(scene, display, part=None, samples=SAMPLES, seed=0):
         tone_map="none",
     )
     engine.start()
+    # What knows the class of rays is loaded before another takes its place.
+    from lippmann.rendering import methods  # noqa: F401
     from lippmann.rendering.transport import ray_source
 
     whole = ray_source.DisplayRays
