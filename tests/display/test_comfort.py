@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from lippmann.display import load_display
@@ -29,14 +31,21 @@ def test_verdicts(back, front, verdict, is_double):
 
 
 def test_a_panel_is_judged_from_its_own_distance():
-    assert comfort_in_words(PANEL, -50, 50).startswith("comfortable: disparity 0.39 degrees behind, 0.46 in front")
+    assert comfort_in_words(PANEL, -50, 50).startswith(
+        "comfortable: disparity from -0.39 degrees at the back to 0.46 at the front"
+    )
     assert "from 654 mm" in comfort_in_words(PANEL, -50, 50)
     assert fusion_warning(PANEL, -50, 50) == ""
     warning = fusion_warning(PANEL, -600, 50)
-    assert warning.startswith(
-        "the scene reaches 600 mm behind the panel and 50 mm in front; from 654 mm most eyes fuse"
-    )
+    assert warning.startswith("the scene reaches from -600 to 50 mm; from 654 mm away most eyes fuse -384 to 164")
     assert "\n" not in warning
+
+
+def test_from_far_away_only_the_front_is_too_much():
+    wall = load_display("portrait").resized(768, 1024)
+    far = replace(wall, viewing_distance=3000.0)
+    assert "most eyes fuse all up to 1" in fusion_warning(far, -1e5, 2000)
+    assert fusion_warning(far, -1e5, 50) == ""
 
 
 def test_nothing_is_said_without_a_viewing_distance():

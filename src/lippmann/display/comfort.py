@@ -20,10 +20,10 @@ def fusion_warning(display: Display, back: float, front: float) -> str:
     near, far = depth_of_disparity(*FUSED, distance, eyes_of_viewer(display))
     if far - 1e-6 <= back and front <= near + 1e-6:
         return ""
-    limit = "all that lies behind" if math.isinf(far) else f"{-far:.0f} mm behind"
+    fused = f"{far:.0f} to {near:.0f} mm" if math.isfinite(far) else f"all up to {near:.0f} mm"
     return (
-        f"the scene reaches {-back:.0f} mm behind the panel and {front:.0f} mm in front; from {distance:.0f} mm most "
-        f"eyes fuse {limit} and {near:.0f} mm in front, what lies beyond is seen double: flatten or shift it"
+        f"the scene reaches from {back:.0f} to {front:.0f} mm; from {distance:.0f} mm away most eyes fuse {fused}, "
+        "what lies beyond is seen double: flatten or shift it"
     )
 
 
@@ -46,6 +46,7 @@ def comfort_in_words(display: Display, back: float, front: float) -> str:
     if max(before, -behind) <= COMFORTABLE + 1e-6:
         verdict = "comfortable"
     return (
-        f"{verdict}: disparity {-behind:.2f} degrees behind, {before:.2f} in front, from {distance:.0f} mm with eyes "
-        f"{eyes:.0f} mm apart (up to {COMFORTABLE:.0f} is comfortable, up to {FUSED[0]:.1f} fuses)"
+        f"{verdict}: disparity from {behind:.2f} degrees at the back to {before:.2f} at the front, seen from "
+        f"{distance:.0f} mm with eyes {eyes:.0f} mm apart (up to {COMFORTABLE:.0f} is comfortable, up to "
+        f"{FUSED[0]:.1f} fuses)"
     )
