@@ -20,6 +20,7 @@ import equal_error_tables
 import estimate_coverage_tables
 import first_picture_tables
 import goals_tables
+import half_and_double
 import kernel_profile_tables
 import light_vertices_tables
 import photon_share_tables
@@ -418,6 +419,7 @@ SECTIONS = {
     "tachyon": _tachyon,
     "full_rate": _full_rate,
     "kernel_profile": kernel_profile_tables.describe,
+    "half_and_double": half_and_double.describe,
     "large_frame": _large_frame,
     "huge": _huge,
     "huge_pooled_oidn-fast": _huge,

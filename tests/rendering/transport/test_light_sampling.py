@@ -78,7 +78,7 @@ def sampling_weights(scene):
 
 @pytest.mark.parametrize("order", [("sky", "bright", "faint"), ("faint", "sky", "bright"), ("bright", "faint", "sky")])
 def test_emitters_are_sampled_by_their_contribution(order):
-    from lippmann.rendering.preparation.tuning import TUNING
+    from lippmann.rendering.transport.tuning import TUNING
 
     weights = estimated_weights(*stage(room(order)))
     by_name = dict(zip(order, weights, strict=True))
@@ -91,7 +91,7 @@ def test_emitters_of_a_scene_with_another_sky_are_told_apart():
     """The new sky comes first among a scene's objects."""
     import mitsuba as mi
 
-    from lippmann.rendering.preparation.tuning import TUNING
+    from lippmann.rendering.transport.tuning import TUNING
     from lippmann.scene.mitsuba_source import with_sky
 
     sky = mi.load_dict({"type": "constant", "radiance": 3.0})
@@ -222,8 +222,8 @@ def test_delta_emitters_give_the_same_picture_by_any_weights():
 @pytest.mark.slow
 def test_more_emitters_than_are_weighed_have_a_picture():
     """Beyond the most emitters the scene's own sampling is used, and each light still arrives."""
-    from lippmann.rendering.preparation.tuning import TUNING
     from lippmann.rendering.transport.light_sampling import SceneLightSampler
+    from lippmann.rendering.preparation.tuning import TUNING
 
     count = TUNING.most_weighed_emitters + 1
     lights = {

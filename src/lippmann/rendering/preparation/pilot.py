@@ -27,6 +27,7 @@ from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource
 from lippmann.rendering.transport.sharp_events import sharp_lobe
 from lippmann.rendering.transport.specular_chains import specular_light
+from lippmann.rendering.transport.tuning import TUNING as TRANSPORT
 
 #: Dimensions of the sample stream at one surface.
 DIMENSIONS_PER_SURFACE = 4
@@ -121,7 +122,7 @@ def emitter_weights(pilot: Pilot) -> NDArray[np.float64]:
     uniform = np.full(len(roots), 1 / max(len(roots), 1))
     if not roots.any():
         return uniform
-    share = TUNING.uniform_share
+    share = TRANSPORT.uniform_share
     return np.asarray(share * uniform + (1 - share) * roots / roots.sum())
 
 

@@ -21,8 +21,6 @@ class PreparationTuning:
         Surfaces along such a path at which emitters are sampled.
     most_weighed_emitters:
         Scenes of more emitters are sampled uniformly.
-    uniform_share:
-        Share of the sampling probability that is uniform over all emitters, for what the pilot paths missed.
     mid_grey:
         Linear radiance that the median of what is lit gets: photographic mid-grey.
     exposure_side, exposure_samples:
@@ -48,7 +46,6 @@ class PreparationTuning:
     pilot_chains: int = 1 << 16
     pilot_surfaces: int = 3
     most_weighed_emitters: int = 1 << 10
-    uniform_share: float = 0.2
     mid_grey: float = 0.18
     exposure_side: int = 64
     exposure_samples: int = 4

@@ -37,7 +37,7 @@ class TransportTuning:
     light_vertices:
         Points of each half of a picture, before those are left out that scatter nothing; and rays of their pilot.
     uniform_share:
-        Share of emissions and of rays from emitters that goes to all alike, whatever the pilot met.
+        Share of emitter samples, emissions and rays from emitters that goes to all alike, for what a pilot missed.
     most_vertex_emitters:
         Scenes of more emitters are left to paths: each has a start of its own in the kernel of rays.
     """
