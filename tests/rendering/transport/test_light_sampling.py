@@ -222,8 +222,8 @@ def test_delta_emitters_give_the_same_picture_by_any_weights():
 @pytest.mark.slow
 def test_more_emitters_than_are_weighed_have_a_picture():
     """Beyond the most emitters the scene's own sampling is used, and each light still arrives."""
-    from lippmann.rendering.transport.light_sampling import SceneLightSampler
     from lippmann.rendering.preparation.tuning import TUNING
+    from lippmann.rendering.transport.light_sampling import SceneLightSampler
 
     count = TUNING.most_weighed_emitters + 1
     lights = {
