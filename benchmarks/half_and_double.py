@@ -122,9 +122,9 @@ def describe(result: dict[str, Any]) -> str:
     return f"""## Tuned constants at half and double
 
 `half_and_double.py`: PSNR in dB that small pictures of {", ".join(result["scenes"])} in light along paths gain with
-half of one constant and with double of it, {result["samples"]} samples per pixel; in the mean, and in brackets on the scene
-that gains least. 0 is less than {NOISE} dB. Constants of estimates and of stopping move no picture of a given number of
-samples.
+half of one constant and with double of it, {result["samples"]} samples per pixel; in the mean, and in brackets
+on the scene that gains least. 0 is less than {NOISE} dB. Constants of estimates and of stopping move no
+picture of a given number of samples.
 
 {table(result["rows"])}"""
 
