@@ -50,7 +50,7 @@ def draw_crests() -> None:
         directions = true_directions(lens)
         own = np.abs(directions.places) <= 0.5 * pitch
         place = directions.places[own]
-        ax.plot(place / pitch, np.degrees(np.arctan(directions.slopes[own])), color="tab:red", label="true mean")
+        ax.plot(place / pitch, np.degrees(np.arctan(directions.slopes[own])), color="tab:red", label="true direction")
         pinhole = np.degrees(np.arctan(-place / (thickness / index)))
         ax.plot(place / pitch, pinhole, "--", color="tab:blue", label="pinhole at t/n")
         ax.set(title=f"R {100 * factor - 100:+.0f} %" if factor > 1 else "paraxial focus", xlabel="place (pitches)")
