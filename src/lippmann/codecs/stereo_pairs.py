@@ -87,7 +87,7 @@ def read_pair(path: Path) -> tuple[Photograph, Photograph] | None:
             "is a film",
             where=str(path),
             rule="films are not read, nor the two views of a spatial one (MV-HEVC)",
-            fix="write its views as pictures first: ffmpeg -view_ids -1",
+            fix="write its views as pictures first: ffmpeg 7.1 names them -map 0:v:view:0 and -map 0:v:view:1",
         )
     return None
 
