@@ -13,6 +13,7 @@ travels to it, which is exact for flat ones; where it is not, things do not agre
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -26,7 +27,7 @@ from lippmann.device.syntax import syntax
 from lippmann.device.types import Array, UInt32
 from lippmann.display import Display
 from lippmann.display.lens_field import lens_centers, lens_numbers
-from lippmann.rendering.sharing.device_pixels import light_of_pixels
+from lippmann.rendering.film.memory_model import PREFERRED_LANES
 from lippmann.rendering.sharing.tuning import TUNING
 
 if TYPE_CHECKING:
@@ -197,3 +198,12 @@ class _Picture:
             dj += dr.select(is_end, 1, 0)
             active = is_surface & (dj <= reach_j)
         return dr.select(is_surface, color / total, light)
+
+
+def light_of_pixels(mean_light: Callable[[UInt32], Array], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """A picture ``(H, W, C)`` of that ``shape``; ``mean_light`` gives the light of pixels by their numbers."""
+    light = np.empty((shape[0] * shape[1], shape[2]), dtype=np.float32)
+    for first in range(0, len(light), PREFERRED_LANES):
+        part = light[first : first + PREFERRED_LANES]
+        part[:] = np.array(mean_light(dr.arange(mi.UInt32, len(part)) + dr.opaque(mi.UInt32, first))).T
+    return light.reshape(shape)

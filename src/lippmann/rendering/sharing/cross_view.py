@@ -25,7 +25,7 @@ from lippmann.device.kernel_ops import divide, upload
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Color3f, UInt32
 from lippmann.display.view_cone import cone_tangent
-from lippmann.rendering.sharing.device_pixels import light_of_pixels
+from lippmann.rendering.sharing.cross_lens import light_of_pixels
 from lippmann.rendering.sharing.tuning import TUNING
 
 if TYPE_CHECKING:
