@@ -46,10 +46,10 @@ def shared_light(light, normal, height, slopes):
 
 @pytest.mark.usefixtures("engine")
 def test_the_mean_is_the_slow_one(monkeypatch):
-    from lippmann.rendering.sharing import device_pixels
+    from lippmann.rendering.sharing import cross_lens
     from lippmann.rendering.sharing.cross_view import _Views
 
-    monkeypatch.setattr(device_pixels, "PREFERRED_LANES", 100)  # several parts
+    monkeypatch.setattr(cross_lens, "PREFERRED_LANES", 100)  # several parts
     random = np.random.default_rng(1)
     shape = (ROWS * HEIGHT, COLUMNS * WIDTH)
     light = random.lognormal(0, 0.5, (*shape, 3)).astype(np.float32)
@@ -58,7 +58,7 @@ def test_the_mean_is_the_slow_one(monkeypatch):
     height, normal = height.astype(np.float32), normal.astype(np.float32)
     slopes = np.linspace(-0.2, 0.2, ROWS * COLUMNS)
     views = _Views(light, normal, height, slopes, COLUMNS, CONVERGENCE, PIXELS_PER_MM, REACH)
-    found = device_pixels.light_of_pixels(views.mean_light, light.shape)
+    found = cross_lens.light_of_pixels(views.mean_light, light.shape)
     expected = shared_light(*(views_of(part) for part in (light, normal, height)), slopes)
     np.testing.assert_allclose(views_of(found), expected, rtol=1e-5)
     # Neither all views agree nor none.
