@@ -52,7 +52,7 @@ class SequenceOptions(Options):
     shows: Shows = option(
         "eye",
         "What the film shows: what an eye sees; the panel's native pixels, each code kept; colour beside depth (rgbd; "
-        "near is white; needs --layers); or what the player of a Hololuminescent display takes.",
+        "near is white; needs `layers`); or what the player of a Hololuminescent display takes.",
         group="Animation",
     )
     codec: Literal["h264", "hevc", "vp9", "av1", "h264-rgb", "vp9-rgb"] | None = _frames(

@@ -114,7 +114,7 @@ def film_of_pictures(
                 "the frames have no depth",
                 parameter="shows",
                 rule="that is a layer, which OpenEXR keeps",
-                fix="add --layers, and name the frames %04d.exr",
+                fix="layers=True, and frames named %04d.exr",
             )
         form = RgbdForm(half=shows == "rgbd-half")
         place = find_stand(motion, display, options_of_sequence(request.placement))(0)

@@ -134,7 +134,7 @@ def write_pair(pair: FloatArray, path: Path, stereo: Stereo, transfer: Transfer)
     is_jps = path.suffix.lower() == ".jps"
     if stereo == "anaglyph" or (stereo == "half" and not is_jps):
         rule = "MPO files hold two whole pictures, JPS files two beside each other"
-        raise UsageError(f"'{stereo}' as {path.suffix}", parameter="stereo", rule=rule, fix="take --sbs full")
+        raise UsageError(f"'{stereo}' as {path.suffix}", parameter="stereo", rule=rule, fix="take the full width")
     left, right = np.split(quantize(pair, 8, transfer), 2, axis=1)
     data = encode_jps(left, right, half=stereo == "half") if is_jps else encode_mpo(left, right)
     with replacing(path) as temporary:

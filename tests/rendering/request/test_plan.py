@@ -233,7 +233,9 @@ def test_a_pilots_results_take_the_place_of_what_it_decides():
     assert told.entries["seen_chains"].value == 8
     # This scene has no physical light sources, so no pilot measured its exposure.
     assert told.entries["exposure"].value == 0.0
-    assert plan.with_pilot({}).entries["caustics"].value == "none"
+    none = plan.with_pilot({}).entries["caustics"]
+    assert none.value == "none"
+    assert none.reason.startswith("no emitter shines")
     asked = resolve(RenderRequest(caustics="paths"), SCENE).plan
     assert asked.with_pilot({"caustics": "paths"}).entries["caustics"].reason == ASKED
 

@@ -72,7 +72,8 @@ class RenderPlan:
             open_ended["caustics"] = told.get("caustics", "none")
         others = {name: told[name] for name in PILOT_REASONS if name in told and name not in ("exposure", "caustics")}
         found = {**open_ended, **others}
-        return replace(self, pilot={name: Choice(value, PILOT_REASONS[name]) for name, value in found.items()})
+        reasons = {**PILOT_REASONS, **({"caustics": NO_CAUSTICS} if found.get("caustics") == "none" else {})}
+        return replace(self, pilot={name: Choice(value, reasons[name]) for name, value in found.items()})
 
     @property
     def entries(self) -> dict[str, Choice[object]]:
@@ -101,6 +102,9 @@ PILOT_REASONS = {
     "light_vertices": "the pilot met indirect light brighter than white, as of a small emitter beside a surface",
     "seen_chains": "of each path: the pilot met light brighter than white in mirrors, glass or smooth gloss",
 }
+
+#: Why a pilot comes to no photons.
+NO_CAUSTICS = "no emitter shines on mirrors, glass or smooth gloss, or its photons hardly land in the picture"
 
 
 def format_value(value: object) -> str:
