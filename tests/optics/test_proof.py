@@ -69,6 +69,12 @@ def test_a_thicker_sheet_narrows_the_field():
     assert proof.thicker.shift == pytest.approx(expected, rel=0.01)
 
 
+@pytest.mark.parametrize(("share", "mark"), [(0.01, "1 %"), (0.02, "2 % (visible)"), (0.07, "7 % (annoying)")])
+def test_crosstalk_says_by_which_mark_it_is_seen(share, mark):
+    words = replace(prove(load_display(SHORT)), crosstalk=share).in_words()
+    assert words["crosstalk"].startswith(f"{mark} straight ahead, ")
+
+
 def test_prints_have_tolerances():
     proof = prove(load_display(SHORT))
     pixel, gap = 25.4 / 720, load_display(SHORT).gap

@@ -124,7 +124,7 @@ class Proof:
             "display": self.display,
             "lens": self.lens or "none is given: an ideal pinhole at the gap",
             "directions": f"{self.directions:.3g} that one lens tells apart, of {self.pixels:.4g} pixels",
-            "crosstalk": f"{_share(self.crosstalk)} straight ahead, {_share(self.crosstalk_aside)} half-way aside",
+            "crosstalk": f"{_ghost(self.crosstalk)} straight ahead, {_ghost(self.crosstalk_aside)} half-way aside",
             "depth": f"{self.depth:.3g} mm in all, half of it behind the lenses{rule}",
             "field": f"{self.field:.3g} deg" + (f", {extreme:.3g} deg by the extreme ray" if extreme else ""),
             "zone": self._zone_in_words(),
@@ -133,7 +133,7 @@ class Proof:
         if self.thicker is not None:
             thicker = self.thicker
             words["3 % thicker"] = (
-                f"field {thicker.field:.3g} deg, crosstalk {_share(thicker.crosstalk)}, "
+                f"field {thicker.field:.3g} deg, crosstalk {_ghost(thicker.crosstalk)}, "
                 f"the picture's edge is {thicker.shift:.2g} pixels off"
             )
         if self.tolerances is not None:
@@ -274,15 +274,21 @@ def _advice(display: Display, straight: float, depth: float, tolerances: PrintTo
 
 
 def _share(share: float) -> str:
-    """A share of light in percent, and by which mark it is seen."""
+    """A share of light in percent."""
     return f"{100 * share:.2g} %" if share >= 5e-4 else "0 %"
+
+
+def _ghost(share: float) -> str:
+    """Crosstalk in percent, and the mark that it is above."""
+    mark = " (annoying)" if share > ANNOYING else " (visible)" if share > VISIBLE else ""
+    return f"{_share(share)}{mark}"
 
 
 def _tolerances_in_words(tolerances: PrintTolerances) -> dict[str, str]:
     return {
         "strips": f"up to {tolerances.best_strips} a lens are not annoying (5.8 %), "
         f"up to {tolerances.invisible_strips} not seen (1 %)",
-        "dot gain": f"of half a pixel: crosstalk {_share(tolerances.dot_gain)}",
+        "dot gain": f"of half a pixel: crosstalk {_ghost(tolerances.dot_gain)}",
         "register": f"an ink one pixel off is turned by {tolerances.misregistration:.2g} deg, "
         f"{tolerances.misregistration_depth:.2g} mm at the usable depth",
         "pitch": f"{100 * tolerances.pitch_drift:.2g} % off turns the picture's edge by one strip",
