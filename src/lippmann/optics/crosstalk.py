@@ -28,6 +28,13 @@ def crosstalk(display: Display, slope: float, strips: float | None = None) -> fl
 
     Under upright lenses the eye stands in the middle of a strip: of a pixel, or of one of so many ``strips`` a lens.
     Slanted lenses have sub-pixels at all places: those farther away than half a direction's width are others.
+
+    Examples
+    --------
+    >>> from lippmann.optics.crosstalk import crosstalk
+    >>> display = lippmann.load_display("print-60lpi")
+    >>> print(f"{crosstalk(display, 0.0):.3f}")
+    0.000
     """
     step = display.micro_image_pitch / _PLACES
     spread, blur = _spread(display, slope, step), _blur(display)
@@ -53,6 +60,13 @@ def independent_directions(display: Display) -> float:
     """Number of directions that one lens tells apart: its micro-image over the half-height width of a pixel's light.
 
     Upright lenses show no more than their pixels.
+
+    Examples
+    --------
+    >>> from lippmann.optics.crosstalk import independent_directions
+    >>> display = lippmann.load_display("print-60lpi")
+    >>> print(f"{independent_directions(display):.1f}")
+    12.0
     """
     shape, blur, step = pixel_trapezoid(display), _blur(display), display.micro_image_pitch / _PLACES
     width = shape.half_height

@@ -62,6 +62,14 @@ def true_directions(lens: Lens) -> TrueDirections:
     """The true directions of a lens: light of all angles that leaves a place through it, weighted by its share.
 
     Of a micro-lens, those of places level with its centre.
+
+    Examples
+    --------
+    >>> from lippmann.optics.directions import true_directions
+    >>> from lippmann.optics.lens import Lens
+    >>> outermost = true_directions(Lens.of(lippmann.load_display("print-60lpi"))).slopes[0]
+    >>> print(f"{outermost:.2f}")
+    0.54
     """
     half = np.linspace(0.0, 0.5, _PLACES) * lens.pitch
     x, y = lens.samples(_POINTS if lens.is_cylinder else _ROUND_POINTS)

@@ -65,6 +65,14 @@ def eye_light(
     ------
     DisplayError
         The display gives no lens.
+
+    Examples
+    --------
+    >>> from lippmann.optics.eye_light import eye_light
+    >>> display = lippmann.load_display("print-60lpi")
+    >>> light = eye_light(display, (-0.1, 0.1), (0.0, 0.0), pupil=4 / 500)
+    >>> len(light.slopes_x) > 1
+    True
     """
     lens = Lens.of(display)
     rows, columns = _DIRECTIONS if lens.is_cylinder else _ROUND_DIRECTIONS

@@ -36,6 +36,12 @@ class Lens:
     ------
     DisplayError
         If such lenses cannot stand side by side.
+
+    Examples
+    --------
+    >>> from lippmann.optics.lens import Lens
+    >>> Lens.of(lippmann.load_display("print-60lpi")).is_cylinder
+    True
     """
 
     profile: LensProfile

@@ -36,6 +36,15 @@ class LightTable:
         ``(directions, places)`` across the lens; what a micro-lens shows is summed up along y.
     squares:
         ``(directions, rows, columns)`` of a micro-lens; None of a cylinder.
+
+    Examples
+    --------
+    >>> from lippmann.optics.lens import Lens
+    >>> from lippmann.optics.light_table import light_table
+    >>> display = lippmann.load_display("print-60lpi")
+    >>> table = light_table(Lens.of(display), [0.0, 0.2])
+    >>> print([round(float(share), 2) for share in table.light])
+    [0.95, 0.95]
     """
 
     slopes: Real
@@ -86,6 +95,14 @@ def light_table(
         Places across one lens.
     neighbours:
         Lenses to both sides of the own one whose places the table has.
+
+    Examples
+    --------
+    >>> from lippmann.optics.lens import Lens
+    >>> from lippmann.optics.light_table import light_table
+    >>> display = lippmann.load_display("print-60lpi")
+    >>> light_table(Lens.of(display), [0.0, 0.2]).shares.shape
+    (2, 288)
     """
     directions, edges = _frame(lens, slopes, along, places_per_lens, neighbours)
     from lippmann.optics.trace_kernel import fill_lines, fill_squares

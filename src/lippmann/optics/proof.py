@@ -97,6 +97,12 @@ class Proof:
         None for displays that are no prints.
     advice:
         What to change, in one line.
+
+    Examples
+    --------
+    >>> from lippmann.optics.proof import prove
+    >>> prove(lippmann.load_display("print-60lpi")).in_words()["directions"]
+    '12 that one lens tells apart, of 12.01 pixels'
     """
 
     display: str
@@ -163,7 +169,14 @@ class Proof:
 
 
 def prove(display: Display) -> Proof:
-    """The proof of a display, with its own lens or, where it gives none, with an ideal pinhole."""
+    """The proof of a display, with its own lens or, where it gives none, with an ideal pinhole.
+
+    Examples
+    --------
+    >>> from lippmann.optics.proof import prove
+    >>> prove(lippmann.load_display("print-60lpi")).advice
+    'keep the scene within 4.59 mm before and behind the lenses; ...'
+    """
     directions, straight = independent_directions(display), crosstalk(display, 0.0)
     slope = edge_slope(display)
     depth = 2.0 * directions * display.gap

@@ -73,10 +73,10 @@ def surface(seed):
 @pytest.mark.parametrize("stop", [0.0, 40.0])
 @pytest.mark.parametrize(("cylindrical", "reach"), [(True, (4, 0)), (False, (3, 3))])
 def test_the_mean_is_the_slow_one(cylindrical, reach, stop, channels, monkeypatch):
-    from lippmann.rendering.sharing import device_pixels
+    from lippmann.rendering.sharing import cross_lens
     from lippmann.rendering.sharing.cross_lens import _Picture
 
-    monkeypatch.setattr(device_pixels, "PREFERRED_LANES", 100)  # several parts
+    monkeypatch.setattr(cross_lens, "PREFERRED_LANES", 100)  # several parts
     random = np.random.default_rng(7)
     normal, height = surface(8)
     light = random.lognormal(0, 0.2, (HEIGHT, WIDTH, channels)).astype(np.float32)
@@ -89,7 +89,7 @@ def test_the_mean_is_the_slow_one(cylindrical, reach, stop, channels, monkeypatc
     centers = np.stack([(i + 0.5) * (PITCH + 0.05), 0 * j if cylindrical else (j + 0.5) * (PITCH - 0.05)], axis=-1)
     centers = np.ascontiguousarray(centers, dtype=np.float64)
     arrays = (light, normal, height, lens, centers)
-    found = device_pixels.light_of_pixels(_Picture(*arrays, GAP, reach, stop).mean_light, light.shape)
+    found = cross_lens.light_of_pixels(_Picture(*arrays, GAP, reach, stop).mean_light, light.shape)
     expected = shared_light(*arrays, reach, stop)
     np.testing.assert_allclose(found, expected, rtol=2e-5)
     assert np.abs(expected - light).mean() > 0.01
