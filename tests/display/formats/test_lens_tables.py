@@ -116,3 +116,10 @@ def test_infinite_numbers_of_a_lens_are_refused(load):
         lines = "\n".join(f"{name} = {value}" for name, value in values.items())
         with pytest.raises(DisplayError, match=key):
             load(f"{SHEET}[lens]\n{lines}")
+
+
+def test_a_display_whose_directions_have_been_inverted_is_loaded_and_stored_again():
+    display = load_display("print-60lpi")
+    assert display.distortion.inverse_factors[0] == pytest.approx(1.0 / display.distortion.factors[0], rel=0.01)
+    assert load_display("print-60lpi") == display
+    assert Display.from_dict(display.to_dict()) == display

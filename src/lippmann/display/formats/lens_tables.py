@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 from lippmann.display.display import Display
 from lippmann.display.formats.monitor_toml import TABLE as MONITOR
@@ -75,7 +75,8 @@ def with_profile(values: Arguments) -> Arguments:
     lenses = LensArray(**values["lens_array"])
     profile = profile_of_table(values["lens"], lenses)
     gap = gap_of(profile, lenses)
-    return {**values, "gap": gap, "lens": vars(profile), "distortion": vars(distortion_of(profile, lenses, gap))}
+    distortion = distortion_of(profile, lenses, gap)
+    return {**values, "gap": gap, "lens": asdict(profile), "distortion": asdict(distortion)}
 
 
 def profile_of_table(table: object, lenses: LensArray) -> LensProfile:
