@@ -252,6 +252,7 @@ def test_a_film_of_native_pixels_and_one_of_colour_beside_depth(engine, lippmann
     assert color[hit].sum(axis=-1).mean() > 60
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_film_for_a_hololuminescent_display(engine, lippmann, tmp_path):
     call = ("--display", "looking-glass-go", "--views", "1x1", "--size", "288x512", "--turntable", "2", "--fps", "30")

@@ -37,7 +37,7 @@ def switched_on(open_tab, path, **options):
     return tab
 
 
-@pytest.mark.long_cases(but=["print", "slanted"])
+@pytest.mark.long_cases(but=["print"])
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DISPLAYS)
 def test_page_shows_what_replay_shows_through_the_real_lens(open_tab, tmp_path, name):
@@ -77,6 +77,7 @@ def test_the_switch_is_there_for_displays_with_a_lens_only(open_tab, tmp_path):
     tab.assert_clean()
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_layers_lie_over_what_real_lenses_show(open_tab, tmp_path):
     display = DISPLAYS["print"]

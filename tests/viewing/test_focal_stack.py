@@ -67,6 +67,7 @@ def lippmann(capfd):
     return call
 
 
+@pytest.mark.long_cases(but=["stack.png"])
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["stack", "stack.tif", "stack.png", "stack.mp4"])
 def test_the_command_writes_folders_pages_and_animations(lippmann, image, picture, tmp_path, name):

@@ -41,6 +41,7 @@ def noise(display):
     return IntegralImage(np.random.default_rng(4).random(shape).astype(np.float32), display)
 
 
+@pytest.mark.long_cases("round")
 @pytest.mark.parametrize("display", [PRINT, WHOLE], ids=["print", "round"])
 def test_an_even_panel_is_white_straight_ahead_and_darker_aside(display):
     ahead, aside = (replay_optics(even(display), (x, 0.0, 900.0), size=(40, 20)) for x in (0.0, 160.0))
@@ -65,6 +66,7 @@ def test_what_other_strips_send_is_the_crosstalk():
     assert 1.0 - seen[10].max() == pytest.approx(crosstalk(PRINT, 0.0), abs=0.01)
 
 
+@pytest.mark.long_cases("round")
 @pytest.mark.parametrize("display", [SLANTED, ROUND], ids=["slanted", "round"])
 def test_light_is_gathered_from_the_places_of_the_light_table(display):
     """Against a sum over dense points of the panel, lit or dark, of which each lens shows an eye its share."""
