@@ -9,6 +9,7 @@ import tifffile
 from PIL import Image
 
 from lippmann.codecs.png import read_png
+from lippmann.codecs.rgbd_names import RgbdForm
 from lippmann.display import load_display
 from lippmann.errors import OutputError, SceneError, UsageError
 from lippmann.image import IntegralImage
@@ -17,7 +18,6 @@ from lippmann.scene.readers.depth_layers import split_layers
 from lippmann.scene.readers.depth_map import read_depth_map
 from lippmann.scene.readers.depth_photo import read_depth_photo
 from lippmann.viewing.color_and_depth import (
-    RgbdForm,
     depth_codes,
     distance_seen,
     named,

@@ -52,6 +52,11 @@ class Photograph:
     notes: tuple[str, ...]
     _decode: Callable[[], Pixels]
 
+    @staticmethod
+    def of_codes(codes: Pixels, icc: bytes, notes: tuple[str, ...] = ()) -> Photograph:
+        """An upright picture of decoded codes."""
+        return Photograph((codes.shape[1], codes.shape[0]), icc, 1, notes, lambda: codes)
+
     def codes(self) -> Pixels:
         """Codes ``(H, W, 1 to 4)``, uint8 or uint16: grey or RGB, with or without alpha. Float TIFF gives floats."""
         return self._decode()

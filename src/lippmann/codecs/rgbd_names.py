@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -12,12 +13,28 @@ White = Literal["near", "far"]
 _NAME = re.compile(r"_rgbd(-half)?(-far)?$", re.IGNORECASE)
 
 
-def ending_of_rgbd(half: bool, white: White) -> str:
-    """The ending of the stem; ``half``: colour and depth are halved in width."""
-    return f"_rgbd{'-half' if half else ''}{'-far' if white == 'far' else ''}"
+@dataclass(frozen=True)
+class RgbdForm:
+    """How colour and depth become one picture.
+
+    Parameters
+    ----------
+    half:
+        Whether each is halved in width, so that both together have the width of one.
+    white:
+        Whether near or far is white.
+    """
+
+    half: bool = False
+    white: White = "near"
+
+    @property
+    def ending(self) -> str:
+        """The ending of a file's stem that says this form; ``_rgbd`` alone is what the maker's player takes."""
+        return f"_rgbd{'-half' if self.half else ''}{'-far' if self.white == 'far' else ''}"
 
 
-def rgbd_of_name(path: Path) -> tuple[bool, White] | None:
-    """Whether both are halved in width, and what is white; None for other pictures."""
+def rgbd_of_name(path: Path) -> RgbdForm | None:
+    """The form that the name says; None for other pictures."""
     match = _NAME.search(path.stem)
-    return None if match is None else (match[1] is not None, "near" if match[2] is None else "far")
+    return None if match is None else RgbdForm(match[1] is not None, "near" if match[2] is None else "far")

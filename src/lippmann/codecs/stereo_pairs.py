@@ -108,7 +108,7 @@ def _read_jps(path: Path) -> tuple[Photograph, Photograph]:
     if flags & _HALF_HEIGHT:
         first, second = first.repeat(2, axis=0), second.repeat(2, axis=0)
     left, right = (first, second) if flags & _LEFT_FIRST else (second, first)
-    return _view(left, icc, notes), _view(right, icc, notes)
+    return Photograph.of_codes(left, icc, notes), Photograph.of_codes(right, icc, notes)
 
 
 def _descriptor(data: bytes) -> tuple[int, int, int]:
@@ -131,9 +131,5 @@ def _read_mpo(path: Path) -> tuple[Photograph, Photograph]:
         for number in range(2):
             picture.seek(number)
             codes = orientations.upright(codes_of(picture), orientations.of_picture(picture))
-            views.append(_view(codes, picture.info.get("icc_profile") or b"", ()))
+            views.append(Photograph.of_codes(codes, picture.info.get("icc_profile") or b""))
     return views[0], views[1]
-
-
-def _view(codes: Pixels, icc: bytes, notes: tuple[str, ...]) -> Photograph:
-    return Photograph((codes.shape[1], codes.shape[0]), icc, 1, notes, lambda: codes)

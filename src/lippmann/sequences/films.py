@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
+from lippmann.codecs.rgbd_names import RgbdForm
 from lippmann.codecs.types import Pixels
 from lippmann.color.transfer import quantize
 from lippmann.display import Display
@@ -25,7 +26,7 @@ from lippmann.sequences.files import SavedFrame
 from lippmann.sequences.forms import INTEGRAL, QuiltForm
 from lippmann.sequences.frames import Stand, find_stand, hold_exposure, of_frame
 from lippmann.sequences.motion import Motion
-from lippmann.viewing.color_and_depth import RgbdForm, rgbd_codes
+from lippmann.viewing.color_and_depth import rgbd_codes
 from lippmann.viewing.hololuminescent import HEIGHT, WIDTH, for_hololuminescent
 from lippmann.viewing.mp4_film import Codec, codec_for, most_pixels
 from lippmann.viewing.replay import Eye, default_eye, default_size

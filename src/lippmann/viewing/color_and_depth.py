@@ -6,7 +6,6 @@ difference neighbouring views differ, and pictures with such depth are read as p
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from lippmann.codecs.exr import write_exr
 from lippmann.codecs.pfm import write_pfm
 from lippmann.codecs.png import encode_png
-from lippmann.codecs.rgbd_names import White, ending_of_rgbd, rgbd_of_name
+from lippmann.codecs.rgbd_names import RgbdForm, White, rgbd_of_name
 from lippmann.codecs.tiff import write_tiff
 from lippmann.codecs.types import Pixels
 from lippmann.color.transfer import quantize
@@ -27,27 +26,6 @@ from lippmann.viewing.replay import Eye, default_eye, default_size, replay
 
 #: Endings of the files that hold colour beside depth, and depth alone.
 RGBD_FILES, DEPTH_FILES = (".png", ".tif", ".tiff"), (".exr", ".tif", ".tiff", ".png", ".pfm")
-
-
-@dataclass(frozen=True)
-class RgbdForm:
-    """How colour and depth become one picture.
-
-    Parameters
-    ----------
-    half:
-        Whether each is halved in width, so that both together have the width of one.
-    white:
-        Whether near or far is white.
-    """
-
-    half: bool = False
-    white: White = "near"
-
-    @property
-    def ending(self) -> str:
-        """The ending of a file's stem that says this form; ``_rgbd`` alone is what the maker's player takes."""
-        return ending_of_rgbd(self.half, self.white)
 
 
 def distance_seen(image: IntegralImage, eye: Eye | None = None, size: tuple[int, int] | None = None) -> FloatArray:
@@ -139,7 +117,7 @@ def named(path: Path, form: RgbdForm) -> Path:
     said = rgbd_of_name(path)
     if said is None:
         return path.with_name(f"{path.stem}{form.ending}{path.suffix}")
-    if RgbdForm(*said) != form:
+    if said != form:
         raise OutputError("the name says another form", where=str(path), rule=f"this one's ends in {form.ending}")
     return path
 

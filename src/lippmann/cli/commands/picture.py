@@ -277,10 +277,11 @@ def _replay_depth(
     console: Console,
 ) -> None:
     """``lippmann replay --rgbd``."""
+    from lippmann.codecs.rgbd_names import RgbdForm
     from lippmann.image.read import read_picture
     from lippmann.viewing import color_and_depth as rgbd
 
-    how = rgbd.RgbdForm(half=form == "half", white=white)
+    how = RgbdForm(half=form == "half", white=white)
     path = output_of(output, picture, "_depth.exr" if form == "depth" else ".png")
     path = path if form == "depth" else rgbd.named(path, how)
     rgbd.check_depth_path(path, rgbd.DEPTH_FILES if form == "depth" else rgbd.RGBD_FILES)

@@ -15,7 +15,7 @@ from PIL import Image as Pillow
 
 from lippmann.codecs.orientation import lies
 from lippmann.codecs.photograph import open_photograph
-from lippmann.codecs.rgbd_names import White, rgbd_of_name
+from lippmann.codecs.rgbd_names import RgbdForm, rgbd_of_name
 from lippmann.codecs.stereo_pairs import HEIF
 from lippmann.errors import SceneError
 from lippmann.runtime.machine import check_input
@@ -73,7 +73,7 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
         elif form is None:
             own = embedded_depth(data, path.name, turn)
         else:
-            image, own = _color_and_depth(image, *form)
+            image, own = _color_and_depth(image, form)
     if depth_map is None and own is None:
         depth_map = depth_beside(path)
         if depth_map is None:
@@ -104,17 +104,17 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
     return replace(description, notes=[*notes, *description.notes])
 
 
-def _color_and_depth(image: Image, half: bool, white: White) -> tuple[Image, DepthMap]:
+def _color_and_depth(image: Image, form: RgbdForm) -> tuple[Image, DepthMap]:
     """The two halves of a picture whose name says that it has depth beside colour."""
     width = image.pixels.shape[1]
     if width % 2 or image.pixels.shape[2] < 3:
         rule = "colour and depth have one width, in red, green and blue"
         raise SceneError(f"is {width} pixels wide", where=image.name, rule=rule)
     color, depth = np.split(image.pixels[..., :3], 2, axis=1)
-    if half:
+    if form.half:
         color = np.repeat(color, 2, axis=1)
         depth = np.repeat(depth, 2, axis=1)
-    return Image(image.name, np.ascontiguousarray(color)), of_nearness(depth, white, image.name)
+    return Image(image.name, np.ascontiguousarray(color)), of_nearness(depth, form.white, image.name)
 
 
 def depth_beside(photograph: Path) -> Path | None:

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from lippmann.codecs.photograph import Photograph
-from lippmann.codecs.types import Pixels
 from lippmann.errors import PictureError
 from lippmann.runtime.machine import check_input
 from lippmann.runtime.optional_import import check_installed
@@ -43,8 +42,4 @@ def read_heif_pair(path: Path) -> tuple[Photograph, Photograph] | None:
     except (ValueError, RuntimeError, EOFError, KeyError, IndexError, TypeError) as error:
         raise PictureError(f"cannot be decoded ({error})", where=str(path), rule="a HEIF picture") from None
     (first, icc), (second, other_icc) = views
-    return _view(first, icc), _view(second, other_icc)
-
-
-def _view(codes: Pixels, icc: bytes) -> Photograph:
-    return Photograph((codes.shape[1], codes.shape[0]), icc, 1, (), lambda: codes)
+    return Photograph.of_codes(first, icc), Photograph.of_codes(second, other_icc)
