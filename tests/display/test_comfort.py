@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 
 from lippmann.display import load_display
-from lippmann.display.comfort import comfort_in_words, fusion_warning
+from lippmann.display.comfort import FUSED, comfort_in_words, fusion_warning
+from lippmann.display.stereo import depth_of_disparity
 
 MONITOR, PANEL = load_display("odyssey-3d"), load_display("portrait")
 
@@ -28,6 +29,14 @@ MONITOR, PANEL = load_display("odyssey-3d"), load_display("portrait")
 def test_verdicts(back, front, verdict, is_double):
     assert comfort_in_words(MONITOR, back, front).startswith(f"{verdict}: ")
     assert bool(fusion_warning(MONITOR, back, front)) == is_double
+
+
+@pytest.mark.parametrize("beyond", [-1e-5, 0.0, 5e-7, 1e-5])
+def test_verdict_and_warning_agree_at_the_limit(beyond):
+    near, far = depth_of_disparity(*FUSED, MONITOR.viewing_distance, 63.0)
+    for back, front in [(0.0, near + beyond), (far - beyond, 0.0)]:
+        is_double = fusion_warning(MONITOR, back, front) != ""
+        assert comfort_in_words(MONITOR, back, front).startswith("too much to fuse") == is_double
 
 
 def test_a_panel_is_judged_from_its_own_distance():

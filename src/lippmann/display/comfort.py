@@ -15,16 +15,20 @@ FUSED = 1.84, 2.04
 def fusion_warning(display: Display, back: float, front: float) -> str:
     """One line if a scene from z = ``back`` to ``front`` mm has more disparity than eyes fuse; else empty."""
     distance = display.viewing_distance
-    if math.isinf(distance):
+    if math.isinf(distance) or _lies_within(FUSED, display, back, front):
         return ""
     near, far = depth_of_disparity(*FUSED, distance, eyes_of_viewer(display))
-    if far - 1e-6 <= back and front <= near + 1e-6:
-        return ""
     fused = f"{far:.0f} to {near:.0f} mm" if math.isfinite(far) else f"all up to {near:.0f} mm"
     return (
         f"the scene reaches from {back:.0f} to {front:.0f} mm; from {distance:.0f} mm away most eyes fuse {fused}, "
         "what lies beyond is seen double: flatten or shift it"
     )
+
+
+def _lies_within(limits: tuple[float, float], display: Display, back: float, front: float) -> bool:
+    """Whether a scene has at most these crossed and uncrossed degrees of disparity, to a nanometre of depth."""
+    near, far = depth_of_disparity(*limits, display.viewing_distance, eyes_of_viewer(display))
+    return far - 1e-6 <= back and front <= near + 1e-6
 
 
 def eyes_of_viewer(display: Display) -> float:
@@ -41,9 +45,8 @@ def comfort_in_words(display: Display, back: float, front: float) -> str:
     if math.isinf(distance) or front >= distance:
         return ""
     behind, before = (disparity(z, distance, eyes) for z in (back, front))
-    is_fused = before <= FUSED[0] and -behind <= FUSED[1]
-    verdict = "too much to fuse" if not is_fused else "strains"
-    if max(before, -behind) <= COMFORTABLE + 1e-6:
+    verdict = "strains" if _lies_within(FUSED, display, back, front) else "too much to fuse"
+    if _lies_within((COMFORTABLE, COMFORTABLE), display, back, front):
         verdict = "comfortable"
     return (
         f"{verdict}: disparity from {behind:.2f} degrees at the back to {before:.2f} at the front, seen from "
