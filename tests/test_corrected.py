@@ -10,6 +10,7 @@ from lippmann.corrected import finer_display, parts_of
 from lippmann.display import load_display
 from lippmann.errors import DisplayError, UsageError
 from lippmann.optics.correction import LensCorrection, parts_beside
+from lippmann.rendering import session
 from lippmann.scene.placement import Placement
 
 PRINT = "print:lpi=60,ppi=720,size=4x2mm,thickness=26mil,radius=0.2877mm"
@@ -37,9 +38,12 @@ def test_parts_are_means_of_what_lies_within_a_pixel():
 
 
 @pytest.mark.slow
-def test_an_eye_sees_the_corrected_picture_nearer_to_what_rays_meet(engine):
+def test_an_eye_sees_the_corrected_picture_nearer_to_what_rays_meet(engine, monkeypatch):
+    built, build = [], session._build
+    monkeypatch.setattr(session, "_build", lambda *parts: built.append(parts) or build(*parts))
     options = {"integrator": "direct", "method": "full", "denoise": "none", "threads": 1}
     image = lippmann.render("teapot", PRINT, correct="lens", spp=16, **options)
+    assert len(built) == 1
     plain = lippmann.render("teapot", PRINT, spp=16, **options)
     assert image.pixels.shape == plain.pixels.shape
     assert image.provenance.options["correct"] == "lens"

@@ -5,7 +5,6 @@ What is meant is the light in more directions than the display has pixels: the p
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 from lippmann.display import Display
@@ -18,7 +17,6 @@ from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.picture import render_picture
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.session import open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.scene import Scene
 
@@ -42,17 +40,13 @@ def render_corrected(
         rule = "light is corrected for a lens, nothing else"
         raise UsageError(f"beside {what}", parameter="correct", rule=rule, fix="leave one of them out")
     correction = LensCorrection(display, bool(resolved.subpixels))
-    request = replace(request, began=request.began or time.perf_counter())
-    # The display stands where its own depth budget has it.
-    session = open_session(scene, resolved, (display.panel.width, display.panel.height), progress=progress)
     asked = replace(
         request,
-        placement=session.place(display),
         subpixels=bool(resolved.subpixels),
         spp=None if request.spp is None else -(-request.spp // PARTS**2),
     )
-    del session
-    finer = render_picture(scene, finer_display(display), asked, progress)
+    # The display stands where its own depth budget has it.
+    finer = render_picture(scene, finer_display(display), asked, progress, stands_as=display)
     parts = parts_of(finer.pixels)
     pixels = correction.rows(parts)
     told = rows_told(display.panel.height)

@@ -29,9 +29,19 @@ if TYPE_CHECKING:
 
 @exclusive()
 def render_picture(
-    scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback = silent
+    scene: Scene,
+    display: Display,
+    request: RenderRequest,
+    progress: ProgressCallback = silent,
+    *,
+    stands_as: Display | None = None,
 ) -> IntegralImage:
     """Render ``scene`` for ``display`` in one piece.
+
+    Parameters
+    ----------
+    stands_as:
+        A display of the same size, where this one is to stand where that one would.
 
     Raises
     ------
@@ -44,7 +54,7 @@ def render_picture(
     request = resolve(request, scene, display)
     session = open_session(scene, request, (display.panel.width, display.panel.height), progress=progress)
     request = session.request
-    placement = session.place(display)
+    placement = session.place(stands_as or display)
 
     # Mitsuba may be loaded now that the engine has chosen its libraries.
     from lippmann.rendering.film.aov import plan_layers, trace_layers
