@@ -19,7 +19,7 @@ def shared_light(light, normal, height, lens, centers, reach, stop):
 
     A point at height z that pixel q shows through lens C lies at ``q + (C' - C) (1 + g / z)`` under lens C'; the 3 x 3
     pixels there count, as far as they are that lens's. The distance d is a sum of squares: of pixels, of heights in
-    units of a fiftieth of z and half a gap, of normals (10 times), and of light relative to the pixel's own (``stop``
+    units of a fiftieth of z and the gap, of normals (10 times), and of light relative to the pixel's own (``stop``
     times).
     """
     result = np.zeros(light.shape)
@@ -48,7 +48,7 @@ def shared_light(light, normal, height, lens, centers, reach, stop):
                     continue
                 across, down = there[1] + 0.5 - place[0], there[0] + 0.5 - place[1]
                 apart = across**2 + down**2
-                apart += ((float(height[there]) - z) / (0.02 * abs(z) + 0.5 * GAP)) ** 2
+                apart += ((float(height[there]) - z) / (0.02 * abs(z) + GAP)) ** 2
                 apart += 10.0 * np.square(normal[there] - normal[here], dtype=np.float64).sum()
                 apart += stop * np.square(light[there] - light[here]).sum() / (1e-3 + np.square(light[here]).sum())
                 weight = max(0.0, 1 - apart / 10) ** 8

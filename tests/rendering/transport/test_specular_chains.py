@@ -341,7 +341,7 @@ def test_of_many_chains_each_counts_as_a_whole(all_events):
     from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.specular_chains import most_of_chain
 
-    assert 5 < most_of_chain(8.0) < 6
+    assert 4 < most_of_chain(8.0) < 5
     assert 20 < most_of_chain(64.0) < 30
     integrator, source = all_events
     four = chained(integrator, 4)

@@ -28,6 +28,8 @@ from lippmann.progress import Progress
 from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from lippmann.calibration.finish import Finish
     from lippmann.display import Display
     from lippmann.image import IntegralImage
@@ -100,7 +102,8 @@ def render(
     )
     source = SceneSource(scene, asked, light, access)
     on_cluster = clusters.Cluster(on)
-    rendered, traced = render_picture, target
+    rendered: Callable[..., IntegralImage] = render_picture
+    traced = target
     if correct == "lens":
         from lippmann.corrected import finer_display, render_corrected
 

@@ -19,12 +19,14 @@ SMALLEST_LANES = 1 << 14
 #: Batches of samples where the memory allows: their number limits how well rare bright light is told from steady noise.
 MOST_BATCHES = 8
 
+#: Three numbers in single precision: linear RGB.
+COLORS = 12
 #: The picture, and the copy that a file writer makes of it.
-PICTURE = 24
+PICTURE = COLORS + COLORS
 #: The squared error of each pixel, its outliers' share and its blur.
-ERROR_MAPS = 12
+ERROR_MAPS = COLORS
 #: What a denoiser treats apart: seen light of two halves, its excess, and coverage of two halves by channels.
-FOR_DENOISER = 60
+FOR_DENOISER = PICTURE + COLORS + PICTURE
 #: One emission of photons, which lands about once, with what sorting takes, in bytes.
 PHOTON = 128
 #: One ray from an emitter to a light vertex, with what it takes to trace it, in bytes.
@@ -42,7 +44,7 @@ DENOISER, NETWORK_MOST = 600, 600 << 20
 
 def batches(number: int) -> int:
     """Bytes per pixel of a picture kept in so many batches: their sums, the picture and its errors."""
-    return number * PICTURE // 2 + PICTURE + ERROR_MAPS
+    return number * COLORS + PICTURE + ERROR_MAPS
 
 
 def photons(emissions: int, passes: int) -> int:

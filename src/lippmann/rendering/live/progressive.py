@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.sobol import named_seed
+from lippmann.rendering.adaptive.tuning import TUNING as ADAPTIVE
 from lippmann.rendering.denoise.noisy_blend import weigh_samples
 from lippmann.rendering.denoise.oidn import denoise
+from lippmann.rendering.denoise.tuning import TUNING as DENOISE
 from lippmann.rendering.film.batched_picture import STREAMS
 from lippmann.rendering.live.develop import develop, develop_picture
 from lippmann.rendering.live.live_tracer import Lanes
@@ -29,8 +31,6 @@ Floats = NDArray[np.float32]
 _STEP_SECONDS = 0.06
 #: Most samples per pixel: the noise is then below one code.
 _MOST_SAMPLES = 1 << 14
-#: Samples of the feature buffers, and least samples per pixel for denoising by halves.
-_FEATURE_SAMPLES, _JUDGED_FROM = 8, 8
 
 
 class Progressive:
@@ -99,11 +99,11 @@ class Progressive:
         started = time.perf_counter()
         tracer = self._kernels.feature_tracer(self._view.display, self._view.request)
         albedo, normal = np.empty((2, self._count, 3), np.float32)
-        step, seed = self._kernels.most_lanes // _FEATURE_SAMPLES, named_seed("guides", self._view.request.seed)
+        step, seed = self._kernels.most_lanes // DENOISE.guide_samples, named_seed("guides", self._view.request.seed)
         for start in range(0, self._count, step):
-            lanes = Lanes(self._pixels, slice(start, start + step), samples=_FEATURE_SAMPLES)
+            lanes = Lanes(self._pixels, slice(start, start + step), samples=DENOISE.guide_samples)
             albedo[lanes.part], normal[lanes.part] = tracer.trace(lanes, self._view.placed, seed=seed)
-        self._features = albedo / np.float32(_FEATURE_SAMPLES), normal / np.float32(_FEATURE_SAMPLES)
+        self._features = albedo / np.float32(DENOISE.guide_samples), normal / np.float32(DENOISE.guide_samples)
         seconds["features"] = time.perf_counter() - started
 
     def _denoise(self, seconds: dict[str, float]) -> LiveFrame | None:
@@ -145,7 +145,7 @@ def _denoised(
     """
     albedo, normal = guides
     mean = np.asarray((noisy[0] + noisy[1]) / 2, np.float32)
-    if samples < _JUDGED_FROM:
+    if samples < ADAPTIVE.first_denoised:
         yield denoise(mean, albedo, normal, effort="fast", threads=threads)
         return
     clean = []

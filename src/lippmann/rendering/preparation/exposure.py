@@ -18,6 +18,7 @@ from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.ray_source import ChosenRays, RaySource
+from lippmann.rendering.transport.tuning import TUNING as TRANSPORT
 from lippmann.scene.values.description import Color
 
 
@@ -45,10 +46,10 @@ def measure_exposure(
     columns, rows = (
         (2 * np.arange(count) + 1) * length // (2 * count)
         for length in (source.width, source.height)
-        for count in [min(TUNING.exposure_side, length)]
+        for count in [min(TRANSPORT.probe_side, length)]
     )
     few = ChosenRays(source, *np.meshgrid(columns, rows))
-    plan = cut_wavefronts(few.width, few.height, TUNING.exposure_samples, channels=few.channels, memory=memory)
+    plan = cut_wavefronts(few.width, few.height, 1, channels=few.channels, memory=memory)
     return exposure_for(trace_frame(integrator, few, plan, seed=seed, box_filter=True).pixels, background)
 
 

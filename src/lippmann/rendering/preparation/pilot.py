@@ -22,15 +22,14 @@ from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream, named_seed
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, Float, MitsubaScene, Point2f, Point3f, Ray3f, UInt32
 from lippmann.rendering.preparation.tuning import TUNING
+from lippmann.rendering.transport.depth_probe import NEAR_SHARE
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler, WeightedLightSampler
 from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.path_vertex import DIMENSIONS
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource
 from lippmann.rendering.transport.sharp_events import sharp_lobe
 from lippmann.rendering.transport.specular_chains import specular_light
 from lippmann.rendering.transport.tuning import TUNING as TRANSPORT
-
-#: Dimensions of the sample stream at one surface.
-DIMENSIONS_PER_SURFACE = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +72,7 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
     if all(each.is_environment() for each in lights):
         return Pilot(np.zeros(count), np.zeros(1), 0, None)
     emitters = count if 0 < count <= TUNING.most_weighed_emitters else 1
-    paths = max(TUNING.pilot_paths // emitters, TUNING.pilot_paths_of_emitter)
+    paths = TRANSPORT.rays_of_each(emitters)
     lane = dr.arange(mi.UInt32, paths * emitters)
     emitter, path = divide(lane, dr.opaque(mi.UInt32, paths))
     stream, column, row, jitter = _place_of(path, source)
@@ -136,7 +135,7 @@ def _region_about(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Corners ``(2, 3)`` of a box about points ``(n, 3)`` that are seen; None where there are none."""
     if not len(points):
         return None
-    corners: NDArray[np.float64] = np.quantile(points, [TUNING.apart, 1 - TUNING.apart], axis=0)
+    corners: NDArray[np.float64] = np.quantile(points, [NEAR_SHARE, 1 - NEAR_SHARE], axis=0)
     middle, size = corners.mean(axis=0), np.ptp(corners, axis=0)
     reach = (0.5 + TUNING.wider) * size + TUNING.wider * size.max()
     return np.stack([middle - reach, middle + reach])
@@ -168,7 +167,7 @@ def _contributions(
         hit = dr.select(surface == 0, active, hit)
         point = dr.select((surface == 0) & active, si.p, point)
         bsdf = si.bsdf(toward)
-        dimension = surface * DIMENSIONS_PER_SURFACE + 1
+        dimension = surface * DIMENSIONS + 1
         # Under uniform sampling each emitter has an equal part of the unit interval.
         uniform = stream.next_2d(dimension)
         uniform.x = (mi.Float(emitter) + uniform.x) / emitters
@@ -186,5 +185,5 @@ def _contributions(
         onward = si.spawn_ray(si.to_world(bs.wo))
         o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
         surface += 1
-        active &= (dr.max(throughput) > 0) & (surface < min(integrator.depth, TUNING.pilot_surfaces))
+        active &= (dr.max(throughput) > 0) & (surface < min(integrator.depth, TRANSPORT.roulette_depth))
     return squares, indirect, hit, point

@@ -14,17 +14,12 @@ class PreparationTuning:
     chains:
         Chains of seen light with each path of a denoised picture. With 3, pictures of 16 samples lose up to 0.2 dB, and
         1.0 dB of primitives; with 2 up to 0.5 dB, and primitives 1 dB (docs/research/seen-light.md).
-    pilot_paths, pilot_paths_of_emitter, pilot_chains:
-        Paths of the pilot, in all, and of each emitter at least; and its chains (0.1 s), of which one meets a spot of a
-        20 000th of the picture in 19 cases of 20.
-    pilot_surfaces:
-        Surfaces along such a path at which emitters are sampled.
+    pilot_chains:
+        Chains of the pilot (0.1 s), of which one meets a spot of a 20 000th of the picture in 19 cases of 20.
     most_weighed_emitters:
         Scenes of more emitters are sampled uniformly.
     mid_grey:
         Linear radiance that the median of what is lit gets: photographic mid-grey.
-    exposure_side, exposure_samples:
-        Pixels looked at for the exposure along each side of the picture, and samples of each.
     exposure_block:
         Pixels along each side of a block, whose mean counts: single pixels are too dark where few paths find the light.
     bright_indirect, most_indirect:
@@ -35,26 +30,19 @@ class PreparationTuning:
         Samples per pixel that one pass of photons, or one set of light vertices, serves.
     kept_share:
         Share of the memory for photons of passes that tiles and bands ask for in turn.
-    apart, wider:
-        Share of the first hits of the pilot's rays that may lie apart from the others, to either side; and by how much
-        of its size the box about the others is widened.
+    wider:
+        Share of its size by which the box about the first hits of the pilot's rays is widened, and of its longest side.
     """
 
     chains: int = 4
-    pilot_paths: int = 1 << 14
-    pilot_paths_of_emitter: int = 1 << 8
     pilot_chains: int = 1 << 16
-    pilot_surfaces: int = 3
     most_weighed_emitters: int = 1 << 10
     mid_grey: float = 0.18
-    exposure_side: int = 64
-    exposure_samples: int = 4
-    exposure_block: int = 8
+    exposure_block: int = 16
     bright_indirect: float = 1e-3
     most_indirect: float = 4.0
     pass_samples: int = 16
     kept_share: float = 0.25
-    apart: float = 0.002
     wider: float = 0.25
 
 

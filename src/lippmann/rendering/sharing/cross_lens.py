@@ -131,7 +131,7 @@ class _Picture:
         is_surface = (normal != 0).x | (normal != 0).y | (normal != 0).z
         is_flat = dr.abs(z) < 1e-3 * self._gap  # seen by one lens alone
         shift = dr.select(is_flat, 1, 1 + self._gap / z)
-        per_height = 1 / (dr.abs(z) * TUNING.of_height + self._gap * TUNING.of_gap)
+        per_height = 1 / (dr.abs(z) * TUNING.of_height + self._gap)
         per_light = self._stop / (1e-3 + dr.squared_norm(light))  # finite in the dark
         # Lenses to either side that see the point, at most.
         seen_by = dr.select(is_flat, 0, mi.Int32(dr.minimum(dr.abs(z) / self._gap + 2, 1e6)))

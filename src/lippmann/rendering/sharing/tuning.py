@@ -22,8 +22,8 @@ class SharingTuning:
     stop:
         Weight of a squared relative difference of light: between 30 and 200 it moves the PSNR of the bundled scenes by
         less than 0.5 dB (docs/research/pooled-light.md).
-    of_height, of_gap:
-        Heights count as alike within this share of the height and of the gap.
+    of_height:
+        Heights count as alike within this share of the height, and the gap.
     view_reach:
         How far light is fetched across views, in radians between cameras; farther, highlights are smeared.
     other_normal:
@@ -36,7 +36,6 @@ class SharingTuning:
     faded: float = 10.0
     stop: float = 60.0
     of_height: float = 0.02
-    of_gap: float = 0.5
     view_reach: float = 0.07
     other_normal: float = 0.19
     view_pixels: float = 2.0

@@ -24,12 +24,6 @@ from lippmann.device.types import (
 )
 from lippmann.rendering.transport.tuning import TUNING
 
-#: A hit is the sampled point on the caster if it lies within this share of the emitter's distance, and the normals
-#: agree to this cosine (the back of a thin body does not).
-_SAME_POINT, _SAME_SIDE = 1e-5, 0.5
-#: Margin of the boxes around shapes without surface sampling, in diagonals.
-_MARGIN = 1e-3
-
 
 @dataclass(frozen=True, eq=False)
 class Casters:
@@ -118,7 +112,7 @@ def _may_be_sharp(bsdf: mi.BSDF) -> bool:
 def _box_about(shape: mi.Shape) -> NDArray[np.float64]:
     found = shape.bbox()
     low, high = np.array(found.min, dtype=float).ravel(), np.array(found.max, dtype=float).ravel()
-    margin = _MARGIN * float(np.linalg.norm(high - low))
+    margin = TUNING.rounding * float(np.linalg.norm(high - low))
     return np.concatenate([low - margin, high + margin])
 
 
@@ -171,8 +165,9 @@ class CasterPoints:
 
     def is_met(self, si: SurfaceInteraction3f, distance: Float) -> Bool:
         """Whether ``si`` is the sampled caster (point), seen from an emitter at ``distance``."""
-        near = dr.squared_norm(si.p - self.p) < dr.square(_SAME_POINT * distance)
-        near &= dr.dot(si.n, self._n) > _SAME_SIDE
+        near = dr.squared_norm(si.p - self.p) < dr.square(TUNING.rounding * distance)
+        # The back of a thin body is not met.
+        near &= dr.dot(si.n, self._n) > TUNING.least_agreement
         return dr.select(self._boxed, (si.instance == self._shape) | (si.shape == self._shape), near)
 
 

@@ -25,8 +25,6 @@ from lippmann.rendering.transport.photon_shooter import PhotonShooter
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.tuning import TUNING
 
-#: Emissions of the pilot for each emitter and caster, at most and at least.
-MOST_OF_PAIR, FEWEST_OF_PAIR = 4096, 64
 #: Emissions of each half over the two-thirds power of the samples. An emission may take as long as two paths
 #: (``benchmarks/photon_share.py``).
 OF_POWER = 6
@@ -119,7 +117,7 @@ class CausticPhotons:
         """Share of the emissions of each pair, by the root second moment of its photons' flux; None for no photons."""
         if casters.pairs == 0:
             return None
-        count = min(max(self._emissions // casters.pairs, FEWEST_OF_PAIR), MOST_OF_PAIR) * casters.pairs
+        count = min(TUNING.rays_of_each(casters.pairs) * casters.pairs, self._emissions)
         even = np.full(casters.pairs, 1 / casters.pairs)
         photons, pair = self._shooter.shoot(count, even, named_seed("pilot of photons", self._seed))
         is_visible = are_inside(photons.position, self._region)

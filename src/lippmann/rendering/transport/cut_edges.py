@@ -15,6 +15,7 @@ from lippmann.device.pbr.half_stopped import half_stopped_by
 from lippmann.display import Display
 from lippmann.display.view_cone import size_seen, zone_slopes
 from lippmann.rendering.transport.depth_probe import Reals, first_hits
+from lippmann.rendering.transport.tuning import TUNING
 from lippmann.scene.matrices import inverse, transform_points
 from lippmann.scene.values.description import Matrix
 
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from lippmann.device.whitted.scene import BuiltClassic
 
 SIDES = ("left", "right", "bottom", "top")
-#: Rays along each side of the panel, of each view.
-_RAYS = 256
 
 
 @dataclass(frozen=True)
@@ -69,8 +68,9 @@ def find_cut_edges(
 
 def _edge(display: Display) -> Reals:
     """Points ``(side, ray, 2)`` of the lens plane half a pixel within the panel's edge, in mm."""
+    rays = TUNING.probe_side
     half_width, half_height = (np.array(size_seen(display)) - display.panel.pixel_pitch) / 2.0
-    along = (np.arange(_RAYS) + 0.5) * (2.0 / _RAYS) - 1.0
-    upright = [np.stack([np.full(_RAYS, x), along * half_height], axis=-1) for x in (-half_width, half_width)]
-    level = [np.stack([along * half_width, np.full(_RAYS, y)], axis=-1) for y in (-half_height, half_height)]
+    along = (np.arange(rays) + 0.5) * (2.0 / rays) - 1.0
+    upright = [np.stack([np.full(rays, x), along * half_height], axis=-1) for x in (-half_width, half_width)]
+    level = [np.stack([along * half_width, np.full(rays, y)], axis=-1) for y in (-half_height, half_height)]
     return np.stack([*upright, *level])

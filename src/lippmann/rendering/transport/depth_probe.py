@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lippmann.rendering.transport.first_surface import make_surfaces
 from lippmann.rendering.transport.ray_source import world_ray
+from lippmann.rendering.transport.tuning import TUNING
 from lippmann.scene.camera_placement import CameraView, VisibleDepth
 from lippmann.scene.matrices import inverse, transform_points
 from lippmann.scene.values.description import Matrix
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 
 Reals = NDArray[np.float64]
 
-#: Rays along each side of the view.
-SIDE = 128
 #: Quantiles of the hit distances that count as the near and the far depth, robust against a few pixels and against a
 #: floor that runs to the horizon.
 NEAR_SHARE, FAR_SHARE = 0.01, 0.9
@@ -30,8 +29,9 @@ NEAR_SHARE, FAR_SHARE = 0.01, 0.9
 
 def probe_depth(built: BuiltScene | BuiltClassic, view: CameraView) -> VisibleDepth | None:
     """Near and far depth of ``view`` along the camera's axis in world units; None if no ray hits."""
-    across = (np.arange(SIDE) + 0.5) * (2 / SIDE) - 1
-    plane = np.zeros((SIDE, SIDE, 3))
+    side = TUNING.probe_side
+    across = (np.arange(side) + 0.5) * (2 / side) - 1
+    plane = np.zeros((side, side, 3))
     plane[..., 0], plane[..., 1] = across * view.half_width, across[:, None] * view.half_height
     toward = np.array((0.0, 0.0, -1.0))
     origins, directions = (plane, toward) if view.is_parallel else (np.zeros(3), plane + toward)

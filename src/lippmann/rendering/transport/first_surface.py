@@ -33,18 +33,17 @@ from lippmann.device.whitted.background_fog import background_color
 from lippmann.device.whitted.geometry import NONE
 from lippmann.device.whitted.scene import BuiltClassic
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
+from lippmann.rendering.transport.sharp_events import MOST_EVENTS
 
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
 
 #: Surfaces with a null transmittance above this are skipped, as if they were not there.
 MAX_NULL_TRANSMITTANCE = 0.5
-#: Specular surfaces along one ray, at most.
-MAX_SPECULAR_SURFACES = 8
 #: Distance of the environment, in units of the scene.
 ENVIRONMENT_DISTANCE = 1e6
-#: Sample at the middle of a lobe, just below 0.5, at which surfaces of opacity 0.5 count as opaque.
-_MIDDLE = 0.49
+#: Sample at the middle of a lobe, so that surfaces up to that null transmittance count as opaque here, too.
+_MIDDLE = float(np.nextafter(np.float32(MAX_NULL_TRANSMITTANCE), np.float32(0)))
 
 
 @dataclass
@@ -182,7 +181,7 @@ class PhysicalSurfaces:
             may_be_specular = _has_specular_lobe(bsdf.flags())
             bs, weight = _central_sample(si, bsdf, hit & may_be_specular)
             specular = _has_specular_lobe(bs.sampled_type)
-            continues = hit & specular & (steps < MAX_SPECULAR_SURFACES) & (dr.max(weight) > 0)
+            continues = hit & specular & (steps < MOST_EVENTS) & (dr.max(weight) > 0)
             albedo = dr.select(active & ~continues, color, albedo)
             normal = dr.select(active & ~continues & hit, mi.Vector3f(_normal(si, bsdf, hit)), normal)
             distance += dr.select(active, dr.select(hit, si.t, ENVIRONMENT_DISTANCE), 0)

@@ -42,7 +42,7 @@ from lippmann.rendering.transport.path_techniques import (
     Techniques,
     WithoutSpecularLight,
 )
-from lippmann.rendering.transport.path_vertex import LastVertex, Scattering, Vertex
+from lippmann.rendering.transport.path_vertex import DIMENSIONS, LastVertex, Scattering, Vertex
 from lippmann.rendering.transport.path_weights import (
     Clamp,
     first_emitter_samples,
@@ -53,9 +53,6 @@ from lippmann.rendering.transport.prepared_light import PreparedLight
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS, ShadowRays
 from lippmann.rendering.transport.tuning import TUNING
-
-#: Sample dimensions used at one vertex.
-DIMENSIONS_PER_VERTEX = 4
 
 
 class PathIntegrator:
@@ -167,7 +164,7 @@ class PathIntegrator:
 
             # ---- next-event estimation ----
             continues = si.is_valid() & (depth < self.depth)
-            dimension = (depth * 2 + crossings) * DIMENSIONS_PER_VERTEX + 1
+            dimension = (depth * 2 + crossings) * DIMENSIONS + 1
             vertex = Vertex(si, bsdf, d, depth, continues, throughput, stream, dimension, states)
             radiance, shadow = techniques.arrive(vertex, radiance, shadow)
             samples, number = self._emitter_samples(stream.index, all_specular)

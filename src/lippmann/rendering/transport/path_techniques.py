@@ -31,9 +31,6 @@ from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.sharp_events import MOST_EVENTS, facing_normal, is_sharp, lambertian_share
 from lippmann.rendering.transport.tuning import TUNING
 
-#: Sample dimension, from a vertex's first, of the photon chosen there, and of the light vertex that it is joined to.
-GATHER_DIMENSION, JOIN_DIMENSION = 1 << 24, 1 << 25
-
 
 class Technique:
     """A technique that does nothing.
@@ -153,7 +150,7 @@ class PhotonGathering(Technique):
             vertex.lobe,
             mi.UInt32(stream.half),
             self._depth - vertex.depth - 1,
-            stream.next_1d(vertex.dimension + GATHER_DIMENSION),
+            stream.next_1d(vertex.dimension + 4),
             state.is_seen,
             lands,
             stream.key + stream.index,
@@ -254,7 +251,7 @@ class LightVertexJoins(Technique):
 
     def arrive(self, state: _Joint, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
         vertex.arrival = self._arrival(state, vertex)
-        choice = vertex.stream.next_1d(vertex.dimension + JOIN_DIMENSION)
+        choice = vertex.stream.next_1d(vertex.dimension + 5)
         half = mi.UInt32(vertex.stream.half)
         light, tests = self._vertices.join(
             vertex.si, vertex.bsdf, choice, half, self._joins(vertex), not self._has_absorption

@@ -24,6 +24,9 @@ from lippmann.device.types import (
 from lippmann.rendering.transport.light_vertices import Arrival
 from lippmann.rendering.transport.sharp_events import follows_sharply, has_wide_lobes, lambertian, sharp_lobe
 
+#: Sample dimensions of one vertex of any path, chain or photon: none of them uses more.
+DIMENSIONS = 8
+
 
 @dataclass
 class LastVertex:

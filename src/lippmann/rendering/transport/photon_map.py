@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import upload
+from lippmann.device.sobol import SEED_STEP
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, Color3f, Float, Point3f, SurfaceInteraction3f, UInt32, Vector3f
 from lippmann.rendering.transport.sharp_events import is_sharp
@@ -25,12 +26,11 @@ Floats = NDArray[np.float32]
 
 #: Lower bounds of the area of a plane in a cell: slope of the plane, and area in faces of the cell.
 _LEAST_SLOPE, _LEAST_AREA = 0.01, 0.05
-_PRIMES = (73856093, 19349663, 83492791)
+#: Odd factors of the coordinates of a cell in its hash.
+_FACTORS = tuple(pow(SEED_STEP, power, 1 << 32) for power in range(1, 4))
 #: Bitmap of wide cells with photons in reach: bits per bucket, fewest bits in all, and width of a wide cell in radii.
 #: One look-up in fifty then finds no photon.
 _NEAR_BITS, _FEWEST_BITS, _NEAR_WIDTH = 16, 1 << 10, 4
-#: Reach of a photon in radii: the radius of a look-up, and rounding.
-_IN_REACH = 1.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,13 +264,13 @@ class PhotonMap:
 
 def _mixed(cell: NDArray[np.uint32]) -> NDArray[np.uint32]:
     """``(n,)``: hashes of cells ``(n, 3)``."""
-    x, y, z = (cell[:, axis] * np.uint32(prime) for axis, prime in enumerate(_PRIMES))
+    x, y, z = (cell[:, axis] * np.uint32(factor) for axis, factor in enumerate(_FACTORS))
     return np.asarray(x ^ y ^ z, dtype=np.uint32)
 
 
 def _mixed_number(cell: Point3f) -> UInt32:
     """:func:`_mixed` on the device."""
-    x, y, z = (mi.UInt32(mi.Int32(part)) * prime for part, prime in zip(cell, _PRIMES, strict=True))
+    x, y, z = (mi.UInt32(mi.Int32(part)) * factor for part, factor in zip(cell, _FACTORS, strict=True))
     return x ^ y ^ z
 
 
@@ -278,7 +278,7 @@ def _mark_near(near: NDArray[np.bool_], position: Floats, radius: float) -> None
     """Mark the hashes of the wide cells that hold points with photons in reach."""
     width = np.float32(_NEAR_WIDTH) * np.float32(radius)
     for corner in itertools.product((-1, 1), repeat=3):
-        cell = np.floor((position + np.float32(_IN_REACH * radius) * np.array(corner, np.float32)) / width)
+        cell = np.floor((position + np.float32((1 + TUNING.rounding) * radius) * np.array(corner, np.float32)) / width)
         near[_mixed(cell.astype(np.int32).astype(np.uint32)) & np.uint32(len(near) - 1)] = True
 
 

@@ -23,6 +23,7 @@ from lippmann.device.types import (
     Vector3f,
 )
 from lippmann.rendering.transport.casters import CasterPoints, Casters
+from lippmann.rendering.transport.path_vertex import DIMENSIONS
 from lippmann.rendering.transport.photon_map import Photons
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.sharp_events import (
@@ -33,15 +34,10 @@ from lippmann.rendering.transport.sharp_events import (
     lambertian,
     sharp_lobe,
 )
+from lippmann.rendering.transport.tuning import TUNING
 
-#: Straight-through surfaces on the way of a photon, at most.
-_MOST_CROSSINGS = 4
 #: Emissions of one kernel.
 _LANES = 1 << 18
-#: How far a ray goes on behind a straight-through surface, relative to its coordinates.
-_CLEARANCE = 1e-4
-#: Dimensions of the sample stream before the first surface, and at each.
-_EMISSION_DIMENSIONS, _DIMENSIONS = 3, 2
 
 
 class PhotonShooter:
@@ -96,7 +92,7 @@ class PhotonShooter:
             return Photons.dark(0), np.zeros(0, np.int64)
         o, d, power = (dr.gather(type(each), each, lit) for each in (o, d, power))
         stream = SampleStream(stream.key, dr.gather(mi.UInt32, index, lit))
-        surfaces = MOST_EVENTS + (_MOST_CROSSINGS if features.has_null else 0)
+        surfaces = MOST_EVENTS + (MOST_EVENTS if features.has_null else 0)
         landed = _Landed(dr.width(lit), surfaces)
         self._follow(mi.Ray3f(o, d), power, mi.Bool(True), stream, landed, surfaces)
         photons, lanes_of_photons = landed.photons()
@@ -111,13 +107,13 @@ class PhotonShooter:
         # From the emitter to the point: tests visibility, and finds the surface there.
         ray = mi.Ray3f(point.p + ds.d * (ds.dist * (1 - 1e-3)), -ds.d)
         si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
-        for _ in range(_MOST_CROSSINGS if self._features.has_null else 0):
+        for _ in range(MOST_EVENTS if self._features.has_null else 0):
             other = active & si.is_valid() & ~point.is_met(si, ds.dist)
             through = si.bsdf(ray).eval_null_transmission(si, other)
             power = dr.select(other, power * through, power)
             active &= ~other | (dr.max(through) > 0)
             # Along the ray, not along the normal as the engine's own offset is: it is to end at the point.
-            step = _CLEARANCE * (1 + dr.max(dr.abs(si.p)))
+            step = TUNING.rounding * (1 + dr.max(dr.abs(si.p)))
             ray = dr.select(other, mi.Ray3f(si.p + ray.d * step, ray.d), ray)
             again = scene.ray_intersect(ray, mi.RayFlags.All, False, other & active)
             si = dr.select(other, again, si)
@@ -144,7 +140,7 @@ class PhotonShooter:
             landed.note(si, power, events, turn, active & (events > 0))
             active &= turn < surfaces
             o, d, power, events, absorption, active = self._next_ray(
-                si, power, events, absorption, active, stream, _EMISSION_DIMENSIONS + _DIMENSIONS * turn
+                si, power, events, absorption, active, stream, DIMENSIONS * (turn + 1)
             )
             turn += 1
 

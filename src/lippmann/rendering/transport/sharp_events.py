@@ -20,7 +20,8 @@ from lippmann.device.pbr.gltf_bsdf import LAMBERTIAN, SHARP_LOBE, WIDE_LOBES
 from lippmann.device.types import Bool, BSDFPtr, BSDFSample3f, Color3f, SurfaceInteraction3f, Vector3f
 from lippmann.rendering.transport.tuning import TUNING
 
-#: Sharp events between an emitter and a caustic, at most; light of more is left to paths.
+#: Sharp events between an emitter and a caustic, straight-through surfaces beside them, and specular surfaces in front
+#: of one whose features a denoiser gets, at most; light of more is left to paths.
 MOST_EVENTS = 6
 
 

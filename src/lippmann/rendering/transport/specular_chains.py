@@ -38,16 +38,11 @@ from lippmann.device.types import (
 )
 from lippmann.rendering.transport.integrator import FirstHit, PixelSample, RayCounts
 from lippmann.rendering.transport.path import PathIntegrator
-from lippmann.rendering.transport.path_vertex import LastVertex, Scattering, Vertex
+from lippmann.rendering.transport.path_vertex import DIMENSIONS, LastVertex, Scattering, Vertex
 from lippmann.rendering.transport.ray_source import PixelRays
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import follows_sharply, is_sharp
 from lippmann.rendering.transport.tuning import TUNING
-
-#: Sample dimensions used at one vertex.
-_DIMENSIONS_PER_VERTEX = 2
-#: Sample dimension, from a vertex's first, of the delta emitter that is sampled there.
-_EMITTER_DIMENSION = 1 << 24
 
 
 def sample_pixel(
@@ -81,7 +76,7 @@ def _covered(hit: FirstHit) -> Float:
 
 def most_of_chain(chains: Float) -> Float:
     """Largest contribution of one of ``chains`` chains of a pixel that is no excess; linear, white is 1."""
-    return TUNING.most_of_chain * chains**TUNING.most_power
+    return chains**TUNING.most_power
 
 
 @syntax
@@ -160,12 +155,12 @@ def _chain(
         emission = integrator.emission(si, last, depth, techniques, states, mi.UInt32(0))
         light += integrator.limited(throughput * emission, depth)
 
-        dimension = (depth * 2 + crossings) * _DIMENSIONS_PER_VERTEX + 1
+        dimension = (depth * 2 + crossings) * DIMENSIONS + 1
         continues = active & si.is_valid() & (depth < integrator.depth)
         vertex = Vertex(si, bsdf, d, depth, continues, throughput, stream, dimension, states)
         continues &= _has_no_width(bsdf) | (dr.squared_norm(vertex.lobe) > 0)
         if dr.hint(len(integrator.without_size) > 0, mode="scalar"):
-            point = stream.next_2d(dimension + _EMITTER_DIMENSION)
+            point = stream.next_2d(dimension + 2)
             drawn, tests = _without_size(integrator, si, bsdf, vertex.lobe, point, continues)
             light += integrator.limited(throughput * drawn, depth + 1)
             shadow += tests

@@ -11,24 +11,29 @@ class TransportTuning:
 
     Attributes
     ----------
+    probe_side:
+        Rays along each side of the pictures by which a scene is probed: for depths, for the panel's edges and for the
+        exposure; the pilots have as many rays as such a picture, and each emitter or pair at least as many as a side.
+    rounding:
+        Relative error of places that counts as rounding of single precision.
     roulette_depth:
         Surfaces after which Russian roulette may end a path.
     early_emitter_samples, later_emitter_samples, early_samples:
         Emitter samples at the first surface of a path that is not purely specular: ``early_emitter_samples`` in each of
         a pixel's first ``early_samples`` samples, then ``later_emitter_samples``. Powers of two keep all points
         stratified.
-    most_of_chain, most_power:
-        Linear value of a pixel, white being 1, up to which a chain of seen light counts that is its only one; of more
-        chains one counts for as much more as this power of their number says. Without the limit, primitives lose 1.5 dB
-        with 16 samples (docs/research/seen-light.md).
+    most_power:
+        A chain of seen light counts up to white where it is its pixel's only one; of more chains one counts for as much
+        more as this power of their number says. Without the limit, primitives lose 1.5 dB with 16 samples
+        (docs/research/seen-light.md).
     least_cosine_angle:
         Radians between half vector and normal up to which a reflection is sharp: 2.5 times the width of the widest lobe
         that counts as narrow.
     small_emitter:
         Emitters are small whose area is less than this part of the square of the scene's diagonal.
     least_agreement, farthest_from_plane:
-        The least cosine between the normals of a photon and of the point that it is looked up at, and how far it may
-        lie from the tangent plane there, in radii.
+        The least cosine between the normals of a photon and of the point that it is looked up at, or of a sampled point
+        and the hit there; and how far a photon may lie from the tangent plane of that point, in radii.
     steepest:
         Limit on what interpolated normals may add to light that grazes the true surface.
     photons_of_cell:
@@ -42,11 +47,12 @@ class TransportTuning:
         Scenes of more emitters are left to paths: each has a start of its own in the kernel of rays.
     """
 
+    probe_side: int = 128
+    rounding: float = 1e-4
     roulette_depth: int = 5
     early_emitter_samples: int = 4
     later_emitter_samples: int = 2
     early_samples: int = 4
-    most_of_chain: float = 1.2
     most_power: float = 0.75
     least_cosine_angle: float = 0.05
     small_emitter: float = 1e-3
@@ -57,6 +63,10 @@ class TransportTuning:
     light_vertices: int = 1 << 16
     uniform_share: float = 0.1
     most_vertex_emitters: int = 1 << 6
+
+    def rays_of_each(self, kinds: int) -> int:
+        """Rays of a pilot for each of so many emitters, or pairs of an emitter and a caster."""
+        return max(self.probe_side**2 // kinds, self.probe_side)
 
 
 TUNING = TransportTuning()

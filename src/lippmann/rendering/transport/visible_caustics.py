@@ -8,7 +8,8 @@ import mitsuba as mi
 from lippmann.device.sobol import SampleStream
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, BSDFPtr, Ray3f, Spectrum, SurfaceInteraction3f, UInt32, Vector3f
-from lippmann.rendering.transport.path import DIMENSIONS_PER_VERTEX, PathIntegrator
+from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.path_vertex import DIMENSIONS
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import (
@@ -47,7 +48,7 @@ class VisibleBlur:
             lobe = sharp_lobe(si, bsdf, active)
             added += throughput * self._light(si, bsdf, lobe, depth, stream, active)
 
-            dimension = (depth * 2 + crossings) * DIMENSIONS_PER_VERTEX + 1
+            dimension = (depth * 2 + crossings) * DIMENSIONS + 1
             bs, weight = bsdf.sample(context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), active)
             active &= follows_sharply(si, lobe, bs)
             throughput *= weight

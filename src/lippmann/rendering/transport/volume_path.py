@@ -16,7 +16,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.pbr.media import surrounding_medium
-from lippmann.device.sobol import SampleStream
+from lippmann.device.sobol import SampleStream, hash32
 from lippmann.device.syntax import syntax
 from lippmann.device.types import (
     Bool,
@@ -31,6 +31,7 @@ from lippmann.device.types import (
 )
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
+from lippmann.rendering.transport.path_vertex import DIMENSIONS
 from lippmann.rendering.transport.path_weights import mis_weight, roulette_survival
 from lippmann.rendering.transport.scene_features import Color
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
@@ -38,10 +39,6 @@ from lippmann.rendering.transport.tuning import TUNING
 
 #: Collisions, null collisions included, along one path or shadow ray: bounds the loop in media that are all but opaque.
 MAX_COLLISIONS = 1 << 16
-#: Sample dimensions used at one event: a collision or a surface.
-DIMENSIONS_PER_EVENT = 8
-#: Sample dimensions of shadow rays begin here, ``1 << _SHADOW_BITS`` of them at each event.
-_SHADOW_DIMENSION, _SHADOW_BITS = 1 << 24, 10
 
 
 class VolumePathIntegrator:
@@ -107,7 +104,7 @@ class VolumePathIntegrator:
         view_dependent = mi.Bool(False)
 
         while dr.hint(active, label="volume paths"):
-            dimension = event * DIMENSIONS_PER_EVENT + 1
+            dimension = event * DIMENSIONS + 1
 
             # ---- free flight through the medium ----
             inside = active & (medium != None)  # noqa: E711 (compares lane by lane)
@@ -162,7 +159,9 @@ class VolumePathIntegrator:
             lit &= dr.max(reflected) > 0
             toward_light = mi.MediumPtr(medium)
             toward_light[at_surface & si.is_medium_transition()] = si.target_medium(light_ds.d)
-            visible, tests = self._transmittance(reference, light_ds.p, toward_light, stream, event, lit)
+            # A stream of its own: a shadow ray may collide any number of times.
+            of_shadow = SampleStream(hash32(stream.key ^ (dimension + 7)), stream.index, stream.half)
+            visible, tests = self._transmittance(reference, light_ds.p, toward_light, of_shadow, lit)
             radiance += dr.select(lit, throughput * reflected * visible, 0)
             shadow += tests
 
@@ -234,7 +233,6 @@ class VolumePathIntegrator:
         target: Point3f,
         medium: MediumPtr,
         stream: SampleStream,
-        event: UInt32,
         active: Bool,
     ) -> tuple[Spectrum, UInt32]:
         """Estimated transmittance from ``reference``, just inside ``medium``, to ``target``; and the rays traced."""
@@ -248,8 +246,7 @@ class VolumePathIntegrator:
         crossings = mi.UInt32(0)
         while dr.hint(active, label="transmittance"):
             inside = active & (medium != None)  # noqa: E711 (compares lane by lane)
-            dimension = _SHADOW_DIMENSION + (event << _SHADOW_BITS) + step
-            mei = medium.sample_interaction(ray, stream.next_1d(dimension), mi.UInt32(0), inside)
+            mei = medium.sample_interaction(ray, stream.next_1d(step), mi.UInt32(0), inside)
             extinction = mi.Spectrum(mei.combined_extinction)
             end = dr.minimum(si.t, ray.maxt)
             uniform = inside & medium.is_homogeneous()
