@@ -55,9 +55,9 @@ def light_notes(
             "no estimate of the error: paths hardly find what mirrors, glass or gloss throw onto other surfaces from "
             "emitters as small as here; photons bring it (caustics)"
         )
-    if estimate is not None and samples < TUNING.few_among_mirrors and is_among_mirrors(choices):
+    if estimate is not None and samples < TUNING.few_samples and is_among_mirrors(choices):
         notes.append(
-            f"fewer than {TUNING.few_among_mirrors} samples may all have missed bright light among mirrors: intervals "
+            f"fewer than {TUNING.few_samples} samples may all have missed bright light among mirrors: intervals "
             "of the PSNR reach down farther"
         )
     if request.clamp_indirect is not None:

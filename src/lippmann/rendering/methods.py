@@ -21,6 +21,7 @@ from lippmann.rendering.denoise.outlines import exchange_coverage
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
 from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts
+from lippmann.rendering.estimate.tuning import TUNING as ESTIMATE
 from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
 from lippmann.rendering.film.wavefront import Frame, trace_frame
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
@@ -123,8 +124,8 @@ def _in_rounds(job: Job) -> Traced:
     denoiser = None if job.request.denoise == "none" else guided_denoiser(job)
     picture = batches if denoiser is None else _denoised(job, batches, denoiser)
     goal = _timed_goal(job)
-    assessment = 0.0 if denoiser is None or goal.max_time is None else denoiser.probe(TUNING.first_denoised)
-    first = TUNING.first_plain if denoiser is None else TUNING.first_denoised
+    assessment = 0.0 if denoiser is None or goal.max_time is None else denoiser.probe(ESTIMATE.outliers_told_from)
+    first = ESTIMATE.few_samples if denoiser is None else ESTIMATE.outliers_told_from
     outcome = reach(
         goal,
         batches,

@@ -11,9 +11,6 @@ class AdaptiveTuning:
 
     Attributes
     ----------
-    first_plain, first_denoised:
-        Samples per pixel at which a picture is first assessed: estimates of fewer plain ones are up to 7 dB too good
-        (``estimate_coverage.py``).
     most:
         Samples per pixel at which a goal is given up: the noise of single precision sums comes near.
     least_growth, most_growth:
@@ -35,8 +32,6 @@ class AdaptiveTuning:
         (``docs/research/equal-time.md``).
     """
 
-    first_plain: int = 16
-    first_denoised: int = 4
     most: int = 1 << 20
     least_growth: float = 1.2
     most_growth: float = 4.0

@@ -93,7 +93,7 @@ class Denoised:
         apart: Floats = (np.float32(0.25) * np.square(slope * (clean[0] - clean[1]))).mean(axis=2)
         left = [slope * (half - smooth) for half, smooth in zip(noisy, clean, strict=True)]
         common = (left[0] * left[1]).mean(axis=2)
-        limit = TUNING.hidden * max(1.0, TUNING.of_samples / self._renderer.samples)
+        limit = TUNING.hidden * max(1.0, ESTIMATE.few_samples / self._renderer.samples)
         hidden = np.maximum(np.abs(left[0]), np.abs(left[1])).max(axis=2) > limit
         common[hidden] = np.float32(ESTIMATE.outlier_ratio) * apart[hidden]
         samples = self._renderer.squared_error()

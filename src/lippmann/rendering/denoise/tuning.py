@@ -26,8 +26,8 @@ class DenoiseTuning:
     far_above:
         A pixel that is brighter than its samples by so many times the halves' mean difference nearby is so by no
         accident: then the step of its code counts.
-    hidden, of_samples:
-        Codes by which samples are off that hide what is wrong in their pixel. With fewer than ``of_samples`` a single
+    hidden:
+        Codes by which samples are off that hide what is wrong in their pixel. With fewer than ``few_samples`` a single
         one is farther off, and more likely all there is of its light: less is left out then (``estimate_coverage.py``).
     untold_outliers:
         Share of the samples' error that is taken to rest on outliers where too few batches tell them
@@ -41,7 +41,6 @@ class DenoiseTuning:
     reaches: tuple[int, int] = (2, 8)
     far_above: float = 4.0
     hidden: float = 8.0
-    of_samples: int = 16
     untold_outliers: float = 0.25
 
 

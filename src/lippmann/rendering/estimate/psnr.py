@@ -92,7 +92,7 @@ class Estimate:
         All of few samples may have missed an emitter in a mirror, or a place that shines by way of one, and nothing in
         them tells: both intervals reach down as much farther as such statements were found to be too good.
         """
-        if samples >= TUNING.few_among_mirrors:
+        if samples >= TUNING.few_samples:
             return self
         whole, worst = TUNING.doubt_among_mirrors
         return replace(self, psnr_low=max(0.0, self.psnr_low - whole), worst_low=max(0.0, self.worst_low - worst))

@@ -25,12 +25,13 @@ from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.ray_source import RaySource, pixel_number
+from lippmann.rendering.transport.tuning import TUNING
 from lippmann.rendering.transport.visible_caustics import VisibleBlur
 
 Floats = NDArray[np.float32]
 
-#: The bias is measured for a share of the pixels, samples per pixel over 256, but for at least 4096 pixels.
-SAMPLES_OF_PIXEL, FEWEST_PIXELS = 256, 1 << 12
+#: The bias is measured for a share of the pixels: samples per pixel over 256, but for as many as a probe has, at least.
+SAMPLES_OF_PIXEL = 256
 
 
 class SquaredBlur:
@@ -61,7 +62,7 @@ class SquaredBlur:
         if passes is None:
             return None
         pixels = self._source.width * self._source.height
-        share = min(1.0, max(samples / SAMPLES_OF_PIXEL, FEWEST_PIXELS / pixels))
+        share = min(1.0, max(samples / SAMPLES_OF_PIXEL, TUNING.probe_side**2 / pixels))
         # Measured anew at each doubling of the share.
         if share >= 2 * self._share or share == 1.0 > self._share:
             # The photons of the last sample are cached.

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.sobol import named_seed
-from lippmann.rendering.adaptive.tuning import TUNING as ADAPTIVE
 from lippmann.rendering.denoise.noisy_blend import weigh_samples
 from lippmann.rendering.denoise.oidn import denoise
 from lippmann.rendering.denoise.tuning import TUNING as DENOISE
+from lippmann.rendering.estimate.tuning import TUNING as ESTIMATE
 from lippmann.rendering.film.batched_picture import STREAMS
 from lippmann.rendering.live.develop import develop, develop_picture
 from lippmann.rendering.live.live_tracer import Lanes
@@ -145,7 +145,7 @@ def _denoised(
     """
     albedo, normal = guides
     mean = np.asarray((noisy[0] + noisy[1]) / 2, np.float32)
-    if samples < ADAPTIVE.first_denoised:
+    if samples < ESTIMATE.outliers_told_from:
         yield denoise(mean, albedo, normal, effort="fast", threads=threads)
         return
     clean = []

@@ -132,12 +132,12 @@ def _has_place(emitters: list[mi.Emitter]) -> NDArray[np.bool_]:
 
 
 def _region_about(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Corners ``(2, 3)`` of a box about points ``(n, 3)`` that are seen; None where there are none."""
+    """Corners ``(2, 3)`` of a box about points ``(n, 3)`` that are seen, wider by its longest side; None for none."""
     if not len(points):
         return None
     corners: NDArray[np.float64] = np.quantile(points, [NEAR_SHARE, 1 - NEAR_SHARE], axis=0)
     middle, size = corners.mean(axis=0), np.ptp(corners, axis=0)
-    reach = (0.5 + TUNING.wider) * size + TUNING.wider * size.max()
+    reach = (size + size.max()) / 2
     return np.stack([middle - reach, middle + reach])
 
 

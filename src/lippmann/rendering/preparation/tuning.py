@@ -30,8 +30,6 @@ class PreparationTuning:
         Samples per pixel that one pass of photons, or one set of light vertices, serves.
     kept_share:
         Share of the memory for photons of passes that tiles and bands ask for in turn.
-    wider:
-        Share of its size by which the box about the first hits of the pilot's rays is widened, and of its longest side.
     """
 
     chains: int = 4
@@ -43,7 +41,6 @@ class PreparationTuning:
     most_indirect: float = 4.0
     pass_samples: int = 16
     kept_share: float = 0.25
-    wider: float = 0.25
 
 
 TUNING = PreparationTuning()

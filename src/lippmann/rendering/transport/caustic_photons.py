@@ -30,8 +30,6 @@ from lippmann.rendering.transport.tuning import TUNING
 OF_POWER = 6
 #: Photons within the radius of a look-up, as a rule, over the root of the emissions.
 NEIGHBOURS_OF_ROOT = 0.12
-#: Photons by which the radius is found.
-_PROBED = 2000
 _NONE = Photons.dark(0)
 
 
@@ -135,12 +133,13 @@ def radius_of_pass(number: int) -> float:
 
 
 def _radius(photons: Photons, neighbours: float) -> float:
-    """Median distance of some photons to their neighbour number ``neighbours``."""
+    """Median distance of photons to their neighbour number ``neighbours``."""
     from scipy.spatial import cKDTree
 
     number = int(min(max(2, round(neighbours)), max(2, len(photons) // 2)))
     if len(photons) < 3:
         return float(np.ptp(photons.position, axis=0).max()) or 1.0
-    probed = photons.position[:: max(1, len(photons) // _PROBED)]
+    # As many photons apart as each has neighbours.
+    probed = photons.position[::number]
     distances, _ = cKDTree(photons.position).query(probed, k=[number])
     return float(np.median(distances)) or float(distances.max()) or 1.0

@@ -35,11 +35,10 @@ def first_emitter_samples(sample: UInt32) -> tuple[UInt32, UInt32]:
     The start is the index of the first emitter sample in the pixel's sequence of points. The paths of a pixel use this
     sequence one after another, without gaps.
     """
-    early = sample < TUNING.early_samples
-    before = TUNING.early_emitter_samples * TUNING.early_samples
-    later = before + TUNING.later_emitter_samples * (sample - TUNING.early_samples)
-    first = dr.select(early, TUNING.early_emitter_samples * sample, later)
-    return dr.select(early, mi.UInt32(TUNING.early_emitter_samples), TUNING.later_emitter_samples), first
+    number = TUNING.emitter_samples
+    early, fewer = sample < number, max(1, number // 2)
+    first = dr.select(early, number * sample, number * number + fewer * (sample - number))
+    return dr.select(early, mi.UInt32(number), fewer), first
 
 
 class Clamp:

@@ -18,10 +18,9 @@ class TransportTuning:
         Relative error of places that counts as rounding of single precision.
     roulette_depth:
         Surfaces after which Russian roulette may end a path.
-    early_emitter_samples, later_emitter_samples, early_samples:
-        Emitter samples at the first surface of a path that is not purely specular: ``early_emitter_samples`` in each of
-        a pixel's first ``early_samples`` samples, then ``later_emitter_samples``. Powers of two keep all points
-        stratified.
+    emitter_samples:
+        Emitter samples at the first surface of a path that is not purely specular, in each of as many first samples of
+        a pixel; half as many in later ones. A power of two keeps all points stratified.
     most_power:
         A chain of seen light counts up to white where it is its pixel's only one; of more chains one counts for as much
         more as this power of their number says. Without the limit, primitives lose 1.5 dB with 16 samples
@@ -50,9 +49,7 @@ class TransportTuning:
     probe_side: int = 128
     rounding: float = 1e-4
     roulette_depth: int = 5
-    early_emitter_samples: int = 4
-    later_emitter_samples: int = 2
-    early_samples: int = 4
+    emitter_samples: int = 4
     most_power: float = 0.75
     least_cosine_angle: float = 0.05
     small_emitter: float = 1e-3
