@@ -41,6 +41,12 @@ def upload(values: NDArray[Any]) -> Array:
     return table
 
 
+def to_numpy(value: Array, lanes: int) -> NDArray[np.float32]:
+    """``(lanes,)`` or ``(lanes, channels)`` of an evaluated array; an array of width 1 is broadcast."""
+    array = np.asarray(value, dtype=np.float32).T
+    return np.ascontiguousarray(np.broadcast_to(array, (lanes, *array.shape[1:])))
+
+
 def divide(number: UInt32, by: UInt32 | int) -> tuple[UInt32, UInt32]:
     """Quotient and remainder of whole numbers, by one division."""
     quotient = number // by

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from lippmann.errors import SceneError
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.mitsuba_plugins import check_plugins_of
-from lippmann.scene.mitsuba_trial import try_scene
 from lippmann.scene.mitsuba_trial_child import NO_ROOM
 from lippmann.scene.mitsuba_xml import MitsubaXml, read_mitsuba_xml
 from lippmann.scene.parsing.files import NamedFiles
@@ -113,6 +112,8 @@ class MitsubaSource:
                 loaded = mi.load_dict(dict(content))
             else:
                 text = content.text()
+                from lippmann.scene.mitsuba_trial import try_scene
+
                 try_scene(text, variant, self.name)
                 loaded = mi.load_string(text)
         except SceneError:

@@ -63,14 +63,13 @@ def blur_of(light, radius, *, samples=8, window=WHOLE, seed=3):
     from lippmann.rendering.film.caustic_blur import SquaredBlur
 
     integrator, source = matt_plane(PlaneOfPhotons(light, radius))
-    return SquaredBlur(integrator, source, window, seed).after(samples)
+    return SquaredBlur(integrator, integrator.light.photon_passes, source, window, seed).after(samples)
 
 
 def test_pictures_without_photons_have_none():
-    from lippmann.rendering.film.caustic_blur import SquaredBlur
+    from lippmann.rendering.film.sample_batches import FullInBatches
 
-    integrator, source = matt_plane(None)
-    assert SquaredBlur(integrator, source, WHOLE, 1).after(8) is None
+    assert FullInBatches(*matt_plane(None), memory=1 << 30).squared_blur() is None
 
 
 @pytest.mark.long
@@ -98,7 +97,7 @@ def test_pixels_are_the_same_in_parts_and_fewer_stand_for_all(monkeypatch):
     from lippmann.rendering.film import caustic_blur
 
     monkeypatch.setattr(caustic_blur, "SAMPLES_OF_PIXEL", 16)
-    monkeypatch.setattr(caustic_blur, "FEWEST_PIXELS", 0)
+    monkeypatch.setattr(caustic_blur, "TUNING", replace(caustic_blur.TUNING, probe_side=0))
     light = lambda x: np.where(x > 0, 1.0, 0.0)  # noqa: E731
     whole = blur_of(light, 0.1, samples=8)
     looked = (whole != 0).any(axis=2)
@@ -116,9 +115,9 @@ def test_a_look_is_repeated_at_twice_the_share(monkeypatch):
     from lippmann.rendering.film import caustic_blur
 
     monkeypatch.setattr(caustic_blur, "SAMPLES_OF_PIXEL", 64)
-    monkeypatch.setattr(caustic_blur, "FEWEST_PIXELS", SIZE * SIZE // 4)
+    monkeypatch.setattr(caustic_blur, "TUNING", replace(caustic_blur.TUNING, probe_side=SIZE // 2))
     integrator, source = matt_plane(PlaneOfPhotons(lambda x: 1 + 5 * x**2, 0.2))
-    blur = caustic_blur.SquaredBlur(integrator, source, WHOLE, 3)
+    blur = caustic_blur.SquaredBlur(integrator, integrator.light.photon_passes, source, WHOLE, 3)
     looked = [float((blur.after(samples) != 0).any(axis=2).mean()) for samples in (8, 24, 32, 64)]
     assert looked[0] == looked[1] == pytest.approx(0.25, abs=0.1)
     assert looked[2] == pytest.approx(0.5, abs=0.1)

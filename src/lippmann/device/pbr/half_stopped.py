@@ -23,7 +23,7 @@ _HALVINGS = 10
 
 
 def half_stopped_by(
-    built: object, world_from_frame: Matrix, origins: Reals, directions: Reals, least: float, threads: int
+    built: BuiltScene, world_from_frame: Matrix, origins: Reals, directions: Reals, least: float, threads: int
 ) -> Iterator[Reals]:
     """Heights ``(n,)`` (z of the frame) at which rays have lost half of their light, to splats, and to a volume.
 
@@ -36,8 +36,6 @@ def half_stopped_by(
     threads:
         CPU threads.
     """
-    if not isinstance(built, BuiltScene):
-        return
     start, step = (values.reshape(-1, 3) for values in np.broadcast_arrays(origins, directions))
     world_start, world_step = transform_points(world_from_frame, start), step @ world_from_frame[:3, :3].T
     per_height = np.linalg.norm(world_step, axis=1)

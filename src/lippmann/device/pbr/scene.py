@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +18,7 @@ from lippmann.device.pbr.materials import Finish, make_finishes
 from lippmann.device.pbr.media import MEDIA_NOTE, has_media
 from lippmann.device.pbr.shapes import Dress, has_volume, make_shapes
 from lippmann.device.pbr.textures import TextureStore
-from lippmann.device.splats.table import SplatTable, make_table
 from lippmann.device.types import BSDF, Emitter, MitsubaScene, Shape
-from lippmann.device.volumes.table import VolumeTable
-from lippmann.device.volumes.table import make_table as make_volume_table
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.light import LightOptions
 from lippmann.runtime import engine as engines
@@ -29,6 +27,10 @@ from lippmann.scene.matrices import transform_points
 from lippmann.scene.mitsuba_source import MitsubaSource, with_sky
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Color, Matrix, SceneDescription
+
+if TYPE_CHECKING:
+    from lippmann.device.splats.table import SplatTable
+    from lippmann.device.volumes.table import VolumeTable
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,10 +128,14 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
     splats = None
     if description.splats is not None:
         with _time_stage(seconds, "splats"):
+            from lippmann.device.splats.table import make_table
+
             splats = make_table(description.splats, available, name=description.name)
     volume = None
     if description.volume is not None:
         with _time_stage(seconds, "volume"):
+            from lippmann.device.volumes.table import make_table as make_volume_table
+
             volume = make_volume_table(description.volume, available, name=description.name)
     with _time_stage(seconds, "lights"):
         lights = [light_object(light) for light in description.lights if max(light.color) > 0]

@@ -49,7 +49,6 @@ from lippmann.display.formats.lens_tables import aperture_of_table, monitor_disp
 from lippmann.display.formats.looking_glass import display_of_calibration, is_calibration
 from lippmann.display.formats.monitor_toml import TABLE as MONITOR
 from lippmann.display.formats.monitor_toml import monitor_of_texts
-from lippmann.display.formats.print_sheet import print_of_texts
 from lippmann.display.formats.recorded_depth import default_aperture
 from lippmann.display.formats.stereo_toml import TABLE as STEREO
 from lippmann.display.formats.stereo_toml import stereo_display
@@ -86,7 +85,11 @@ def display_of_short_form(name: str) -> Display:
 
 def display_of_texts(kind: str, texts: Mapping[str, str]) -> Display:
     """The ``print`` or ``monitor`` of values by their keys; raises as :func:`display_of_short_form`."""
-    return print_of_texts(texts).display() if kind == "print" else monitor_of_texts(texts).display()
+    if kind != "print":
+        return monitor_of_texts(texts).display()
+    from lippmann.display.formats.print_sheet import print_of_texts
+
+    return print_of_texts(texts).display()
 
 
 @dataclass(frozen=True)

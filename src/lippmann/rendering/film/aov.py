@@ -13,8 +13,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.kernel_ops import divide
-from lippmann.device.types import Float, Vector3f
+from lippmann.device.kernel_ops import divide, to_numpy
+from lippmann.device.types import Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.memory_model import LAYERS as BYTES
 from lippmann.rendering.film.wavefront_plan import Plan, Tile, cut_wavefronts
@@ -115,10 +115,3 @@ def to_frame(matrix: NDArray[np.float64], vector: Vector3f) -> Vector3f:
     """The linear part ``(3, 3)`` of ``matrix`` on a vector of the device."""
     rows = matrix[:3, :3].tolist()
     return mi.Vector3f(*(row[0] * vector.x + row[1] * vector.y + row[2] * vector.z for row in rows))
-
-
-def to_numpy(value: Float | Vector3f, lanes: int) -> FloatArray:
-    """``(lanes,)`` or ``(lanes, channels)`` of an evaluated array; an array of width 1 is broadcast."""
-    array = np.asarray(value, dtype=np.float32).T
-    shape = (lanes,) if array.ndim == 1 else (lanes, array.shape[1])
-    return np.ascontiguousarray(np.broadcast_to(array, shape))

@@ -49,7 +49,7 @@ class BatchedPicture:
         *,
         keeps_specular: bool,
         keeps_coverage: bool,
-        blur_after: Callable[[int], Floats | None],
+        blur_after: Callable[[int], Floats] | None,
     ) -> None:
         pixels = shape[0] * shape[1]
         self._shape, self._transfer = shape, transfer
@@ -160,11 +160,10 @@ class BatchedPicture:
 
         See :class:`lippmann.rendering.film.caustic_blur.SquaredBlur`.
         """
-        linear = self._blur_after(self.samples)
-        if linear is None:
+        if self._blur_after is None:
             return None
         slope = coding_slope(self.picture(), self._transfer)
-        blur: Floats = (np.square(slope) * self.displayed(linear)).mean(axis=-1)
+        blur: Floats = (np.square(slope) * self.displayed(self._blur_after(self.samples))).mean(axis=-1)
         return blur
 
     def displayed(self, values: Floats) -> Floats:

@@ -21,7 +21,6 @@ from lippmann.display.pixel_window import PixelWindow
 from lippmann.rendering.film.memory_model import PREFERRED_LANES
 from lippmann.rendering.film.wavefront import select_colors
 from lippmann.rendering.transport.caustic_photons import CausticPhotons, radius_of_pass
-from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.ray_source import RaySource, pixel_number
@@ -39,28 +38,30 @@ class SquaredBlur:
 
     Parameters
     ----------
-    integrator, source, window:
-        Those of the picture; a pixel has the same value in any window.
+    integrator, passes:
+        Those of the picture.
+    source, window:
+        Its rays, and the part of it; a pixel has the same value in any window.
     seed:
         Of the picture, 0 to 2**32 - 1.
     """
 
-    def __init__(self, integrator: Integrator, source: RaySource, window: PixelWindow, seed: int) -> None:
-        self._integrator = integrator
+    def __init__(
+        self, integrator: PathIntegrator, passes: CausticPhotons, source: RaySource, window: PixelWindow, seed: int
+    ) -> None:
+        self._integrator, self._passes = integrator, passes
         self._source = source
         self._window = window
         self._seed = seed
         self._share, self._pass = 0.0, 0
         self._of_pass = np.zeros((0, 3), np.float32)
 
-    def after(self, samples: int) -> Floats | None:
-        """``(H, W, 3)`` squared bias of a picture of ``samples`` samples per pixel; None without photon passes.
+    def after(self, samples: int) -> Floats:
+        """``(H, W, 3)`` squared bias of a picture of ``samples`` samples per pixel.
 
         Values of single pixels are noisy, and may be negative; their sums are not biased.
         """
-        passes = self._integrator.light.photon_passes if isinstance(self._integrator, PathIntegrator) else None
-        if passes is None:
-            return None
+        passes = self._passes
         pixels = self._source.width * self._source.height
         share = min(1.0, max(samples / SAMPLES_OF_PIXEL, TUNING.probe_side**2 / pixels))
         # Measured anew at each doubling of the share.
@@ -73,7 +74,6 @@ class SquaredBlur:
 
     def _measure(self, photons: PhotonMap, share: float) -> Floats:
         """``(pixels, 3)`` from a ``share`` of the pixels, each weighted by 1 / share; the others are 0."""
-        assert isinstance(self._integrator, PathIntegrator)
         blur = VisibleBlur(self._integrator, photons)
         chosen = _choose_pixels(self._source, self._window, self._seed, share)
         squares = np.zeros((self._window.pixels, 3), np.float32)

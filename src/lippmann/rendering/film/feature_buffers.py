@@ -10,9 +10,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import to_numpy
 from lippmann.device.types import Color3f, Float, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.film.aov import to_numpy
 from lippmann.rendering.film.memory_model import LAYERS
 from lippmann.rendering.film.wavefront import Coverage, samples_of_tile, to_rows
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile, cut_wavefronts

@@ -9,7 +9,7 @@ variance; the difference between streams measures how much less. This module tra
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import drjit as dr
 import mitsuba as mi
@@ -25,7 +25,6 @@ from lippmann.progress import Progress, ProgressCallback, of_part, silent
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.batched_picture import STREAMS, BatchedPicture
-from lippmann.rendering.film.caustic_blur import SquaredBlur
 from lippmann.rendering.film.wavefront import (
     STRIP_ROWS,
     Frame,
@@ -110,7 +109,7 @@ class FullInBatches(BatchedPicture):
             transfer,
             keeps_specular=keeps_specular,
             keeps_coverage=keeps_coverage,
-            blur_after=SquaredBlur(integrator, source, self._window, seed).after,
+            blur_after=_blur_after(integrator, source, self._window, seed),
         )
 
     def add(self, samples: int, progress: ProgressCallback = silent) -> None:
@@ -186,6 +185,17 @@ class FullInBatches(BatchedPicture):
         evaluate(traced, lanes, self.rays)
         sums = sum_samples(traced, channels, number, run.count)
         return {name: to_rows(part, window.width) for name, part in sums.items()} if run.in_strips else sums
+
+
+def _blur_after(
+    integrator: Integrator, source: RaySource, window: PixelWindow, seed: int
+) -> Callable[[int], Floats] | None:
+    """Squared bias of a window's pixels by the blur of caustics, from the samples of each; None without photons."""
+    if not isinstance(integrator, PathIntegrator) or integrator.light.photon_passes is None:
+        return None
+    from lippmann.rendering.film.caustic_blur import SquaredBlur
+
+    return SquaredBlur(integrator, integrator.light.photon_passes, source, window, seed).after
 
 
 def _stretches(integrator: Integrator, first: int, samples: int) -> Iterator[tuple[Integrator, int]]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lippmann.device.pbr.half_stopped import half_stopped_by
+from lippmann.device.pbr import BuiltScene
 from lippmann.display import Display
 from lippmann.display.view_cone import size_seen, zone_slopes
 from lippmann.rendering.transport.depth_probe import Reals, first_hits
@@ -20,7 +20,6 @@ from lippmann.scene.matrices import inverse, transform_points
 from lippmann.scene.values.description import Matrix
 
 if TYPE_CHECKING:
-    from lippmann.device.pbr import BuiltScene
     from lippmann.device.whitted.scene import BuiltClassic
 
 SIDES = ("left", "right", "bottom", "top")
@@ -57,8 +56,11 @@ def find_cut_edges(
     hit, points = first_hits(built, world_from_display, origins, directions)
     heights = np.where(hit, transform_points(inverse(world_from_display), points)[:, 2], -np.inf)
     least = display.resolved_size / (2.0 * side)
-    for half_stopped in half_stopped_by(built, world_from_display, origins, directions, least, threads):
-        heights = np.maximum(heights, half_stopped)
+    if isinstance(built, BuiltScene) and not (built.splats is None and built.volume is None):
+        from lippmann.device.pbr.half_stopped import half_stopped_by
+
+        for half_stopped in half_stopped_by(built, world_from_display, origins, directions, least, threads):
+            heights = np.maximum(heights, half_stopped)
     is_cut = (heights > least).reshape(steps.shape[:-1])
     if not is_cut.any():
         return None

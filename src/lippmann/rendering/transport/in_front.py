@@ -14,9 +14,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.kernel_ops import linear_to_srgb, srgb_to_linear, upload
+from lippmann.device.kernel_ops import linear_to_srgb, srgb_to_linear, to_numpy, upload
 from lippmann.device.sobol import SampleStream
-from lippmann.device.types import Bool, Color3f, Float, Point3f, Ray3f, Spectrum
+from lippmann.device.types import Bool, Color3f, Float, Ray3f, Spectrum
 from lippmann.rendering.transport.first_surface import PhysicalSurfaces
 from lippmann.rendering.transport.integrator import Integrator, RayCounts
 
@@ -61,7 +61,7 @@ class _InFront:
         # All at once: each evaluated alone would trace the paths anew.
         dr.eval(radiance, counts.secondary, counts.shadow, end, ray)
         lanes = max(dr.width(ray), dr.width(radiance), dr.width(end))
-        colors, transmittances = self._composite(_rows(ray.o, lanes), _rows(ray.d, lanes), _rows(end, lanes))
+        colors, transmittances = self._composite(to_numpy(ray.o, lanes), to_numpy(ray.d, lanes), to_numpy(end, lanes))
         color, transmittance = mi.Color3f(np.ascontiguousarray(colors.T)), upload(transmittances)
         composited = self._over(color, transmittance, radiance)
         # Where nothing is in front the radiance stays what it was, to the last bit.
@@ -110,12 +110,6 @@ class GridVolumeIntegrator(_InFront):
         from lippmann.device.volumes.ray_march import composite
 
         return composite(self._table, origins, directions, ends, self._toward_light, self._threads)
-
-
-def _rows(value: Point3f, lanes: int) -> Floats:
-    """``(lanes,)`` or ``(lanes, 3)`` float32 of an evaluated array; one of a single entry counts for every lane."""
-    array = np.asarray(value, dtype=np.float32).T
-    return np.ascontiguousarray(np.broadcast_to(array, (lanes, *array.shape[1:])))
 
 
 def toward_light(frame_from_world: Numbers) -> Numbers:

@@ -16,7 +16,6 @@ from lippmann.options.outputs import AccessOptions
 from lippmann.options.scene import LoadKeywords, SceneOptions, Up
 from lippmann.options.texts import settings_of
 from lippmann.runtime.plugins import Plugin, function_of
-from lippmann.scene.cloud_selection import SplatSelection, VolumeSelection
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.dicom_files import DICOM, holds_dicom
 from lippmann.scene.parsing.files import NamedFiles, read_bytes
@@ -147,14 +146,9 @@ def read_scene(
             if getattr(asked, name):
                 raise UsageError("is for files", parameter=name, fix="leave it out")
         scene = _from_object(source)
-    if scene.has_volume:
-        scene = VolumeSelection(asked.crop, asked.transfer_function, asked.window).of(
-            SplatSelection(None, asked.unit_scale, asked.min_opacity).of(scene)
-        )
-    else:
-        scene = SplatSelection(asked.crop, asked.unit_scale, asked.min_opacity).of(
-            VolumeSelection(None, asked.transfer_function, asked.window).of(scene)
-        )
+    chosen = asked.crop, asked.unit_scale, asked.min_opacity, asked.transfer_function, asked.window
+    if any(value is not None for value in chosen):
+        scene = _selected(scene, asked)
     scene = replace(scene, light=light or scene.light, settings=(*scene.settings, *settings_of(asked)))
     scene = scene if color is None else replace(scene, has_chosen_background=True)
     studio = scene.studio and str(asked.environment) != NO_ENVIRONMENT
@@ -167,6 +161,15 @@ def read_scene(
     if asked.single_scattering:
         description = _single_scattering(description)
     return replace(scene, description=description, studio=studio)
+
+
+def _selected(scene: Scene, asked: SceneOptions) -> Scene:
+    """The scene with what is asked for of its splats and of its volume."""
+    from lippmann.scene.cloud_selection import SplatSelection, VolumeSelection
+
+    of_splats, of_volume = (None, asked.crop) if scene.has_volume else (asked.crop, None)
+    scene = SplatSelection(of_splats, asked.unit_scale, asked.min_opacity).of(scene)
+    return VolumeSelection(of_volume, asked.transfer_function, asked.window).of(scene)
 
 
 def _single_scattering(description: SceneDescription | MitsubaSource) -> SceneDescription:
