@@ -11,7 +11,7 @@ import trimesh
 
 import lippmann
 from lippmann.display import Display, LensArray, Panel
-from lippmann.display.box_window import panel_window, view_window
+from lippmann.display.view_cone import panel_window, view_window
 from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.session import even_background
 from lippmann.scene.placement import place

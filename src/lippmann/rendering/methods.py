@@ -1,10 +1,10 @@
-"""The rendering methods: from a job to a traced frame."""
+"""The rendering methods: from a job, a scene with its rays and integrator, to a traced frame."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.options.choices import Method
-from lippmann.rendering.adaptive.goal import Goal, goal_of
-from lippmann.rendering.adaptive.stopping import Outcome, reach
+from lippmann.progress import ProgressCallback
+from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
 from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.denoise.dual_buffer import Denoised, clean_light, remove_excess
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
@@ -25,12 +25,80 @@ from lippmann.rendering.estimate.tuning import TUNING as ESTIMATE
 from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
 from lippmann.rendering.film.wavefront import Frame, trace_frame
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
-from lippmann.rendering.job import Job, Traced
 from lippmann.rendering.light_statements import is_among_mirrors
 from lippmann.rendering.reprojection.point_image import STATUS_LAYER, TRACED
 from lippmann.rendering.request.preconditions import why_no_estimate
-from lippmann.rendering.transport.integrator import ReusableIntegrator
-from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.session import Session
+from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator
+from lippmann.rendering.transport.ray_source import DisplayRays, OnePicture, QuiltRays, SubpixelRays, WindowRays
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """A scene, its rays and the integrator to trace them with.
+
+    Attributes
+    ----------
+    session:
+        The scene on the device, the request, and the machine's share.
+    integrator, source:
+        The integrator, and the rays of the picture.
+    display_from_world:
+        ``(4, 4)`` affine map to the display's frame (mm).
+    is_part:
+        Whether the source is a tile of a picture that is assembled and assessed elsewhere.
+    """
+
+    session: Session
+    integrator: Integrator
+    source: OnePicture | QuiltRays
+    display_from_world: NDArray[np.float64]
+    is_part: bool = False
+
+    @property
+    def request(self) -> RenderRequest:
+        """The resolved request."""
+        return self.session.request
+
+    @property
+    def progress(self) -> ProgressCallback:
+        """The callback of progress reports."""
+        return self.session.watch.progress
+
+    @property
+    def traced(self) -> OnePicture | QuiltRays:
+        """Whose samples are gathered: of sub-pixels that are denoised, all colours."""
+        source = self.source
+        if not isinstance(source, DisplayRays | WindowRays) or not self.request.keeps_colors(source.display):
+            return source
+        return SubpixelRays(source)
+
+
+@dataclass(frozen=True)
+class Traced:
+    """The result of a job.
+
+    Attributes
+    ----------
+    samples:
+        Samples per pixel.
+    estimate:
+        Estimated PSNR; where it is None, ``notes`` say why.
+    options, seconds:
+        Metadata of the method, and the seconds of its own stages.
+    errors:
+        Squared errors of the pixels; None where they are unknown.
+    """
+
+    frame: Frame
+    samples: int
+    estimate: Estimate | None = None
+    notes: tuple[str, ...] = ()
+    options: dict[str, object] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    errors: PixelErrors | None = None
+
 
 Floats = NDArray[np.float32]
 

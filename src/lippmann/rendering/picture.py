@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from lippmann.display import Display
-from lippmann.display.box_window import panel_window
 from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.view_cone import panel_window
 from lippmann.image import IntegralImage
 from lippmann.optics.lens import lens_notes
 from lippmann.options.choices import REUSING
@@ -58,8 +58,7 @@ def render_picture(
 
     # Mitsuba may be loaded now that the engine has chosen its libraries.
     from lippmann.rendering.film.aov import plan_layers, trace_layers
-    from lippmann.rendering.job import Job
-    from lippmann.rendering.methods import trace
+    from lippmann.rendering.methods import Job, trace
     from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 
     display_from_world = placement.display_from_world

@@ -122,7 +122,7 @@ class Session:
         return replace(placement, warnings=warnings, may_cut=None)
 
     def _warn_of_cut(self, display: Display, options: PlacementOptions, placement: Placement) -> tuple[str, ...]:
-        from lippmann.rendering.transport.cut_edges import find_cut_edges
+        from lippmann.rendering.transport.first_hits import find_cut_edges
 
         where = trimmed(display), placement.world_from_display, self.engine.threads
         cut = self.watch.stage("build", lambda: find_cut_edges(self.built, *where))
@@ -167,7 +167,7 @@ class Session:
             turn_environment(emitter, world_from_viewer @ environment.world_from_environment)
 
     def _probe_depth(self, view: CameraView) -> VisibleDepth | None:
-        from lippmann.rendering.transport.depth_probe import probe_depth
+        from lippmann.rendering.transport.first_hits import probe_depth
 
         key = np.array(
             [*np.ravel(view.world_from_camera), view.half_width, view.half_height, view.is_parallel]

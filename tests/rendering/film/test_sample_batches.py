@@ -148,8 +148,7 @@ def test_the_mean_is_that_of_full_and_the_error_what_it_says(integrator, subpixe
 @pytest.mark.slow
 def test_a_quality_that_is_asked_for_is_kept(integrator):
     from lippmann.color.transfer import encode_srgb
-    from lippmann.rendering.adaptive.goal import Goal
-    from lippmann.rendering.adaptive.stopping import reach
+    from lippmann.rendering.adaptive.stopping import Goal, reach
     from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 
     renderer = batches(integrator, seed=5)

@@ -22,7 +22,7 @@ from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream, named_seed
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, Float, MitsubaScene, Point2f, Point3f, Ray3f, UInt32
 from lippmann.rendering.preparation.tuning import TUNING
-from lippmann.rendering.transport.depth_probe import NEAR_SHARE
+from lippmann.rendering.transport.first_hits import NEAR_SHARE
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler, WeightedLightSampler
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.path_vertex import DIMENSIONS

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import drjit as dr
 import mitsuba as mi
 
 from lippmann.options.choices import REUSING
+from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.memory_model import LIGHT_VERTEX
 from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
-from lippmann.rendering.preparation.photons import shoot_photons
 from lippmann.rendering.preparation.pilot import Pilot, brightest_specular_light, make_light_sampler, trace_pilot
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.transport.casters import has_sharp_surfaces
+from lippmann.rendering.transport.casters import find_casters, has_sharp_surfaces, hides_caustics
+from lippmann.rendering.transport.caustic_photons import CausticPhotons, emissions, no_photons
 from lippmann.rendering.transport.light_vertices import LightVertexPasses
 from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.prepared_light import PreparedLight
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.rendering.transport.tuning import TUNING as TRANSPORT
@@ -127,3 +130,68 @@ def count_chains(integrator: PathIntegrator, request: RenderRequest, source: Ray
     if not is_denoised or not has_sharp_surfaces(integrator.scene):
         return 0
     return TUNING.chains if brightest_specular_light(integrator, source) > 1 else 0
+
+
+@dataclass(frozen=True, eq=False)
+class Caustics:
+    """How a picture's caustics come.
+
+    Attributes
+    ----------
+    way:
+        ``photons``, ``paths`` or ``none``; None where there are none.
+    photons, passes:
+        See :class:`~lippmann.rendering.transport.prepared_light.PreparedLight`.
+    """
+
+    way: Literal["photons", "paths", "none"] | None
+    photons: PhotonMap | None = None
+    passes: CausticPhotons | None = None
+
+
+def shoot_photons(
+    integrator: PathIntegrator, request: RenderRequest, source: RaySource, pilot: Pilot, memory: int
+) -> Caustics:
+    """How the caustics come in the picture of ``source``, with their photons.
+
+    By photons wherever an emitter and a caster form a pair, and a few photons land in what the picture shows.
+
+    Raises
+    ------
+    MemoryLimitError
+        ``memory`` bytes do not hold the photons that were asked for; where nothing was, they are left to paths.
+    """
+    if request.integrator != "path" or request.surfaces < 2:
+        return Caustics(None)
+    if request.caustics == "paths":
+        return _left_to_paths(integrator)
+    if request.caustics == "none":
+        return Caustics("none", no_photons())
+    casters = find_casters(integrator.scene)
+    if casters.pairs == 0:
+        return Caustics(None)
+    pixels = source.width * source.height * source.channels
+    # A single pass is for no more samples than there are.
+    samples = pixels * (TUNING.pass_samples if request.is_open_ended else min(TUNING.pass_samples, request.samples))
+    passes = 2 if request.is_open_ended else -(-request.samples // TUNING.pass_samples)
+    # No fewer where memory is short: it does not change a picture.
+    required = memory_model.photons(emissions(samples), passes)
+    if required > memory:
+        if request.caustics == "auto":
+            return _left_to_paths(integrator)
+        raise memory_model.too_small(memory, "photons of caustics", required)
+    photons = CausticPhotons(
+        integrator.scene,
+        integrator.features,
+        casters,
+        samples=samples,
+        pass_samples=TUNING.pass_samples,
+        seed=request.seed,
+        region=pilot.region,
+        kept=max(1, min(passes, int(TUNING.kept_share * memory) // memory_model.photons(emissions(samples), 1))),
+    )
+    return Caustics(None) if photons.are_none else Caustics("photons", photons.of_pass(0), photons)
+
+
+def _left_to_paths(integrator: PathIntegrator) -> Caustics:
+    return Caustics("paths" if hides_caustics(integrator.scene) else None)

@@ -32,7 +32,7 @@ from lippmann.device.types import (
 from lippmann.device.whitted.background_fog import background_color
 from lippmann.device.whitted.geometry import NONE
 from lippmann.device.whitted.scene import BuiltClassic
-from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
+from lippmann.rendering.transport.light_sampling import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import MOST_EVENTS
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Light samplers: which emitter next-event estimation samples at a surface, and with what pdf.
+"""Next-event estimation: which emitter is sampled at a surface, with what pdf, and whether a shadow ray reaches it.
 
 An integrator holds its light sampler. Nothing is written into the scene, which other renders may use at the same time.
 """
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import binary_search
+from lippmann.device.syntax import syntax
 from lippmann.device.types import (
     Bool,
     DirectionSample3f,
@@ -21,6 +22,8 @@ from lippmann.device.types import (
     Interaction3f,
     MitsubaScene,
     Point2f,
+    Point3f,
+    Ray3f,
     Spectrum,
     UInt32,
 )
@@ -180,3 +183,51 @@ class WithoutSize:
         sample, radiance = emitter.sample_direction(reference, point, active)
         sample.pdf /= self._count
         return sample, radiance * self._count
+
+
+#: Straight-through surfaces that one ray may cross before it counts as blocked. Bounds the loop between many panes.
+MAX_CROSSINGS = 64
+
+
+class ShadowRays:
+    """Shadow rays in one scene.
+
+    Parameters
+    ----------
+    scene:
+        A ``mi.Scene``.
+    has_null:
+        Whether some of its surfaces let rays straight through.
+    """
+
+    def __init__(self, scene: MitsubaScene, has_null: bool) -> None:
+        self._scene, self._has_null = scene, has_null
+
+    @syntax
+    def transmittance(self, ray: Ray3f, end: Point3f, active: Bool) -> tuple[Spectrum, UInt32]:
+        """Transmittance in [0, 1] along ``ray``, which stops short of ``end``, and the rays traced for it.
+
+        A ray that crosses n surfaces counts n + 1 times.
+        """
+        active = mi.Bool(active)
+        tests = dr.select(active, mi.UInt32(1), mi.UInt32(0))
+        transmittance = mi.Spectrum(1)
+        if dr.hint(not self._has_null, mode="scalar"):
+            transmittance = dr.select(self._scene.ray_test(ray, active), mi.Spectrum(0), transmittance)
+        else:
+            crossings = mi.UInt32(0)
+            o, d, distance = mi.Point3f(ray.o), mi.Vector3f(ray.d), mi.Float(ray.maxt)
+            while dr.hint(active, label="visibility", exclude=[end]):
+                part = mi.Ray3f(o, d)
+                part.maxt = distance
+                hit = self._scene.ray_intersect(part, mi.RayFlags.All, False, active)
+                crosses = hit.is_valid()
+                through = hit.bsdf(part).eval_null_transmission(hit, crosses)
+                transmittance = dr.select(crosses, transmittance * through, transmittance)
+                crossings += 1
+                transmittance = dr.select(crosses & (crossings >= MAX_CROSSINGS), mi.Spectrum(0), transmittance)
+                active = crosses & (dr.max(transmittance) > 0) & (crossings < MAX_CROSSINGS)
+                tests += dr.select(active, mi.UInt32(1), mi.UInt32(0))
+                rest = hit.spawn_ray_to(end)
+                o, d, distance = mi.Point3f(rest.o), mi.Vector3f(rest.d), mi.Float(rest.maxt)
+        return transmittance, tests

@@ -32,7 +32,7 @@ from lippmann.device.types import (
     UInt32,
 )
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
-from lippmann.rendering.transport.light_sampling import SceneLightSampler, WithoutSize
+from lippmann.rendering.transport.light_sampling import MAX_CROSSINGS, SceneLightSampler, ShadowRays, WithoutSize
 from lippmann.rendering.transport.light_vertices import Arrival
 from lippmann.rendering.transport.path_techniques import (
     Absorption,
@@ -51,7 +51,6 @@ from lippmann.rendering.transport.path_weights import (
 )
 from lippmann.rendering.transport.prepared_light import PreparedLight
 from lippmann.rendering.transport.scene_features import SceneFeatures
-from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS, ShadowRays
 from lippmann.rendering.transport.tuning import TUNING
 
 

@@ -37,10 +37,10 @@ from lippmann.device.types import (
     Vector3f,
 )
 from lippmann.rendering.transport.integrator import FirstHit, PixelSample, RayCounts
+from lippmann.rendering.transport.light_sampling import MAX_CROSSINGS
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.path_vertex import DIMENSIONS, LastVertex, Scattering, Vertex
 from lippmann.rendering.transport.ray_source import PixelRays
-from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import follows_sharply, is_sharp
 from lippmann.rendering.transport.tuning import TUNING
 

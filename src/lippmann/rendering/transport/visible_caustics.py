@@ -8,10 +8,10 @@ import mitsuba as mi
 from lippmann.device.sobol import SampleStream
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, BSDFPtr, Ray3f, Spectrum, SurfaceInteraction3f, UInt32, Vector3f
+from lippmann.rendering.transport.light_sampling import MAX_CROSSINGS
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.path_vertex import DIMENSIONS
 from lippmann.rendering.transport.photon_map import PhotonMap
-from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import (
     facing_normal,
     follows_sharply,

@@ -30,11 +30,10 @@ from lippmann.device.types import (
     UInt32,
 )
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
-from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
+from lippmann.rendering.transport.light_sampling import MAX_CROSSINGS, LightSampler, SceneLightSampler
 from lippmann.rendering.transport.path_vertex import DIMENSIONS
 from lippmann.rendering.transport.path_weights import mis_weight, roulette_survival
 from lippmann.rendering.transport.scene_features import Color
-from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.tuning import TUNING
 
 #: Collisions, null collisions included, along one path or shadow ray: bounds the loop in media that are all but opaque.
