@@ -17,6 +17,7 @@ from lippmann.display import load_display
 from lippmann.errors import PictureError
 from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.runtime.atomic_write import temporary_file
 from lippmann.sequences.files import journal_of, saved_sequence
 from lippmann.sequences.motion import open_motion
 
@@ -94,7 +95,7 @@ def test_damaged_and_absent_frames_are_rendered_again(unbroken, moving_ball, dis
 @pytest.mark.long
 def test_what_was_half_written_is_swept(unbroken, moving_ball, display, tmp_path):
     run(moving_ball, display, tmp_path, most=1)
-    (tmp_path / ".f_03-0123abcd.part.png").write_bytes(b"half")
+    temporary_file(tmp_path / "f_03.png").write_bytes(b"half")
     run(moving_ball, display, tmp_path, resume=True)
     assert contents(tmp_path) == unbroken
 

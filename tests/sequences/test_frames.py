@@ -137,7 +137,7 @@ def test_every_frame_is_rendered_as_was_asked_for(moving_ball, display):
     motion, asked = open_motion(moving_ball), []
 
     class Form:
-        def render(self, scene, display, request, progress):
+        def render(self, scene, display, request, progress, build):
             asked.append((request.method, request.denoise))
             return Preview(np.zeros((2, 2, 3), np.float32), Provenance(method="full"))
 
@@ -150,7 +150,7 @@ def seeds(motion, frames, **options):
     asked = []
 
     class Form:
-        def render(self, scene, display, request, progress):
+        def render(self, scene, display, request, progress, build):
             asked.append((request.seed, request.fixed_noise))
             return Preview(np.zeros((2, 2, 3), np.float32), Provenance(method="full"))
 

@@ -17,7 +17,7 @@ from lippmann.options.choices import REUSING
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.session import Session, even_background, open_session
+from lippmann.rendering.session import Build, Session, even_background, open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.placement import Placement
 from lippmann.scene.scene import Scene
@@ -33,6 +33,7 @@ def render_picture(
     display: Display,
     request: RenderRequest,
     progress: ProgressCallback = silent,
+    build: Build | None = None,
     *,
     stands_as: Display | None = None,
 ) -> IntegralImage:
@@ -40,6 +41,8 @@ def render_picture(
 
     Parameters
     ----------
+    build:
+        As of :func:`~lippmann.rendering.session.open_session`.
     stands_as:
         A display of the same size, where this one is to stand where that one would.
 
@@ -52,7 +55,8 @@ def render_picture(
         request = replace(request, began=time.perf_counter())
     display.check_native()
     request = resolve(request, scene, display)
-    session = open_session(scene, request, (display.panel.width, display.panel.height), progress=progress)
+    size = display.panel.width, display.panel.height
+    session = open_session(scene, request, size, progress=progress, build=build)
     request = session.request
     placement = session.place(stands_as or display)
 
@@ -96,7 +100,7 @@ def render_picture(
     return IntegralImage(request.tone_mapped(frame.pixels), display, placement.world_from_display, provenance, maps)
 
 
-def choose_exposure(scene: Scene, display: Display, request: RenderRequest) -> float:
+def choose_exposure(scene: Scene, display: Display, request: RenderRequest, build: Build | None = None) -> float:
     """The automatic exposure in stops of a picture of ``scene``, without rendering it.
 
     Raises
@@ -104,7 +108,7 @@ def choose_exposure(scene: Scene, display: Display, request: RenderRequest) -> f
     UsageError, SceneError, EngineError
         As :func:`render_picture`.
     """
-    session = open_session(scene, resolve(request, scene, display))
+    session = open_session(scene, resolve(request, scene, display), build=build)
     placement = session.place(display)
     from lippmann.rendering.transport.ray_source import DisplayRays
 

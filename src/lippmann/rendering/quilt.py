@@ -16,7 +16,7 @@ from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.picture import placed_options
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.session import even_background, open_session
+from lippmann.rendering.session import Build, even_background, open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Color
@@ -41,6 +41,7 @@ def render_quilt(
     size: tuple[int, int],
     request: RenderRequest,
     progress: ProgressCallback = silent,
+    build: Build | None = None,
 ) -> QuiltFrame:
     """Render the views that cameras in front of ``display`` see, see
     :class:`~lippmann.rendering.transport.ray_source.QuiltRays`.
@@ -65,7 +66,7 @@ def render_quilt(
     if request.began is None:
         request = replace(request, began=time.perf_counter())
     request = resolve(request, scene, display, "quilt", size=size)
-    session = open_session(scene, request, size, progress=progress)
+    session = open_session(scene, request, size, progress=progress, build=build)
     request = session.request
     placement = session.place(display)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -51,6 +51,9 @@ if TYPE_CHECKING:
 DEFAULT_MEMORY_SHARE = 0.6
 
 T = TypeVar("T")
+
+#: :func:`lippmann.device.pbr.build`, or what stands for it.
+Build: TypeAlias = "Callable[..., BuiltScene]"
 
 
 @dataclass
@@ -322,6 +325,7 @@ def open_session(
     *,
     memory: int | None = None,
     progress: ProgressCallback = silent,
+    build: Build | None = None,
 ) -> Session:
     """Start the engine and build the scene; what cannot be done is refused before anything is loaded.
 
@@ -335,6 +339,8 @@ def open_session(
         Bytes that the picture may use, instead of the request's.
     progress:
         Told of all stages.
+    build:
+        Instead of :func:`lippmann.device.pbr.build`, such as for a scene that is kept on the device.
 
     Raises
     ------
@@ -348,7 +354,7 @@ def open_session(
     if request.denoises:
         load_denoiser()
     engine = watch.stage("load", lambda: engines.start(request.device, request.threads))
-    built = watch.stage("build", lambda: _build(scene, request, engine, memory))
+    built = watch.stage("build", lambda: _build(scene, request, engine, memory, build))
     request = _without_pooling(request, built)
     return Session(scene, request, engine, built, memory, watch)
 
@@ -384,16 +390,18 @@ def memory_limit(request: RenderRequest) -> int:
     return request.memory or int(machine.available_memory() * DEFAULT_MEMORY_SHARE)
 
 
-def _build(scene: Scene, request: RenderRequest, engine: engines.Engine, memory: int) -> BuiltScene | BuiltClassic:
+def _build(
+    scene: Scene, request: RenderRequest, engine: engines.Engine, memory: int, build: Build | None
+) -> BuiltScene | BuiltClassic:
     """The scene on the device, in the form that the integrator needs."""
     if request.integrator == "classic":
         from lippmann.device.whitted.scene import build_classic
 
         assert scene.classic is not None  # the resolver refuses others
         return build_classic(scene.classic)
-    from lippmann.device.pbr import build
+    from lippmann.device import pbr
 
-    return build(scene, engine, memory=memory)
+    return (build or pbr.build)(scene, engine, memory=memory)
 
 
 def make_integrator(built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix) -> Integrator:

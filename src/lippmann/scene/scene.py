@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -13,6 +14,7 @@ from lippmann.options.light import LightOptions
 from lippmann.runtime.engine_lock import cached_property
 from lippmann.scene.extreme_points import extreme_points_of, used_positions
 from lippmann.scene.light_options import change_environment, change_source
+from lippmann.scene.matrices import rotation_of
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.splat_clouds import check_splats, typical_points
 from lippmann.scene.values.description import (
@@ -58,6 +60,8 @@ class Scene:
     None for all others; ``home_may_move`` says that it need not be kept to exactly where a display shows more or less.
     ``studio`` says whether the built-in studio may light a scene that has no lights. ``light`` changes the direction
     and the strength of its light: :attr:`environment` and :attr:`lights` are those after that change.
+    ``light_moved`` is the rigid 4x4 matrix by which its light is moved after that, but for the studio's, which follows
+    the viewer; None for light that stays.
     ``has_chosen_background`` says that the background is of a colour that the caller asked for; ``settings`` are the
     options that it was read with, a line each (:func:`lippmann.options.texts.settings_of`).
 
@@ -79,6 +83,7 @@ class Scene:
     views: tuple[Camera, ...] = field(default=(), repr=False)
     light: LightOptions = field(default_factory=LightOptions, repr=False)
     has_chosen_background: bool = field(default=False, repr=False)
+    light_moved: Matrix | None = field(default=None, repr=False)
     settings: tuple[str, ...] = field(default=(), repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -217,9 +222,15 @@ class Scene:
     def environment(self) -> Environment | None:
         """Light from far away: the scene's or the caller's; the studio where the scene has no light at all."""
         original = self._original_environment
-        return None if original is None else change_environment(original, self.light)
+        if original is None:
+            return None
+        changed = change_environment(original, self.light)
+        if self.light_moved is None or changed.follows_viewer:
+            return changed
+        turned = rotation_of(self.light_moved) @ changed.world_from_environment
+        return replace(changed, world_from_environment=turned)
 
-    @property
+    @cached_property
     def _original_environment(self) -> Environment | None:
         if not self.in_studio:
             return self.physical.environment
@@ -232,7 +243,22 @@ class Scene:
         """The light sources of a description; none of a scene of Mitsuba's, which keeps its own."""
         if isinstance(self.physical, MitsubaSource):
             return ()
-        return tuple(change_source(light, self.light) for light in self.physical.lights)
+        changed = (change_source(light, self.light) for light in self.physical.lights)
+        if self.light_moved is None:
+            return tuple(changed)
+        return tuple(
+            replace(light, world_from_light=self.light_moved @ np.asarray(light.world_from_light)) for light in changed
+        )
+
+    def with_light_moved(self, matrix: Matrix) -> Scene:
+        """The scene with its light moved by a rigid ``matrix`` (4x4); what was derived of its content is kept.
+
+        A form for the classic light models is left out: its light would not have moved.
+        """
+        moved = copy.copy(self)
+        object.__setattr__(moved, "light_moved", matrix)
+        object.__setattr__(moved, "classic", None)
+        return moved
 
     @property
     def background(self) -> Color | None:

@@ -1,8 +1,7 @@
 """A scene on a turntable: the axis that it turns about, the scene at an angle, and the space that it sweeps.
 
-The display and all light stand still. A scene of meshes turns by the places of its meshes. The shapes of a scene for
-the classic light models keep their places, since some of them (boxes along the axes) cannot turn. There the display and
-the light sources go round the other way, which gives the same picture.
+The display and all light stand still, and the scene turns. What moves in numbers are the display and the light, which
+go round the other way: that gives the same picture, of shapes that keep their places and need not be built again.
 """
 
 from __future__ import annotations
@@ -18,11 +17,9 @@ from lippmann.scene.camera_placement import remove_scale
 from lippmann.scene.matrices import Bounds, Vector, inverse, rotation, transform_points, translation
 from lippmann.scene.placement import face_viewer
 from lippmann.scene.scene import Scene
-from lippmann.scene.splat_clouds import moved
-from lippmann.scene.values.description import Matrix, SceneDescription
+from lippmann.scene.values.description import Matrix
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.values.whitted_surfaces import Background, ClassicLight
-from lippmann.scene.volumes.grid import moved as moved_volume
 from lippmann.scene.whitted.world_frame import world_from_scene
 
 #: Steps (degrees) in which the outline of a scene and the space that it sweeps are measured. A circle's radius is exact
@@ -66,40 +63,15 @@ def turning_axis(scene: Scene, options: PlacementOptions) -> Vector:
     return axis[0], axis[1], axis[2]
 
 
-def moves_meshes(scene: Scene) -> bool:
-    """Whether a scene turns by itself; otherwise the display goes round it, by :func:`with_lights_moved`."""
-    return isinstance(scene.description, SceneDescription)
-
-
-def with_meshes_moved(scene: Scene, matrix: Matrix) -> Scene:
-    """The scene with its meshes moved by a rigid ``matrix`` (4x4, world from world); light and cameras stay."""
-    description = scene.description
-    assert isinstance(description, SceneDescription)
-    instances = [
-        replace(instance, world_from_mesh=matrix @ np.asarray(instance.world_from_mesh, np.float64))
-        for instance in description.instances
-    ]
-    splats = None if description.splats is None else moved(description.splats, matrix)
-    volume = None if description.volume is None else moved_volume(description.volume, matrix)
-    # A form for the classic light models would not have turned.
-    return replace(
-        scene, description=replace(description, instances=instances, splats=splats, volume=volume), classic=None
-    )
-
-
 def with_lights_moved(scene: Scene, matrix: Matrix) -> Scene:
     """The scene with its light sources, environment and background moved by a rigid ``matrix``; its shapes stay.
 
     Light sources in a scene of Mitsuba's are parts of it and stay, too; an environment that was given instead moves.
     """
-    if scene.description is None:
-        assert scene.classic is not None
-        return replace(scene, classic=_classic_lights_moved(scene.classic, matrix))
-    environment = scene.description.environment
-    if environment is None:
-        return scene
-    turned = replace(environment, world_from_environment=_turn_of(matrix) @ environment.world_from_environment)
-    return replace(scene, description=replace(scene.description, environment=turned))
+    if scene.description is not None:
+        return scene.with_light_moved(matrix)
+    assert scene.classic is not None
+    return replace(scene, classic=_classic_lights_moved(scene.classic, matrix))
 
 
 def outline(scene: Scene, axis: Vector, center: Vector | Bounds) -> Bounds:
@@ -140,12 +112,6 @@ def _frame_along(axis: Vector) -> Matrix:
     matrix = np.eye(4)
     matrix[:3, :3] = np.stack([right, up, np.cross(right, up)])
     return matrix
-
-
-def _turn_of(matrix: Matrix) -> Matrix:
-    turn = np.eye(4)
-    turn[:3, :3] = matrix[:3, :3]
-    return turn
 
 
 def _classic_lights_moved(scene: ClassicScene, matrix: Matrix) -> ClassicScene:

@@ -25,6 +25,7 @@ from lippmann.scene.placement import options_of_sequence
 from lippmann.sequences.files import SavedFrame
 from lippmann.sequences.forms import INTEGRAL, QuiltForm
 from lippmann.sequences.frames import Stand, find_stand, hold_exposure, of_frame
+from lippmann.sequences.kept_scene import KeptScene
 from lippmann.sequences.motion import Motion
 from lippmann.viewing.color_and_depth import rgbd_codes
 from lippmann.viewing.hololuminescent import HEIGHT, WIDTH, for_hololuminescent
@@ -235,16 +236,17 @@ class QuiltCameras:
     request: RenderRequest
     layout: QuiltLayout
     _where: Stand | None = field(default=None, init=False)
+    _kept: KeptScene = field(default_factory=KeptScene, init=False)
 
     def __call__(self, frame: int) -> Quilt:
         where = self._begin() if self._where is None else self._where
         request = replace(of_frame(self.request, frame), placement=where(frame))
-        return self._form().render(self.motion.scene(frame), self.display, request, silent)
+        return self._form().render(self.motion.scene(frame), self.display, request, silent, self._kept.build)
 
     def _begin(self) -> Stand:
         """Find where the display stands, and what of the request a quilt can honour."""
         self._where = find_stand(self.motion, self.display, options_of_sequence(self.request.placement))
-        held = hold_exposure(self.request, self.motion, self.display, self._where)
+        held = hold_exposure(self.request, self.motion, self.display, self._where, self._kept.build)
         method = "full" if held.method in REUSING else held.method
         self.request = replace(held, method=method, order=None, respect_gloss=None, subpixels=False, layers=False)
         return self._where

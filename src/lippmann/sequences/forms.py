@@ -16,6 +16,7 @@ from lippmann.progress import ProgressCallback
 from lippmann.quilts.files import read_quilt, write_quilt
 from lippmann.quilts.quilt import DeviceQuilt, Quilt
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.session import Build
 from lippmann.scene.scene import Scene
 
 #: An integral image, or a quilt.
@@ -31,8 +32,10 @@ class Form(ABC, Generic[Shown]):
         """What an unfinished sequence has to agree in with one that goes on with it, besides the render's request."""
 
     @abstractmethod
-    def render(self, scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback) -> Shown:
-        """Render a frame; errors as of the renderer."""
+    def render(
+        self, scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback, build: Build
+    ) -> Shown:
+        """Render a frame of a scene that ``build`` builds; errors as of the renderer."""
 
     @abstractmethod
     def write(self, frame: Shown, path: Path, bits: int | None) -> None:
@@ -55,11 +58,11 @@ class IntegralForm(Form[IntegralImage]):
         return {}
 
     def render(
-        self, scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback
+        self, scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback, build: Build
     ) -> IntegralImage:
         from lippmann.rendering.picture import render_picture
 
-        return render_picture(scene, display, request, progress)
+        return render_picture(scene, display, request, progress, build)
 
     def write(self, frame: IntegralImage, path: Path, bits: int | None) -> None:
         frame.save(path, bits=bits)
@@ -88,12 +91,14 @@ class QuiltForm(Form[Quilt]):
         layout, size = self.quilt.layout, (self.quilt.width, self.quilt.height)
         return {"the quilt": f"{layout.columns}x{layout.rows} views, {size[0]}x{size[1]} pixels"}
 
-    def render(self, scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback) -> Quilt:
+    def render(
+        self, scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback, build: Build
+    ) -> Quilt:
         from lippmann.rendering.quilt import render_quilt
 
         layout = self.quilt.layout
         grid, size = (layout.columns, layout.rows), (self.quilt.width, self.quilt.height)
-        frame = render_quilt(scene, display, grid, size, request, progress)
+        frame = render_quilt(scene, display, grid, size, request, progress, build)
         return Quilt(frame.pixels, layout, provenance=frame.provenance)
 
     def write(self, frame: Quilt, path: Path, bits: int | None) -> None:

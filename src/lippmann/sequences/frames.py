@@ -19,9 +19,11 @@ from lippmann.errors import SceneError, UsageError
 from lippmann.options.placement import Mode, PlacementOptions
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.session import Build
 from lippmann.scene.placement import Placement, options_of_sequence, place, stand
 from lippmann.scene.values.description import Camera, Matrix
 from lippmann.sequences.forms import INTEGRAL, Form, QuiltForm, Shown
+from lippmann.sequences.kept_scene import KeptScene
 from lippmann.sequences.motion import Motion, open_motion
 
 if TYPE_CHECKING:
@@ -301,11 +303,12 @@ def render_frames(
     progress: ProgressCallback,
 ) -> Iterator[tuple[int, Shown]]:
     """The frames of :func:`render_sequence`, in any form, once it is known where the display stands."""
-    request = hold_exposure(request, motion, display, where)
+    kept = KeptScene()
+    request = hold_exposure(request, motion, display, where, kept.build)
     for position, frame in enumerate(frames):
         report = _report_of_frame(progress, position, len(frames))
         asked = replace(of_frame(request, frame), placement=where(frame))
-        image = form.render(motion.scene(frame), display, asked, report)
+        image = form.render(motion.scene(frame), display, asked, report, kept.build)
         made = image.provenance
         yield frame, replace(image, provenance=replace(made, options={**made.options, "frame": frame}))
 
@@ -341,7 +344,9 @@ def render_tiled_frames(
         )
 
 
-def hold_exposure(request: RenderRequest, motion: Motion, display: Display, where: Stand) -> RenderRequest:
+def hold_exposure(
+    request: RenderRequest, motion: Motion, display: Display, where: Stand, build: Build | None = None
+) -> RenderRequest:
     """``request`` with the exposure that suits the motion's first frame, whichever frames are rendered."""
     scene = motion.scene(0)
     if request.exposure != "auto" or not scene.has_physical_lights:
@@ -349,7 +354,7 @@ def hold_exposure(request: RenderRequest, motion: Motion, display: Display, wher
     from lippmann.rendering.picture import choose_exposure
 
     still = replace(request, placement=where(0), fixed_noise=False)
-    return replace(request, exposure=choose_exposure(scene, display, still))
+    return replace(request, exposure=choose_exposure(scene, display, still, build))
 
 
 def of_frame(request: RenderRequest, number: int) -> RenderRequest:

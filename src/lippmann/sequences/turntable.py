@@ -18,12 +18,10 @@ from lippmann.scene.placement import Placement, face_viewer, place
 from lippmann.scene.scene import Scene
 from lippmann.scene.turntable import (
     STEP,
-    moves_meshes,
     swept_points,
     turn_about,
     turning_axis,
     with_lights_moved,
-    with_meshes_moved,
 )
 from lippmann.scene.values.description import Camera, Matrix
 from lippmann.sequences.motion import Motion
@@ -88,16 +86,13 @@ class Turntable(Motion):
         return 360.0 * share if self._swing is None else self._swing / 2.0 * math.sin(2.0 * math.pi * share)
 
     def scene(self, frame: int) -> Scene:
-        turn = self._turn(self.angle(frame))
-        if moves_meshes(self._scene):
-            return with_meshes_moved(self._scene, turn)
-        return with_lights_moved(self._scene, inverse(turn))
+        return with_lights_moved(self._scene, self.display_turn(frame))
 
     def camera(self, frame: int, name: str | None) -> Camera | None:
         return None
 
     def display_turn(self, frame: int) -> Matrix:
-        return np.eye(4) if moves_meshes(self._scene) else inverse(self._turn(self.angle(frame)))
+        return inverse(self._turn(self.angle(frame)))
 
     def bounds(self) -> Bounds:
         return _box_of(self.swept())

@@ -1,0 +1,72 @@
+"""A scene that is kept on the device while only the display and far light move, as if it were built for each frame."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import lippmann
+from lippmann.device import pbr
+from lippmann.display import load_display
+from lippmann.scene.values.description import Environment, Light
+from lippmann.sequences.frames import render_sequence
+from lippmann.sequences.motion import open_motion
+from lippmann.sequences.turntable import open_turntable
+
+QUICK = {"integrator": "path", "spp": 2, "device": "cpu"}
+
+
+@pytest.fixture(scope="module")
+def display():
+    return load_display("seed-lenticular").resized(64, 64)
+
+
+@pytest.fixture
+def builds(monkeypatch):
+    """Names of the scenes that were built."""
+    built, build = [], pbr.build
+
+    def counted(scene, *args, **options):
+        built.append(scene.name)
+        return build(scene, *args, **options)
+
+    monkeypatch.setattr(pbr, "build", counted)
+    return built
+
+
+def sky():
+    """Bright on one side: turned, it lights another."""
+    pixels = np.full((8, 16, 3), 0.1, np.float32)
+    pixels[2:4, 3:5] = 20.0
+    return Environment(pixels)
+
+
+def teapot(**more):
+    scene = lippmann.load_scene("teapot")
+    return replace(scene, description=replace(scene.physical, **more), classic=None)
+
+
+@pytest.mark.parametrize("lit", ["studio", "sky"])
+def test_a_turn_builds_once_and_shows_what_frames_built_alone_show(engine, display, builds, lit):
+    scene = teapot() if lit == "studio" else teapot(environment=sky(), background=None)
+    motion = open_turntable(scene, 5)
+    together = {frame: image.pixels for frame, image in render_sequence(motion, display, [0, 1, 3], **QUICK)}
+    assert len(builds) == 1
+    for frame in (1, 3):
+        ((_, alone),) = render_sequence(motion, display, [frame], **QUICK)
+        assert np.array_equal(alone.pixels, together[frame])
+    assert len(builds) == 3
+
+
+def test_a_light_source_that_goes_along_is_placed_anew(engine, display, builds):
+    lamp = Light("point", (80.0, 80.0, 80.0), np.array([[1, 0, 0, 6], [0, 1, 0, 4], [0, 0, 1, 6], [0, 0, 0, 1.0]]))
+    motion = open_turntable(teapot(lights=[lamp]), 4)
+    list(render_sequence(motion, display, [0, 1], **QUICK))
+    assert len(builds) == 2
+
+
+def test_what_moves_is_built_for_each_frame(engine, display, builds, moving_ball):
+    list(render_sequence(open_motion(moving_ball), display, [0, 5], **QUICK))
+    assert len(builds) == 2
