@@ -18,6 +18,7 @@ import defaults_tables
 import drafts_tables
 import equal_error_tables
 import estimate_coverage_tables
+import films_tables
 import first_picture_tables
 import goals_tables
 import half_and_double
@@ -406,6 +407,7 @@ SECTIONS = {
     "light_vertices": light_vertices_tables.describe,
     "equal_error": equal_error_tables.describe,
     "goals": goals_tables.describe,
+    "films": films_tables.describe,
     "drafts": drafts_tables.describe,
     "estimate_coverage": estimate_coverage_tables.describe,
     "reuse": _reuse,

@@ -1,0 +1,66 @@
+"""The section of ``docs/background/measurements.md`` on films, from ``films.py``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def describe(result: dict[str, Any]) -> str:
+    """One table of time and memory, and one of errors, for each display."""
+    parts = []
+    for display in dict.fromkeys(row["display"] for row in result["rows"]):
+        rows = [row for row in result["rows"] if row["display"] == display]
+        parts.append(f"### Films on {display}\n\n" + _times(rows))
+        if judged := [row for row in rows if "psnr" in row["today"]]:
+            parts.append(_errors(judged))
+    missing = [f"{name} {reason}." for name, reason in result["missing"].items()]
+    if missing:
+        parts.append("Left out: " + " ".join(missing))
+    commits = dict.fromkeys(tuple(row["commits"].values()) for row in result["rows"])
+    said = "; ".join(f"{other} and, after the arrows, {today}" for other, today in commits)
+    return f"""## Films beside an earlier version (`films.py`)
+
+`lippmann render SCENE --display NAME --depth-scale 0.5` for five frames and for two, whole commands in processes of
+their own, in turn; commit {said}. The time of a frame is a third of the difference of their processor seconds, one run
+of each on a busy machine. A still is the first frame alone. Turntables have 48 frames, the swing covers 40 degrees.
+Films in italics are of bundled scenes; the others no setting was tuned on.
+
+{(chr(10) * 2).join(parts)}
+"""
+
+
+def _name(row: dict[str, Any]) -> str:
+    return f"*{row['film']}*" if row["seen"] else str(row["film"])
+
+
+def _times(rows: list[dict[str, Any]]) -> str:
+    lines = ["| film | a frame | ratio | peak memory | that of a still | over it | samples |", "|" + "---|" * 7]
+    for row in rows:
+        a, b = row["other"], row["today"]
+        lines.append(
+            f"| {_name(row)} | {a['seconds']:.2f} → {b['seconds']:.2f} s | {b['seconds'] / a['seconds']:.2f} | "
+            f"{a['peak'] / 1e6:.0f} → {b['peak'] / 1e6:.0f} MB | "
+            f"{a['still_peak'] / 1e6:.0f} → {b['still_peak'] / 1e6:.0f} MB | "
+            f"{a['peak'] / a['still_peak']:.2f} → {b['peak'] / b['still_peak']:.2f} | {a['spp']} → {b['spp']} |"
+        )
+    return "\n".join(lines)
+
+
+def _errors(rows: list[dict[str, Any]]) -> str:
+    lines = [
+        "PSNR in dB of the first frames, and of the differences of successive ones, against two plain renderings of",
+        "the same native pixels whose noise cancels. Beside the arrows in brackets: this commit with `--fixed-noise`.",
+        "",
+        "| film | frames | as an eye sees them | differences | as an eye sees them | stated of the first |",
+        "|" + "---|" * 6,
+    ]
+    for row in rows:
+        cells = [
+            f"{row['other'][key]:.1f} → {row['today'][key]:.1f} ({row['fixed'][key]:.1f})"
+            for key in ("psnr", "eye_psnr", "flicker", "eye_flicker")
+        ]
+        stated = " → ".join(
+            "none" if row[side]["stated"] is None else f"{row[side]['stated']:.1f}" for side in ("other", "today")
+        )
+        lines.append(f"| {_name(row)} | {' | '.join(cells)} | {stated} |")
+    return "\n".join(lines)
