@@ -9,9 +9,11 @@ import pytest
 
 import lippmann
 from lippmann.device import pbr
+from lippmann.device.pbr import scene as scene_module
 from lippmann.display import load_display
 from lippmann.scene.values.description import Environment, Light
 from lippmann.sequences.frames import render_sequence
+from lippmann.sequences.kept_scene import KeptScene
 from lippmann.sequences.motion import open_motion
 from lippmann.sequences.turntable import open_turntable
 
@@ -67,6 +69,22 @@ def test_a_light_source_that_goes_along_is_placed_anew(engine, display, builds):
     assert len(builds) == 2
 
 
-def test_what_moves_is_built_for_each_frame(engine, display, builds, moving_ball):
-    list(render_sequence(open_motion(moving_ball), display, [0, 5], **QUICK))
+def test_an_animation_keeps_its_materials_and_shows_what_frames_built_alone_show(
+    engine, display, builds, moving_ball, monkeypatch
+):
+    made, make = [], scene_module.make_finishes
+    monkeypatch.setattr(scene_module, "make_finishes", lambda *args, **more: made.append(1) or make(*args, **more))
+    motion = open_motion(moving_ball)
+    together = {frame: image.pixels for frame, image in render_sequence(motion, display, [0, 5], **QUICK)}
     assert len(builds) == 2
+    assert len(made) == 1
+    ((_, alone),) = render_sequence(motion, display, [5], **QUICK)
+    assert np.array_equal(alone.pixels, together[5])
+
+
+def test_other_materials_are_made_anew(engine):
+    scene, kept = teapot(), KeptScene()
+    first = kept.build(scene, engine)
+    red = [replace(material, base_color=(1.0, 0.0, 0.0)) for material in scene.physical.materials]
+    second = kept.build(teapot(materials=red), engine)
+    assert not set(map(id, first.finishes.values())) & set(map(id, second.finishes.values()))

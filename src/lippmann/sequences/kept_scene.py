@@ -1,4 +1,4 @@
-"""The scene on the device, kept from frame to frame where nothing moves but the display and light from far away."""
+"""What of a scene on the device is kept from frame to frame."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ from typing import TYPE_CHECKING
 
 from lippmann.runtime.engine import Engine
 from lippmann.scene.scene import Scene
+from lippmann.scene.values.description import SceneDescription
 
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
 
 
 class KeptScene:
-    """Builds scenes as :func:`lippmann.device.pbr.build` does, or turns the light of the last one.
+    """Builds scenes as :func:`lippmann.device.pbr.build` does, with what they share with the last one.
 
-    On a turntable, and where a camera flies, shapes, materials and textures stay as they are. The picture is that of a
-    scene built anew, byte for byte.
+    On a turntable, and where a camera flies, shapes stay as they are, and light from far away is turned. An animation
+    keeps its materials and textures. The picture is that of a scene built anew, byte for byte.
     """
 
     def __init__(self) -> None:
@@ -26,13 +27,16 @@ class KeptScene:
         from lippmann.device.pbr import build
         from lippmann.device.pbr.emitters import turn_environment
 
-        if self._last is not None and _differs_by_far_light(self._last[0], scene):
+        if self._last is None:
+            built = build(scene, engine, memory=memory)
+        elif _differs_by_far_light(self._last[0], scene):
             built = self._last[1]
             if scene.environment is not None:
                 turn_environment(built.mitsuba.environment(), scene.environment.world_from_environment)
         else:
+            finishes = self._last[1].finishes if _has_same_materials(self._last[0], scene) else None
             self._last = None  # two scenes may not fit the memory
-            built = build(scene, engine, memory=memory)
+            built = build(scene, engine, memory=memory, finishes=finishes)
         self._last = scene, built
         return built
 
@@ -45,6 +49,16 @@ def _differs_by_far_light(one: Scene, other: Scene) -> bool:
     if one is other:
         return True
     return one.physical is other.physical and one.light == other.light and not one.lights
+
+
+def _has_same_materials(one: Scene, other: Scene) -> bool:
+    """Whether all materials of two scenes are the same objects."""
+    before, after = one.physical, other.physical
+    if not (isinstance(before, SceneDescription) and isinstance(after, SceneDescription)):
+        return False
+    if len(before.materials) != len(after.materials) or before.multiple_scattering != after.multiple_scattering:
+        return False
+    return all(old is new for old, new in zip(before.materials, after.materials, strict=True))
 
 
 __all__ = ["KeptScene"]

@@ -7,7 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -56,6 +56,8 @@ class BuiltScene:
         Gaussian splats that can be seen, which are no part of the ``mi.Scene``.
     volume:
         A volume, which is no part of it, either.
+    finishes:
+        Materials on the device, by what of them meshes use.
     notes:
         What could not be honoured, one line each.
     seconds:
@@ -73,15 +75,24 @@ class BuiltScene:
     has_media: bool = False
     splats: SplatTable | None = None
     volume: VolumeTable | None = None
+    finishes: Mapping[Variant, Finish] = field(default_factory=dict)
 
 
-def build(scene: Scene, engine: engines.Engine | None = None, *, memory: int | None = None) -> BuiltScene:
+def build(
+    scene: Scene,
+    engine: engines.Engine | None = None,
+    *,
+    memory: int | None = None,
+    finishes: Mapping[Variant, Finish] | None = None,
+) -> BuiltScene:
     """Make a Mitsuba scene under the variant of ``engine``, a running engine; None starts one.
 
     Parameters
     ----------
     memory:
         Bytes that the scene's shapes may take; None for all that is free.
+    finishes:
+        Those of another scene of the same materials, which are used again where meshes use the same of them.
 
     Raises
     ------
@@ -98,13 +109,18 @@ def build(scene: Scene, engine: engines.Engine | None = None, *, memory: int | N
     description = replace(
         scene.physical, environment=scene.environment, background=scene.background, lights=scene.lights
     )
-    return build_description(description, memory=memory)
+    return build_description(description, memory=memory, finishes=finishes)
 
 
-def build_description(description: SceneDescription, *, memory: int | None = None) -> BuiltScene:
+def build_description(
+    description: SceneDescription,
+    *,
+    memory: int | None = None,
+    finishes: Mapping[Variant, Finish] | None = None,
+) -> BuiltScene:
     """Make a Mitsuba scene of a description as it stands, under the variant that runs.
 
-    ``memory`` is that of :func:`build`.
+    ``memory`` and ``finishes`` are those of :func:`build`.
 
     Raises
     ------
@@ -119,7 +135,9 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
             "the scene has no geometry", where=description.name, rule="there must be at least one triangle"
         )
     with _time_stage(seconds, "materials"):
-        finishes = _finishes(description, list(placed))
+        variants = [_variant(description, mesh) for mesh in placed]
+        if finishes is None or finishes.keys() != set(variants):
+            finishes = _finishes(description, variants)
         notes += _texture_notes(description, finishes)
     with _time_stage(seconds, "shapes"):
         dressed = [(_dress(description, mesh, finishes), matrices) for mesh, matrices in placed.items()]
@@ -152,6 +170,7 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
         seconds=seconds,
         splats=splats,
         volume=volume,
+        finishes=finishes,
     )
 
 
@@ -220,8 +239,7 @@ def _variant(description: SceneDescription, mesh: int) -> Variant:
     )
 
 
-def _finishes(description: SceneDescription, meshes: Sequence[int]) -> dict[Variant, Finish]:
-    variants = [_variant(description, mesh) for mesh in meshes]
+def _finishes(description: SceneDescription, variants: Sequence[Variant]) -> dict[Variant, Finish]:
     compensates = description.multiple_scattering
     made = make_finishes(description.materials, variants, TextureStore(), compensates=compensates)
     return {variant: finish for finish in made for variant in finish.members}
