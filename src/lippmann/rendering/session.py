@@ -217,7 +217,7 @@ class Session:
         return integrator
 
     def counted_exposure(self, own_exposure: float) -> float:
-        """A camera's own exposure where it counts: for light that the file brings, not for the studio's."""
+        """A camera's own exposure if the light is the scene file's; 0 for the studio's light."""
         scene = self.scene
         is_lit = scene.has_physical_lights or (scene.environment is not None and not scene.in_studio)
         return own_exposure if is_lit else 0.0
@@ -306,7 +306,7 @@ class Session:
         if background is None and scene is not None and scene.environment() is None:
             background = (0.0, 0.0, 0.0)
         if not has_pixels and background is not None and max(background) == 0.0:
-            return ()  # glowing surfaces in front of a black background send no rays on
+            return ()  # neither colours nor rays would tell emitters from the background: paths end at both
         return warn_of_emptiness(visible_share(frame.pixels if has_pixels else None, background, frame.rays, work))
 
     @property

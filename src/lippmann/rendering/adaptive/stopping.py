@@ -124,7 +124,7 @@ def _floor(value: float) -> float:
 
 
 def goal_of(request: RenderRequest) -> Goal:
-    """When a picture of this request is to stop: a default one takes of its reserve until it is clean."""
+    """The goal of a request. A default picture takes samples of its reserve until its estimated PSNR is good enough."""
     if request.is_open_ended:
         return Goal(request.quality, request.quality_worst, request.max_time, request.spp)
     if request.spp_reserve is None:
@@ -162,12 +162,12 @@ def reach(
     Parameters
     ----------
     first:
-        Samples per pixel of the first round. Where time is limited, a single one goes before them, which tells how long
-        it takes.
+        Samples per pixel of the first round. With a time limit a round of a single sample comes first, to measure how
+        long a sample takes.
     slope:
         Expected power of the sample count by which the squared error falls.
     assessment:
-        Seconds that denoising and an estimate take, before they were done once.
+        Expected seconds of denoising and of an estimate, until they have been measured.
     """
     began = clock() if goal.began is None else goal.began
     first, note, expected = min(first, goal.most), "", 0.0

@@ -62,7 +62,7 @@ class Denoised:
     threads:
         CPU threads.
     coverage:
-        Coverage by either half of the guides' rays; None where it is not known.
+        Returns the coverage by each half of the feature buffers' rays; None, or returns None, where it is not known.
     """
 
     def __init__(
@@ -148,13 +148,13 @@ class Denoised:
         return first, second
 
     def _coverages(self) -> list[tuple[Coverage, Coverage]] | None:
-        """Coverage of each half by its paths and by its rays of the guides; None where either is not known."""
+        """Coverage of each half-buffer by its paths, and by its feature rays; None where either is not known."""
         paths = self._renderer.coverage_halves()
         further = None if paths is None or self._coverage is None else self._coverage()
         return None if paths is None or further is None else list(zip(paths, further, strict=True))
 
     def _slope(self, noisy: tuple[Floats, Floats]) -> Floats:
-        """Slope of a pixel's code between picture and truth, per linear difference."""
+        """Factor from linear errors to errors of the code, per pixel: the curve's slope, or a finite difference."""
         picture, transfer = self._mean(), self._transfer
         slope = coding_slope(picture, transfer)
         displayed = np.float32(0.5) * (noisy[0] + noisy[1])

@@ -1,4 +1,4 @@
-"""Open Image Denoise for the successive states of one picture, with guides that are traced once.
+"""Open Image Denoise for the successive states of one picture, with feature buffers ("guides") that are traced once.
 
 The network gets the pixels in panel order: near the lens plane they look like a plain picture. Sky and background
 behind all surfaces have no noise. So the network gets the rectangle that contains all surfaces, and its output is used
@@ -222,7 +222,7 @@ def denoise_surfaces(
     turned: bool = False,
     threads: int | None = None,
 ) -> Floats:
-    """The picture without its noise; arguments as those of :func:`~lippmann.rendering.denoise.oidn.denoise`.
+    """The denoised picture; arguments as those of :func:`~lippmann.rendering.denoise.oidn.denoise`.
 
     The network gets the rectangle of the ``surfaces``, those of ``normal``. Pixels that are not near a surface are left
     as they are, so that no border of that rectangle shows.

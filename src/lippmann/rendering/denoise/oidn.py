@@ -159,7 +159,8 @@ def denoiser_version() -> str | None:
 
 # ---- Devices: the GPU if the engine runs there, else the CPU ----
 
-#: Devices by their CPU threads, made once: that takes longer than a small picture. No threads: the GPU's.
+#: Devices by their number of CPU threads, None for the GPU's. Each is made once: that takes longer than to denoise a
+#: small picture.
 _devices: dict[int | None, OidnDevice] = {}
 
 

@@ -83,8 +83,8 @@ def _color_around(
         color += weight[:, None] * value
         square += weight[:, None] * np.square(value)
     each = np.maximum(total, _LEAST_WEIGHT)[:, None]
-    # Values beyond white are clipped, as a highlight is no colour of a whole side; but a side that is far beyond white
-    # in all pixels keeps its brightness: the mean less one standard deviation.
+    # Values beyond white are clipped, so that one highlight does not set the colour of its side. A side that is far
+    # beyond white in all its pixels keeps the mean minus one standard deviation.
     mean = color / each
     deviation = np.sqrt(np.maximum(square / each - np.square(mean), 0))
     return total, np.maximum(within / each, mean - deviation)

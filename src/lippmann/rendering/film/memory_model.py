@@ -48,12 +48,13 @@ def batches(number: int) -> int:
 
 
 def photons(emissions: int, passes: int) -> int:
-    """Bytes of the photons of passes of so many emissions in both halves of the samples: one is held while the next is
+    """Bytes of the photons of passes of so many emissions, for both half-buffers: one pass is kept while the next is
     shot."""
     return 2 * min(passes, 2) * emissions * PHOTON
 
 
-#: A pixel of a tile: its batches and a wavefront; with what denoising adds, a pixel of a tile with its margin.
+#: Bytes per pixel of a tile: its batches and a lane of its wavefront. A denoised tile adds those of the denoiser, for
+#: the pixels of its margin, too.
 TILE = batches(MOST_BATCHES) + BYTES_PER_LANE
 DENOISED_TILE = TILE + DENOISER
 

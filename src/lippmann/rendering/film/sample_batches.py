@@ -51,7 +51,7 @@ class FullInBatches(BatchedPicture):
     Parameters
     ----------
     integrator, source:
-        What is gathered along which rays.
+        The integrator, and the rays that it traces.
     seed:
         0 to 2**32 - 1. With the same calls of :meth:`add` the same seed gives the same picture.
     box_filter:

@@ -224,7 +224,7 @@ def sum_samples(sample: PixelSample, channels: int, batches: int, count: int) ->
 
 
 def select_colors(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """``(pixels, ..., 3)`` from ``(pixels, channels, ..., 3)``: the own colour of each sub-pixel.
+    """``(pixels, ..., 3)`` from ``(pixels, channels, ..., 3)``: of each sub-pixel's samples, the colour that it shows.
 
     The rays of a sub-pixel carry all three colours.
     """

@@ -1,8 +1,8 @@
-"""Exposure: by how many stops a scene's light is raised or lowered, and how that is chosen.
+"""Automatic exposure in stops (EV).
 
-Physical light sources are told in lux and candela, and their pictures clip without an exposure. As a camera does, the
-automatic exposure brings the median of what is lit to mid-grey: the median over small blocks of the mean of their lit
-pixels, for where few paths find the light, most pixels of a look are far darker than they will be.
+Physical light sources have units such as lux and candela, and their pictures clip without an exposure. As in a camera,
+the automatic exposure brings the median luminance of the lit pixels to mid-grey. It is the median over small blocks of
+the mean of their lit pixels: where few paths find the light, most pixels of one sample are far too dark.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ def gain_of(exposure: float) -> float:
 def measure_exposure(
     integrator: Integrator, source: RaySource, background: Color | None, memory: int, seed: int
 ) -> float:
-    """Exposure in stops (EV) that brings the median luminance of what is lit to mid-grey; 0 where nothing is lit.
+    """Exposure in stops (EV) that brings the median luminance of lit pixels to mid-grey; 0 where none is lit.
 
     Parameters
     ----------
     integrator:
-        Not yet exposed.
+        An integrator without exposure.
     source:
-        Rays of the whole picture: parts of one picture must be told the same.
+        Rays of the whole picture: all parts of a picture must get the same exposure.
     background:
-        What rays see that meet nothing, which is not counted; None for an environment, which is.
+        Colour of rays that hit nothing, which do not count; None for an environment, which counts.
     memory, seed:
-        Bytes that this may take, and the picture's seed.
+        Bytes that may be used, and the picture's seed.
     """
     columns, rows = (
         (2 * np.arange(count) + 1) * length // (2 * count)
@@ -56,7 +56,7 @@ def measure_exposure(
 def exposure_for(pixels: NDArray[np.float32], background: Color | None) -> float:
     """The exposure in stops for linear RGB ``(height, width, 3)``; see :func:`measure_exposure`.
 
-    It is rounded, so that all machines that render a picture choose the same.
+    Rounded, so that all machines that render parts of a picture choose the same.
     """
     luminance = pixels.astype(np.float64) @ xyz_from_rgb(REC709)[1]
     lit = luminance > 0

@@ -1,6 +1,6 @@
-"""The pilot of a picture: a few paths through all of it, by which every rule of the preparation decides.
+"""The pilot of a picture: a few paths through all its pixels, whose results decide how its light is prepared.
 
-All emitters are sampled along the same paths, so that their contributions differ by nothing else.
+Each emitter is sampled along the same paths, so that differences between contributions come from the emitters alone.
 
 Mitsuba samples all emitters uniformly unless a scene sets weights. Emitters that light nothing in the picture then take
 their share too: a sky outside a closed room takes half of all shadow rays. Here an emitter is sampled in proportion to
@@ -34,20 +34,20 @@ from lippmann.rendering.transport.tuning import TUNING as TRANSPORT
 
 @dataclass(frozen=True, eq=False)
 class Pilot:
-    """What the pilot paths of a picture met.
+    """Results of the pilot paths of a picture.
 
     Attributes
     ----------
     moments:
         ``(emitters,)`` in the order of ``mi.Scene.emitters()``: second moment of the contribution of each emitter to a
-        path, clipped at 1; all 0 in scenes of more emitters than are told apart.
+        path, clipped at 1; all 0 in scenes with too many emitters to weight them.
     indirect:
-        ``(paths,)``: radiance, the mean of its components, that emitters with a place bring to a path by rough surfaces
-        beyond one that scatters evenly.
+        ``(paths,)``: indirect radiance of each path, mean of its components, from emitters at a finite distance: light
+        at rough surfaces that a path reaches by diffuse scattering.
     placed:
-        Number of emitters with a place in the scene.
+        Number of emitters at a finite distance: areas, points, spots.
     region:
-        Corners ``(2, 3)`` of a box about what the picture shows; None where it shows nothing.
+        Corners ``(2, 3)`` of a box around the visible points; None where the picture shows no surface.
     """
 
     moments: NDArray[np.float64]
@@ -56,15 +56,15 @@ class Pilot:
     region: NDArray[np.float64] | None
 
     def bright_indirect(self, gain: float) -> float:
-        """Second moment of what of :attr:`indirect` is brighter than white, exposed by ``gain`` and clipped."""
+        """Second moment of :attr:`indirect`, exposed by ``gain`` and clipped, over the paths where it exceeds white."""
         exposed = np.minimum(self.indirect * gain, TUNING.most_indirect)
         return float(np.square(exposed[exposed > 1]).sum() / len(exposed))
 
 
 def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
-    """The pilot of the picture of ``source``; it depends on the scene, the ray depth and the rays alone.
+    """Trace the pilot of the picture of ``source``, which depends on the scene, the ray depth and the rays alone.
 
-    None is traced in scenes that are lit by their sky alone: no rule asks for it there. ``integrator`` samples all
+    In scenes that are lit by their environment alone nothing is traced, as no rule needs it. ``integrator`` samples
     emitters uniformly.
     """
     lights = integrator.scene.emitters()
@@ -89,7 +89,7 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
 
 
 def brightest_specular_light(integrator: PathIntegrator, source: RaySource) -> float:
-    """Largest radiance, exposed, the mean of its components, that a chain of sharp events shows in the picture."""
+    """Largest exposed radiance, mean of its components, of the pilot's specular chains."""
     stream, column, row, _ = _place_of(dr.arange(mi.UInt32, TUNING.pilot_chains), source)
     pixel, number = PixelRays(source, column, row, mi.UInt32(0)), dr.opaque(mi.UInt32, 1)
     light = integrator.exposed(specular_light(integrator, pixel, stream, number, mi.Bool(True))[0])
@@ -97,7 +97,7 @@ def brightest_specular_light(integrator: PathIntegrator, source: RaySource) -> f
 
 
 def _place_of(path: UInt32, source: RaySource) -> tuple[SampleStream, UInt32, UInt32, Point2f]:
-    """Samples of each path by its number; column and row of its pixel, and its place in it."""
+    """For each path by its number: its sample stream, the column and row of its pixel, and the point in the pixel."""
     stream = SampleStream.of_pixels(mi.UInt32(0), path, dr.opaque(mi.UInt32, named_seed("pilot")))
     place = stream.next_2d(PIXEL_DIMENSION)
     x, y = place.x * dr.opaque(mi.Float, source.width), place.y * dr.opaque(mi.Float, source.height)
@@ -108,8 +108,8 @@ def _place_of(path: UInt32, source: RaySource) -> tuple[SampleStream, UInt32, UI
 def make_light_sampler(scene: MitsubaScene, pilot: Pilot) -> LightSampler:
     """Make the light sampler of one picture.
 
-    Where uniform sampling is as good as anything known (a single emitter, very many, no contribution found), the
-    scene's own weights are used.
+    The scene's own weights are used where the pilot gives no better ones: with a single emitter, with very many, or
+    where no contribution was found.
     """
     weights = emitter_weights(pilot)
     return WeightedLightSampler(scene, weights) if len(np.unique(weights)) > 1 else SceneLightSampler(scene)
@@ -126,7 +126,7 @@ def emitter_weights(pilot: Pilot) -> NDArray[np.float64]:
 
 
 def _has_place(emitters: list[mi.Emitter]) -> NDArray[np.bool_]:
-    """``(emitters,)``: which have a place in the scene."""
+    """``(emitters,)``: which are at a finite distance, neither an environment nor directional."""
     flags = np.array([int(emitter.flags()) for emitter in emitters], np.uint32)
     return np.asarray(flags & int(mi.EmitterFlags.Surface | mi.EmitterFlags.DeltaPosition), bool)
 
@@ -145,10 +145,10 @@ def _region_about(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
 def _contributions(
     integrator: PathIntegrator, ray: Ray3f, stream: SampleStream, emitter: UInt32, emitters: Float
 ) -> tuple[Float, Float, Bool, Point3f]:
-    """Of a path with each lane, and the light of ``emitter`` alone, one of ``emitters``.
+    """Contributions of ``emitter``, one of ``emitters``, to the path of each lane.
 
-    The sum over its surfaces of the squared contribution, that of the indirect contributions, whether the ray meets a
-    surface, and where.
+    Returns the sum of squared contributions over its surfaces, the sum of indirect contributions, whether the primary
+    ray hits a surface, and the hit point.
     """
     scene = integrator.scene
     context = mi.BSDFContext()

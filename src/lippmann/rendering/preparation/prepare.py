@@ -1,4 +1,4 @@
-"""Prepares the light of a picture: emitter weights, photons, exposure, light vertices, and chains of seen light."""
+"""Prepares the light of a picture: emitter weights, photons, exposure, light vertices, and specular chains."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def prepare_light(
     own_exposure:
         The camera's own exposure in stops, to which a fixed exposure is added.
     stands_alone:
-        Whether nothing, such as splats, is composited over the integrator's radiance.
+        Whether the integrator's radiance is all that is seen: nothing, such as splats, is composited over it.
     weighs_emitters:
         Whether emitters are sampled by their contribution to the picture, not by the scene's weights.
 
@@ -99,17 +99,16 @@ def prepare_light(
 def trace_light_vertices(
     integrator: PathIntegrator, request: RenderRequest, pilot: Pilot, memory: int, gain: float
 ) -> LightVertexPasses | None:
-    """Light vertices for a picture if its indirect light is noisy without them; else None.
+    """Light vertices for a picture whose indirect light is noisy without them; None for others.
 
     Parameters
     ----------
     pilot:
-        Of the picture.
+        The picture's pilot.
     memory:
-        Bytes that those of two passes may take, in both halves of the samples; where these do not hold them, paths find
-        all light themselves.
+        Bytes for the light vertices of two passes, for both half-buffers. If they are too few, there are none.
     gain:
-        Exposure of the picture.
+        Factor on radiance of the picture's exposure.
     """
     if request.integrator != "path" or request.surfaces < 2 or memory < 4 * TRANSPORT.light_vertices * LIGHT_VERTEX:
         return None
@@ -123,8 +122,8 @@ def trace_light_vertices(
 def count_chains(integrator: PathIntegrator, request: RenderRequest, source: RaySource) -> int:
     """Specular chains per path (:mod:`~lippmann.rendering.transport.specular_chains`): a fixed number, or 0.
 
-    A denoiser takes highlights for noise, so a denoised picture shows seen light by chains if one of the pilot's meets
-    light brighter than white. None where all rays of a pixel are one, or its points are taken from others.
+    A denoiser takes highlights for noise. So a denoised picture has specular chains if one of the pilot's meets light
+    brighter than white. Pictures of one ray through each pixel's centre and reprojected ones have none.
     """
     is_denoised = request.denoise != "none" and request.box_filter and request.method not in REUSING
     if not is_denoised or not has_sharp_surfaces(integrator.scene):
@@ -134,12 +133,12 @@ def count_chains(integrator: PathIntegrator, request: RenderRequest, source: Ray
 
 @dataclass(frozen=True, eq=False)
 class Caustics:
-    """How a picture's caustics come.
+    """The technique that renders a picture's caustics, with its photons.
 
     Attributes
     ----------
     way:
-        ``photons``, ``paths`` or ``none``; None where there are none.
+        ``photons``, ``paths`` or ``none`` (left out); None where the scene has no caustics.
     photons, passes:
         See :class:`~lippmann.rendering.transport.prepared_light.PreparedLight`.
     """
@@ -152,14 +151,14 @@ class Caustics:
 def shoot_photons(
     integrator: PathIntegrator, request: RenderRequest, source: RaySource, pilot: Pilot, memory: int
 ) -> Caustics:
-    """How the caustics come in the picture of ``source``, with their photons.
+    """Choose the technique of caustics for the picture of ``source``, and shoot their photons.
 
-    By photons wherever an emitter and a caster form a pair, and a few photons land in what the picture shows.
+    Photons are used wherever an emitter and a caster form a pair, and some photons land within the visible region.
 
     Raises
     ------
     MemoryLimitError
-        ``memory`` bytes do not hold the photons that were asked for; where nothing was, they are left to paths.
+        Photons were asked for, and ``memory`` bytes do not hold them. Where they were not, caustics are left to paths.
     """
     if request.integrator != "path" or request.surfaces < 2:
         return Caustics(None)
@@ -171,10 +170,10 @@ def shoot_photons(
     if casters.pairs == 0:
         return Caustics(None)
     pixels = source.width * source.height * source.channels
-    # A single pass is for no more samples than there are.
+    # A pass serves no more samples than the picture has.
     samples = pixels * (TUNING.pass_samples if request.is_open_ended else min(TUNING.pass_samples, request.samples))
     passes = 2 if request.is_open_ended else -(-request.samples // TUNING.pass_samples)
-    # No fewer where memory is short: it does not change a picture.
+    # Memory that is short does not reduce the photons: a picture does not depend on it.
     required = memory_model.photons(emissions(samples), passes)
     if required > memory:
         if request.caustics == "auto":

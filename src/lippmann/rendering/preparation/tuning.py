@@ -7,29 +7,30 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class PreparationTuning:
-    """Constants of chains, exposure, emitter weights and light vertices.
+    """Constants of specular chains, exposure, emitter weights, photon passes and light vertices.
 
     Attributes
     ----------
     chains:
-        Chains of seen light with each path of a denoised picture. With 3, pictures of 16 samples lose up to 0.2 dB, and
+        Specular chains with each path of a denoised picture. With 3, pictures of 16 samples lose up to 0.2 dB, and
         1.0 dB of primitives; with 2 up to 0.5 dB, and primitives 1 dB (docs/research/seen-light.md).
     pilot_chains:
-        Chains of the pilot (0.1 s), of which one meets a spot of a 20 000th of the picture in 19 cases of 20.
+        Specular chains of the pilot (0.1 s): one of them hits a spot of a 20 000th of the picture with a probability of
+        95 %.
     most_weighed_emitters:
-        Scenes of more emitters are sampled uniformly.
+        Scenes with more emitters sample them uniformly.
     mid_grey:
-        Linear radiance that the median of what is lit gets: photographic mid-grey.
+        Linear value that the median of lit pixels gets: photographic mid-grey.
     exposure_block:
-        Pixels along each side of a block, whose mean counts: single pixels are too dark where few paths find the light.
+        Pixels along each side of a block of whose lit pixels the mean counts, as single ones are too noisy.
     bright_indirect, most_indirect:
-        Second moment of what of the pilot's exposed indirect radiance is brighter than white, from which on paths are
-        joined to light vertices, and what one path counts for in it at most. Scenes where joins gain have 0.0035 to
-        0.15, others at most 0.0004: half and double choose the same (docs/background/light-vertices.md).
+        Second moment of the pilot's exposed indirect radiance beyond white, from which on paths are joined to light
+        vertices; and the limit at which the radiance of one path is clipped for it. Scenes where joins gain have 0.0035
+        to 0.15, others at most 0.0004: half and double choose the same (docs/background/light-vertices.md).
     pass_samples:
         Samples per pixel that one pass of photons, or one set of light vertices, serves.
     kept_share:
-        Share of the memory for photons of passes that tiles and bands ask for in turn.
+        Share of the memory for cached photon passes, which tiles and bands of a picture use in turn.
     """
 
     chains: int = 4

@@ -191,7 +191,7 @@ def _gather_pixel(
         return False
     total, mean = 0.0, 0.0
     for k in range(len(depth)):
-        if share[k] > 0.0 and not alike(depth[k], front, TUNING.one_point):
+        if share[k] > 0.0 and not alike(depth[k], front, TUNING.one_surface):
             share[k] = 0.0
         if share[k] == 0.0:
             # Colours without a source may be NaN: 0 times NaN is not 0.

@@ -85,7 +85,7 @@ def is_trusted(points: PointImage, place: Place, rules: Rules) -> bool:
     """Whether the colour at a place may be reprojected: no pixel is fragile, no edge runs through it."""
     first_row, first_column = -1, -1
     trusted = True
-    tolerance = rules.tolerance if place.whole else TUNING.rim_tolerance * rules.tolerance
+    tolerance = rules.tolerance if place.whole else TUNING.part_tolerance * rules.tolerance
     for k in range(4):
         weight = place.a if k == 0 else (place.b if k == 1 else (place.c if k == 2 else place.d))
         if weight == 0.0:

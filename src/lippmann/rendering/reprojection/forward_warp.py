@@ -83,7 +83,7 @@ class Scratch(NamedTuple):
     Attributes
     ----------
     disparity:
-        That of the point at the pixel's centre.
+        Disparity of the point at the pixel's centre.
     piece, part:
         Column of the right end of the piece that covers it (-1: none), and how far along the piece it lies, 0 to 1.
     hidden:
@@ -276,7 +276,7 @@ def settle(
         from_left, from_right = piece[0, place] >= 0, piece[1, place] >= 0
         if not (from_left or from_right):
             continue
-        if from_left and from_right and not alike(s[0, place], s[1, place], TUNING.one_point):
+        if from_left and from_right and not alike(s[0, place], s[1, place], TUNING.one_surface):
             from_left = nearer(s[0, place], s[1, place])
             from_right = not from_left
         share = 1.0 if not from_right else (0.0 if not from_left else weight)

@@ -104,7 +104,7 @@ def _average(
             or points.fragile[one_row, one_column]
             or points.fragile[other_row, other_column]
             or color_difference(points.color, one_row, one_column, other_row, other_column, rules.coded)
-            > TUNING.averaged_tolerance * rules.tolerance
+            > TUNING.part_tolerance * rules.tolerance
         ):
             continue
         for channel in range(3):

@@ -149,7 +149,7 @@ def mark_surroundings(
     These are the micro-image, which is about ``reach`` columns wide, and those beside it, so many ``rows`` up and down.
     """
     height, width = points.status.shape
-    # Surroundings overlap: one visit to each row of a micro-image is enough.
+    # Surroundings of several pixels overlap, so each row of a micro-image is visited once.
     visited = np.zeros((height, width // max(1, reach) + 1), np.bool_)
     for i in range(len(numbers)):
         row, column = divmod(int(numbers[i]), width)
@@ -196,7 +196,7 @@ def follow_points(
                     if field.lens[r, c] != target:
                         continue
                     other = np.float64(points.disparity[r, c])
-                    if alike(s, other, TUNING.one_point):
+                    if alike(s, other, TUNING.one_surface):
                         # What looks different from every side is not the same anywhere.
                         if (
                             points.fragile[row, column]

@@ -20,9 +20,7 @@ class Tuning(NamedTuple):
     one_surface:
         Neighbouring pixels see one surface if their disparities differ by at most this part of the larger: a surface
         that turns away from the viewer by up to 75 degrees, on a display with a field of 18 degrees and 8 pixels under
-        a lens.
-    one_point:
-        Sources on two sides show one point if their disparities agree to this part.
+        a lens. Sources on two sides show one point if theirs do.
     one_height:
         Pixels of a run see one surface, too, if their heights differ by at most this part of the display's gap.
     one_probed_surface:
@@ -32,15 +30,13 @@ class Tuning(NamedTuple):
     longest_piece:
         Pixels. A piece between two pixels of the source that is stretched to more is seen too obliquely by it.
     smallest_share:
-        Pixels that stand for missing ones at the rim of a micro-image must have this bilinear weight together ...
-    rim_tolerance:
-        ... and be alike in colour to this part of the tolerance.
+        Least sum of bilinear weights of the pixels that stand for missing ones at the rim of a micro-image.
     close, too_far:
         Pixels. A line of sight enters a surface where the two are this close; farther apart than ``too_far`` it does
         not.
-    averaged_tolerance:
-        A careful mean takes neighbours that agree to this part of the tolerance: nothing is known of what lies between
-        them, and the two may be wrong in the same sense.
+    part_tolerance:
+        Part of the tolerance to which colours must agree at the rim of a micro-image, and of the two that a careful
+        mean is made of: they may be wrong in the same sense.
     deviation:
         Part of the tolerance by which a traced pixel must differ from its predicted colour for the search to go on.
     around:
@@ -49,16 +45,14 @@ class Tuning(NamedTuple):
 
     strides: tuple[int, int, int] = (16, 4, 1)
     one_surface: float = 0.2
-    one_point: float = 0.15
     one_height: float = 0.06
     one_probed_surface: float = 0.3
     on_center: float = 1e-3
     longest_piece: float = 3.0
     smallest_share: float = 0.25
-    rim_tolerance: float = 0.4
     close: float = 0.02
     too_far: float = 0.2
-    averaged_tolerance: float = 0.5
+    part_tolerance: float = 0.5
     deviation: float = 0.7
     around: int = 3
 

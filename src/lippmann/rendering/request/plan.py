@@ -1,8 +1,8 @@
-"""The plan of a render: everything called "auto", decided in one place, each value with its reason in words.
+"""The plan of a render: every option that is "auto", decided in one place, each value with its reason in words.
 
-:func:`make_plan` reads as a table of rules, one function a value: what was asked for wins, then the scene decides, then
-the display and the size of the picture. An automatic exposure, photons, chains of seen light and light vertices need a
-pilot of the scene: they are "auto" in the plan until its results are added
+:func:`make_plan` reads as a table of rules, one function for each value. A value that was asked for wins; then the
+scene decides, then the display and the size of the picture. An automatic exposure, photons, specular chains and light
+vertices need a pilot of the scene: they are "auto" in the plan until its results are added
 (:meth:`~lippmann.rendering.request.render_request.RenderPlan.with_pilot`).
 """
 
@@ -39,20 +39,20 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class SampleBudget:
-    """Tuned numbers of samples where none is asked for.
+    """Tuned constants of the number of samples where none is asked for.
 
     Attributes
     ----------
     values:
-        Samples that a pooled picture is made of: half a second of two cores (``defaults.py``).
+        Samples of a pooled picture, of all its pixels together: half a second of two cores (``defaults.py``).
     fewest, most:
-        Samples per pixel (or sub-pixel) of a pooled picture. With fewer than 4 the worst micro-images suffer; more than
-        16 are for who asks for them (``docs/research/equal-time.md``).
+        Least and most samples per pixel (or sub-pixel) of a pooled picture. With fewer than 4 the worst micro-images
+        are noisy; more than 16 have to be asked for (``docs/research/equal-time.md``).
     fewest_of_many, many:
-        Samples per sub-pixel of pictures of more than ``many`` values.
+        Least samples per sub-pixel of pictures of more than ``many`` sub-pixels.
     reserve, most_in_reserve:
-        How many times its samples a picture may have if it is not clean with them, and how many these may
-        be in all: minutes of two cores. Who asks for so large a picture may say how clean it shall be.
+        Factor on the samples up to which a picture that is not clean takes more, and the most samples of all pixels
+        together that this may come to: minutes of two cores.
     """
 
     values: int = 1 << 20
@@ -69,16 +69,16 @@ BUDGET = SampleBudget()
 
 @dataclass(frozen=True)
 class FinalPicture:
-    """What a picture of the effort ``final`` is to have.
+    """Goals of a picture of the effort ``final``.
 
     Attributes
     ----------
     quality:
         PSNR in dB, by its own estimate: noise of 2.5 codes of 8 bits, which a print hides (``goals.py``).
     most:
-        Samples per pixel with which it is given up.
+        Most samples per pixel, with which it stops short of the quality.
     samples:
-        Samples per pixel where no goal can be followed: in tiles, forecasts, plain pictures and reused points.
+        Samples per pixel where no estimate says when to stop: tiles, forecasts, plain pictures, reprojection.
     """
 
     quality: float = 40.0
@@ -92,12 +92,12 @@ FINAL = FinalPicture()
 def make_plan(
     scene: Scene, display: Display | None, request: RenderRequest, form: Form, size: tuple[int, int] | None
 ) -> RenderPlan:
-    """Decide all that ``request`` leaves open; see :func:`~lippmann.rendering.request.plan.resolve`.
+    """Decide all values that ``request`` leaves open; see :func:`~lippmann.rendering.request.plan.resolve`.
 
     Raises
     ------
     UsageError, PictureError
-        What is asked for cannot be done.
+        The request cannot be rendered as it asks.
     """
     if scene.lies_off_surfaces:
         check_off_surfaces(request, scene)
@@ -134,31 +134,31 @@ def resolve(
     *,
     size: tuple[int, int] | None = None,
 ) -> RenderRequest:
-    """Fill in what ``request`` leaves open, and check that it can be honoured.
+    """Decide the values that ``request`` leaves open, and check that it can be rendered.
 
     Parameters
     ----------
     request:
-        What was asked for.
+        The request, with values that are "auto" or None.
     scene:
-        What is rendered.
+        The scene.
     display:
-        What it is rendered for; None for the plain picture of a camera.
+        The display; None for the plain picture of a camera.
     form:
-        What is made of it: a picture in one piece, one in tiles, a quilt, a forecast, or a camera's plain picture.
+        The form of the result: a picture in one piece, one in tiles, a quilt, a forecast, or a camera's plain picture.
     size:
         Width and height of the picture in pixels, where it is not the display's.
 
     Returns
     -------
     RenderRequest
-        With its plan. ``spp`` stays None where a quality or a time says when to stop; ``exposure`` and ``caustics``
-        stay "auto" where a pilot decides.
+        The decided request, with its plan. ``spp`` stays None where rendering stops by a quality or a time;
+        ``exposure`` and ``caustics`` stay "auto" where a pilot decides.
 
     Raises
     ------
     UsageError, PictureError
-        What is asked for cannot be done in this form, or for this scene or display.
+        The request does not fit this form of result, or this scene or display.
     """
     planned = follow(make_plan(scene, display, request, form, size), request)
     check(planned, form, display)
@@ -166,7 +166,7 @@ def resolve(
 
 
 def follow(plan: RenderPlan, request: RenderRequest) -> RenderRequest:
-    """``request`` with every value of the plan, which it carries."""
+    """``request`` with all values of ``plan``, and with the plan itself."""
     return replace(
         request,
         integrator=plan.integrator.value,
@@ -190,10 +190,7 @@ def follow(plan: RenderPlan, request: RenderRequest) -> RenderRequest:
 
 @dataclass(frozen=True)
 class _Facts:
-    """What rules ask of the request and the scene.
-
-    ``is_exact``: light has no noise, and is shown by one ray through each pixel's middle, unless samples are asked for.
-    """
+    """Facts of the request and the scene that several rules read."""
 
     request: RenderRequest
     scene: Scene
@@ -209,38 +206,38 @@ class _Facts:
         return self.integrator in POOLED_LIGHT
 
     def is_final(self, method: Method) -> bool:
-        """Whether a quality is worked for because the picture is to be final."""
+        """Whether the effort ``final`` gives the picture a quality goal."""
         has_goal = self.form in ("picture", "quilt") and method not in REUSING and self.is_pooled_light
         return self.request.effort == "final" and has_goal and not self.is_one_ray
 
     @property
     def is_denoised_draft(self) -> bool:
-        """Whether the fast network takes the noise out of a single sample."""
+        """Whether a draft's single sample is denoised by the fast network."""
         is_open = self.form != "preview" and self.request.denoise == "auto" and machine.has_denoiser()
         return self.is_draft and is_open and self.is_pooled_light and not self.is_photograph
 
     @property
     def shows_own_colors(self) -> bool:
-        """Whether surfaces that nothing lights show colours which are made for displays."""
+        """Whether all surfaces are unlit, so that their colours are display colours, not radiance."""
         return self.scene.is_unlit and self.is_pooled_light and not self.scene.lies_off_surfaces
 
     @property
     def is_photograph(self) -> bool:
-        """Whether a photograph is shown as it is: its light has no noise."""
+        """Whether the scene is a photograph that is shown unchanged: it has no noise."""
         request = self.request
         is_plain = request.method in ("auto", "full") and request.denoise in ("auto", "none")
         return self.shows_own_colors and self.scene.fills_panel and is_plain
 
     @property
     def is_one_ray(self) -> bool:
-        """Whether one ray through each pixel's middle shows the scene."""
+        """Whether a single ray through each pixel's centre is enough, as nothing in the scene has noise."""
         request = self.request
         is_exact = self.is_photograph or self.scene.is_off_surfaces_alone
         return is_exact and (request.spp in (None, 1) or self.is_draft) and not request.is_open_ended
 
 
 def _first(*rules: tuple[bool, T, str]) -> Choice[T]:
-    """The choice of the first rule that holds: whether it does, the value, and the reason."""
+    """The choice of the first rule that holds, of rules ``(whether it holds, value, reason)``."""
     return next(Choice(value, reason) for holds, value, reason in rules if holds)
 
 

@@ -1,4 +1,4 @@
-"""What can be honoured: options that belong together, and what each form of a picture and each scene allows."""
+"""Checks of a request: options that exclude each other, and those that a form of picture or a scene has no use for."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from lippmann.scene.scene import Scene
 #: Pictures number their sub-pixels in 32 bits.
 MOST_SUBPIXELS = 1 << 32
 
-#: Why a form has not all options.
+#: Why a form of picture does not take all options.
 _WHY: dict[Form, str] = {
     "tiles": "with resume=True, to Zarr and beyond the memory pictures are rendered in tiles",
     "quilt": "every pixel of a quilt is traced, for all colours",
@@ -20,7 +20,7 @@ _WHY: dict[Form, str] = {
     "preview": "it is for pictures on a display",
 }
 
-#: Whether a request is refused, what of it, by which parameter, by which rule, and how it is mended.
+#: Whether a request is refused; and of the error: what is wrong, in which parameter, by which rule, and its fix.
 _Refusal = tuple[bool, str, str, str, str]
 
 _LEAVE = "leave it out"
@@ -28,14 +28,14 @@ _FULL = 'use method="full"'
 
 
 def check(request: RenderRequest, form: Form, display: Display | None) -> None:
-    """Refuse what cannot be honoured.
+    """Refuse a request that cannot be rendered as it asks.
 
     Raises
     ------
     UsageError
-        Options contradict each other, or mean nothing in this form.
+        Options contradict each other, or have no meaning for this form of picture.
     PictureError
-        The display's lenses have no quilt.
+        A quilt is asked for, and the display's lenses are not cylindrical.
     """
     if form == "quilt" and display is not None and display.lens_array.layout != "lenticular":
         raise PictureError(
@@ -55,12 +55,12 @@ def check(request: RenderRequest, form: Form, display: Display | None) -> None:
 
 
 def check_off_surfaces(request: RenderRequest, scene: Scene) -> None:
-    """Refuse what scenes do not have whose light lies on no surface: Gaussian splats, volumes.
+    """Refuse options that scenes of Gaussian splats or volumes do not support, as their light lies on no surface.
 
     Raises
     ------
     UsageError
-        It asks for a surface, light to be shared or denoised, or an exposure.
+        The request asks for a surface property, for pooling or denoising, or for an exposure.
     """
     what = "Gaussian splats" if scene.has_splats else "a volume"
     rule = f"this scene has {what}, and light that lies on none"
@@ -83,7 +83,7 @@ def check_off_surfaces(request: RenderRequest, scene: Scene) -> None:
 
 
 def why_no_estimate(request: RenderRequest) -> str | None:
-    """Why a picture says nothing of its own error, as a sentence; None if it does."""
+    """Why a picture has no estimate of its error, as a sentence for its notes; None where it has one."""
     if request.pixel_filter == "point" and request.integrator not in POOLED_LIGHT:
         return "no estimate of the error: one ray through each pixel's middle leaves nothing to chance"
     if request.spp == 1:
@@ -136,7 +136,7 @@ def _of_reuse(request: RenderRequest) -> list[_Refusal]:
 
 
 def _of_goal(request: RenderRequest) -> list[_Refusal]:
-    """A quality or a time needs samples that tell their error."""
+    """Refusals of goals: a quality or a time needs a picture whose error is estimated."""
     goals = [name for name in ("max_time", "quality", "quality_worst") if getattr(request, name) is not None]
     if not goals:
         return []

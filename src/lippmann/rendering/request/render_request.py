@@ -1,4 +1,4 @@
-"""What a render is asked for, and its plan: every decision as a value with its reason in words."""
+"""The request of a render, as asked for, and its plan: every decision as a value with its reason in words."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Choice(Generic[T]):
-    """A value, and why it is this one."""
+    """A decided value, and the reason for it in words."""
 
     value: T
     reason: str = ASKED
@@ -37,16 +37,17 @@ class RenderPlan:
     Attributes
     ----------
     integrator, depth, method, denoise, subpixels, pixel_filter, exposure, tone_map, caustics:
-        As of a :class:`~lippmann.rendering.request.render_request.RenderRequest`; ``exposure`` and ``caustics`` are
-        "auto" where a pilot decides. ``denoise`` is ``oidn`` where the network's effort follows the traced rays.
+        Values of the fields of a :class:`~lippmann.rendering.request.render_request.RenderRequest`; ``exposure`` and
+        ``caustics`` are "auto" where a pilot decides. ``denoise`` is ``oidn`` where the number of samples chooses the
+        network's effort.
     samples:
-        Samples per pixel, or sub-pixel; where a goal says when to stop the most of them, or None.
+        Samples per pixel, or sub-pixel. With a goal they are the most that are taken; None for no limit.
     quality:
-        PSNR in dB that is to be reached; None for none.
+        PSNR in dB at which rendering stops; None without such a goal.
     reserve:
-        Samples that a picture may have that is not clean with those; None for no more.
+        Most samples per pixel of a picture that is not clean by its own estimate with ``samples``; None for no more.
     pilot:
-        What a pilot of the scene came to, by name.
+        Choices that were made by the results of the pilot, by name.
     """
 
     integrator: Choice[Integrator]
@@ -64,7 +65,7 @@ class RenderPlan:
     pilot: Mapping[str, Choice[object]] = field(default_factory=dict)
 
     def with_pilot(self, told: Mapping[str, object]) -> RenderPlan:
-        """The plan with what a pilot came to, by the names of :data:`PILOT_REASONS`."""
+        """The plan with the choices of a pilot, whose results have the names of :data:`PILOT_REASONS`."""
         open_ended: dict[str, object] = {}
         if self.exposure.value == "auto":
             open_ended["exposure"] = told.get("exposure", 0.0)
@@ -77,7 +78,7 @@ class RenderPlan:
 
     @property
     def entries(self) -> dict[str, Choice[object]]:
-        """All choices by name; where a pilot decided, what it came to."""
+        """All choices by name, those of the pilot in place of "auto"."""
         own = {each.name: cast("Choice[object]", getattr(self, each.name)) for each in fields(self)[:-1]}
         return {**own, **self.pilot}
 
@@ -94,7 +95,7 @@ class RenderPlan:
         return {name: {"value": each.value, "reason": each.reason} for name, each in self.entries.items()}
 
 
-#: What a pilot may come to, and why.
+#: Reasons for what a pilot chooses, by name.
 PILOT_REASONS = {
     "exposure": "the pilot's median of what is lit comes to mid-grey",
     "camera_exposure": "the camera's own, from the scene",
@@ -103,7 +104,7 @@ PILOT_REASONS = {
     "seen_chains": "of each path: the pilot met light brighter than white in mirrors, glass or smooth gloss",
 }
 
-#: Why a pilot comes to no photons.
+#: The reason why a pilot chooses no photons.
 NO_CAUSTICS = "no emitter shines on mirrors, glass or smooth gloss, or its photons hardly land in the picture"
 
 
@@ -116,27 +117,27 @@ def format_value(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-#: Samples per pixel where nothing is said and light is not pooled.
+#: Samples per pixel where none are asked for and light is not pooled.
 DEFAULT_SPP = 16
 
 
 @dataclass(frozen=True)
 class RenderRequest(MachineOptions, QualityOptions):
-    """How a picture is to be made, on what it runs, and where the display stands.
+    """A request to render: quality options, the machine's options, and the display's placement.
 
-    Every value is checked by itself here. :func:`~lippmann.rendering.request.plan.resolve` fills in what is "auto"
-    or None and checks what belongs together.
+    Each value is checked on its own here. :func:`~lippmann.rendering.request.plan.resolve` decides the values that are
+    "auto" or None, and checks that the values fit together.
 
     Parameters
     ----------
     placement:
         Where the display stands in the scene: options, or a placement found before.
     fixed_noise:
-        Whether all frames of a sequence have the same random numbers; for nothing else.
+        Whether all frames of a sequence have the same random numbers; refused for single pictures.
     plan:
-        Why the values are these, once all of them are decided: see :mod:`~lippmann.rendering.request.plan`.
+        The plan that decided the values, with its reasons; None before :mod:`~lippmann.rendering.request.plan`.
     began:
-        When the work began that ``max_time`` limits, in seconds of :func:`time.perf_counter`; None: with the rendering.
+        Reading of :func:`time.perf_counter` from which ``max_time`` counts; None: when rendering begins.
 
     Raises
     ------
@@ -160,25 +161,25 @@ class RenderRequest(MachineOptions, QualityOptions):
 
     @classmethod
     def from_options(cls, *parts: Options, **others: Any) -> RenderRequest:
-        """The request of several classes of options; ``others`` are further fields, and win."""
+        """Make a request of several classes of options; ``others`` are further fields, and override those."""
         values = {each.name: getattr(part, each.name) for part in parts for each, _ in options_of(type(part))}
         return cls(**{**values, **others})
 
     @property
     def reason(self) -> str:
-        """The method and why it is this one, where it was left open; else nothing."""
+        """The method and the reason for it, where it was decided by the plan; else empty."""
         plan = self.plan
         is_told = plan is None or plan.method.reason == ASKED
         return "" if is_told or plan is None else f"{plan.method.value}: {plan.method.reason}"
 
     @property
     def spp_reserve(self) -> int | None:
-        """Samples that a picture may have which is not clean with ``spp``; None for no more."""
+        """Most samples per pixel of a picture that is not clean with ``spp``; None for no more."""
         return None if self.plan is None else self.plan.reserve.value
 
     @property
     def denoises(self) -> bool:
-        """Whether the picture is denoised whatever comes."""
+        """Whether it is decided that the picture is denoised."""
         return self.denoise not in ("none", "auto")
 
     @property
@@ -198,34 +199,34 @@ class RenderRequest(MachineOptions, QualityOptions):
 
     @property
     def is_open_ended(self) -> bool:
-        """Whether something else than a number of samples says when to stop."""
+        """Whether rendering stops by a quality or a time instead of a number of samples."""
         return self.has_quality or self.max_time is not None
 
     def keeps_colors(self, display: Display) -> bool:
-        """Whether the rays of sub-pixels keep all three colours, whichever is shown, for a denoiser to use.
+        """Whether rays of sub-pixels keep all three colours for the denoiser, though each sub-pixel shows one.
 
-        Under cylinders; on arrays, whose micro-images are short in both directions, that was better here, worse there.
+        Only under cylindrical lenses: on arrays, whose micro-images are short in both directions, the gain was mixed.
         """
         return bool(self.subpixels) and self.denoise != "none" and display.lens_array.layout == "lenticular"
 
     @property
     def careful(self) -> bool:
-        """Whether what reprojection would falsify is traced."""
+        """Whether pixels whose reprojection would be wrong, as of gloss and mirrors, are traced instead."""
         return self.order != "paper" if self.respect_gloss is None else self.respect_gloss
 
     @property
     def samples(self) -> int:
-        """Samples per pixel where nothing else says when to stop."""
+        """Samples per pixel of a picture without a goal."""
         return DEFAULT_SPP if self.spp is None else self.spp
 
     @property
     def surfaces(self) -> int:
-        """The depth that will be used."""
+        """Ray depth: surfaces of a path."""
         return default_depth(self.integrator) if self.depth is None else self.depth
 
     @property
     def channels(self) -> int:
-        """Rays with places of their own in a pixel: 3 for sub-pixels, else 1."""
+        """Sets of rays per pixel: 3 where each sub-pixel has its own, else 1."""
         return 3 if self.subpixels else 1
 
     def tone_mapped(self, linear: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -234,5 +235,5 @@ class RenderRequest(MachineOptions, QualityOptions):
 
     @property
     def transfer(self) -> Transfer:
-        """How values become codes: those of the classic models are codes already, as their own programs write them."""
+        """Transfer curve from values to codes: linear for the classic light models, whose values are codes already."""
         return "linear" if self.integrator == "classic" else "srgb"

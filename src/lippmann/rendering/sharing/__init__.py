@@ -1,1 +1,1 @@
-"""Denoised light shared across lenses and across views."""
+"""Joint filters across micro-images (after denoising) and across views of a quilt (before it)."""

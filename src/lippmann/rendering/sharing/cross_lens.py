@@ -1,14 +1,14 @@
-"""Denoised light, shared by all micro-images that show the same surface.
+"""Cross-bilateral filter of denoised light over the micro-images that show the same surface.
 
-What a denoiser leaves of the noise in one micro-image or view, it leaves by chance: in the next one, which had samples
-of its own, it is wrong another way. So every pixel takes the mean of its own light and of that which other lenses, and
-the pixels around, show at the same point of the scene. The light of a pixel is its colour over its albedo, so that
-textures stay where they are.
+The noise that a denoiser leaves is independent between micro-images, as each has samples of its own. So each pixel
+takes a weighted mean of its own demodulated irradiance (colour over albedo, so that textures stay sharp) and of that of
+the same surface point in other micro-images and in the pixels around.
 
-A point that is seen at height z under one lens lies under its neighbours where the geometry says; along with place,
-height and normal must agree, and the light itself roughly: a shadow's edge or a highlight, which moves over the surface
-from lens to lens, is not smeared. What is seen in mirrors and through glass counts as lying as far behind as light
-travels to it, which is exact for flat ones; where it is not, things do not agree and nothing is shared.
+The pixel of a point at height z under another lens follows from the geometry. The weight falls with the distance in
+pixels and with differences of height, normal and light; by the last, shadow edges and highlights, which move over the
+surface from lens to lens, are not smeared. A surface that is seen in a mirror or through glass has the height of its
+virtual image, the length of the light's path behind the glass. This is exact for flat ones; elsewhere heights and
+normals differ, so that weights vanish.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def share_light(
     lenses: NDArray[np.int32] | None = None,
     columns: int = 1,
 ) -> Floats:
-    """A denoised picture whose micro-images have shared their light.
+    """The denoised picture, filtered across its micro-images.
 
     Parameters
     ----------
@@ -55,13 +55,13 @@ def share_light(
     guides:
         Albedo, normal and height of the same pixels.
     stop:
-        Weight of a squared relative difference of light: the less noise is left, the larger it may be.
+        Weight of a squared relative difference of light in the sum that decides a pixel's weight.
     lenses:
         From :func:`~lippmann.display.lens_field.lens_numbers`: of a window, or of sub-pixels that show one colour each;
         those of sub-pixels in full colour from :func:`~lippmann.display.lens_field.lens_numbers_in_full_color`. None
         for whole pixels of the whole panel.
     columns:
-        How many make a pixel: 3 of sub-pixels in full colour.
+        Columns of ``pixels`` for each pixel of the panel: 3 for sub-pixels in full colour, else 1.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def share_light(
 
 
 class _Picture:
-    """What pixels show, and the lenses that they lie under, on the device; numbers are opaque, for one kernel.
+    """Light, features and lens of each pixel on the device; numbers are opaque, so that all pictures share a kernel.
 
     ``light`` is ``(H, W, C)``, C 1 or 3, ``normal`` ``(H, W, 3)``, ``height`` ``(H, W)`` z in millimetres, and ``lens``
     ``(H, W)`` each pixel's lens as its number in ``centers``, ``(rows, columns, 2)`` in pixels to the right and
@@ -117,7 +117,7 @@ class _Picture:
 
     @syntax
     def mean_light(self, pixel: UInt32) -> Array:
-        """The mean of some pixels, by their numbers in the picture."""
+        """Filtered light of pixels, given by their numbers in the picture."""
         rows, columns = self._size
         lens_rows, lens_columns = self._lenses
         reach_i, reach_j = self._reach

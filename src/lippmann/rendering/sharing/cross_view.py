@@ -1,15 +1,15 @@
-"""Light that the views of a quilt share before their noise is taken out.
+"""Joint filter of noisy light over neighbouring views of a quilt, before denoising.
 
-The cameras of a quilt stand so close together that neighbours see nearly the same: the same points of the scene, a few
-pixels further left or right, by light that hardly depends on where it is seen from. So every pixel takes the mean of
-its own noisy light and of that which the views beside have at the same point; what is nearer counts more. The light of
-a pixel is its colour over its albedo, so that textures stay where they are. Height and normal must agree. What is seen
-in mirrors and through glass counts as lying as far behind as light travels to it, which is exact for flat ones.
+The cameras of a quilt are so close together that neighbours see the same surface points, shifted by a few pixels, under
+nearly the same light. So each pixel takes a weighted mean of its own demodulated irradiance (colour over albedo, so
+that textures stay sharp) and of that of the same point in the views beside it; nearer views count more. Height and
+normal must agree. A surface that is seen in a mirror or through glass has the height of its virtual image, as in
+:mod:`.cross_lens`.
 
-That is done before the denoiser: what it leaves of the noise, and what it blurs with it, it leaves and blurs in all
-views alike, so that sharing its results gains less (docs/background/quilts.md). What is told of the error includes what
-sharing itself falsifies, such as highlights, which move over a surface from view to view: each half of the samples is
-shared for itself, and judged by the other, which is not. The two eyes of a stereo pair always share.
+The filter comes before the denoiser, whose remaining noise and blur are much the same in all views, so that filtering
+its results gains less (docs/background/quilts.md). The error estimate includes the filter's own bias, as of highlights,
+which move over a surface from view to view: each half-buffer is filtered by itself, and compared with the other,
+unfiltered one. The two views of a stereo pair are always filtered.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Floats = NDArray[np.float32]
 
 
 def share_views(pixels: Floats, source: QuiltRays, guides: Guides) -> Floats:
-    """The noisy pixels of a quilt with less noise, ``(H, W, 3)`` float32.
+    """The pixels of a quilt, filtered across its views, ``(H, W, 3)`` float32.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class _Views:
 
     @syntax
     def mean_light(self, pixel: UInt32) -> Color3f:
-        """The mean of some pixels, by their numbers in the quilt."""
+        """Filtered light of pixels, given by their numbers in the quilt."""
         row, column = divide(mi.Int32(pixel), self._columns * self._width)
         above, line = divide(row, self._height_of_view)
         aside, place = divide(column, self._width)

@@ -1,4 +1,4 @@
-"""Tuned constants of shared light, each with its unit and the benchmark that set it."""
+"""Tuned constants of the filters across lenses and views, each with its unit and the benchmark that set it."""
 
 from __future__ import annotations
 
@@ -7,29 +7,29 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SharingTuning:
-    """Constants of light that is shared across lenses, and across the views of a quilt.
+    """Constants of the filters across lenses, and across the views of a quilt.
 
-    Weights are ``(1 - sum / faded)^8`` for a sum of squared differences, which is nearly ``exp(-8 sum / faded)`` and
-    takes a fraction of its time.
+    Weights across lenses are ``(1 - sum / faded)^8`` for a sum of squared differences, which is nearly
+    ``exp(-8 sum / faded)`` and takes a fraction of its time.
 
     Attributes
     ----------
     reach:
-        Lenses to either side from which light is fetched.
+        Lenses to either side whose micro-images are filtered.
     faded:
-        Sum from which on nothing is shared. Differences of place count in pixels, of normals as much as that a right
-        angle is far too much.
+        Sum of squared differences at which a weight is 0. Distances count in pixels; a squared difference of normals of
+        1 alone makes the weight 0.
     stop:
         Weight of a squared relative difference of light: between 30 and 200 it moves the PSNR of the bundled scenes by
         less than 0.5 dB (docs/research/pooled-light.md).
     of_height:
-        Heights count as alike within this share of the height, and the gap.
+        Unit of differences of height: this share of the height, plus the gap across lenses.
     view_reach:
-        How far light is fetched across views, in radians between cameras; farther, highlights are smeared.
+        Largest angle in radians between cameras whose views are filtered; larger ones smear highlights.
     other_normal:
-        Squared difference of normals from which on they are those of different surfaces: an angle of 25 degrees.
+        Squared difference of unit normals at which surfaces count as different ones: an angle of 25 degrees.
     view_pixels:
-        Heights across views count as alike within so many pixels, too.
+        Heights across views also count as alike within this length, in pixels.
     """
 
     reach: int = 4

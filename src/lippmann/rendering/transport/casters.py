@@ -27,17 +27,17 @@ from lippmann.rendering.transport.tuning import TUNING
 
 @dataclass(frozen=True, eq=False)
 class Casters:
-    """What can make caustics in a scene.
+    """Emitters and shapes of a scene that can make caustics.
 
     Attributes
     ----------
     emitters, shapes:
-        Indices into the scene's; every pair of them may make caustics.
+        Indices of emitters and of casters in the scene; each pair may make caustics.
     boxes:
         ``(len(shapes), 6)``: least and greatest corners of the boxes of shapes without surface sampling (instances,
         curves); NaN for others.
     areas:
-        ``(len(shapes),)``: of the shapes, or of their boxes.
+        ``(len(shapes),)``: surface areas of the shapes, or of their boxes.
     points:
         ``len(shapes)`` functions that sample points uniformly on each; :func:`no_point` for those with boxes.
     """
@@ -138,7 +138,7 @@ class CasterPoints:
         self.area: Float = dr.gather(mi.Float, mi.Float(casters.areas), caster)
         self._boxed = mi.Bool(False)
         boxed = casters.boxed
-        # Not a virtual call: that would ask all shapes there are, and some refuse.
+        # Not a virtual call, which would include all shapes of the scene: some cannot be sampled.
         self.p, self._n = dr.switch(caster, list(casters.points), sample)
         if boxed.any():
             self._boxed = dr.gather(mi.Bool, mi.Bool(boxed), caster)

@@ -118,7 +118,7 @@ class EmitterRays:
         density = upload((self._density[place] * chances[chosen]).astype(np.float32))
         stream = SampleStream.of_pixels(mi.UInt32(0), dr.arange(mi.UInt32, count), dr.opaque(mi.UInt32, seed))
         direction = stream.next_2d(1)
-        # Not a virtual call: that would ask all shapes there are, and some refuse.
+        # Not a virtual call, which would include all shapes of the scene: some cannot be sampled.
         p, n = dr.switch(upload(chosen.astype(np.uint32)), self._starts, stream.next_2d(0))
         n = dr.select((upload(self._two_sided[place].astype(np.uint32)) > 0) & (stream.next_1d(2) < 0.5), -n, n)
         anywhere = dr.zeros(mi.Interaction3f, count)

@@ -201,7 +201,7 @@ class PhotonMap:
         weights = mi.Float(0)  # of the photons met so far; one of them is chosen by reservoir sampling
         chosen = mi.Vector3f(0, 0, 1)
         color = mi.Color3f(0)
-        # The own cell is the fourteenth of those around it.
+        # Number 13 of the 27 cells is the point's own.
         corner = dr.select(by_kernel, mi.UInt32(0), 13)
         end_corner = dr.select(by_kernel, mi.UInt32(27), 14)
         density = dr.select(by_kernel, 2 / (dr.pi * r * r), 1 / _area_in_cell(p - (base + 1) * r, normal, r))

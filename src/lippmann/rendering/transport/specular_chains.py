@@ -8,7 +8,7 @@ with the same expectation. Sky that the primary ray sees stays with the path.
 Delta emitters, which no ray can hit, are sampled at each sharp surface. They count where the half vector makes the
 event sharp.
 
-A pixel that one chain alone makes bright is more likely an outlier than that bright. The part of a chain's contribution
+A pixel that is bright by a single chain is more likely an outlier than truly bright. The part of a chain's contribution
 beyond :func:`most_of_chain` is its *excess*. A picture without excess is biased, darker where images of emitters were
 missed, but has a smaller error (docs/research/seen-light.md). The limit grows with the number of chains, so that the
 bias vanishes.
