@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from stand_in import TINY
 
+from lippmann.display.seen_pixels import EyeMap
+from lippmann.studio_app.real_lens import RealEyeMap
 from lippmann.studio_app.render_jobs import Job
 from lippmann.studio_app.state import StudioState
 
@@ -427,4 +429,31 @@ def test_a_print_is_rendered_and_seen_through_its_sheet(page, studio):
     assert tab.page.get_by_role("button", name="Show on the display").count() == 0
     tab.page.get_by_role("button", name="Back to the live view").click()
     assert tab.page.locator(".result").is_hidden()
+    tab.assert_clean()
+
+
+@pytest.mark.slow
+def test_the_real_lens_is_a_switch_of_displays_that_have_one(studio, page):
+    tab = page()
+    button = tab.page.get_by_role("button", name="Real lens")
+    assert button.count() == 0
+    tab.page.keyboard.press("o")
+    assert tab.evaluate(f"{STUDIO}.stage.isReal") is False
+    tab.evaluate(f"{STUDIO}.store.set({{ display: '{TINY},thickness=1.4mm,index=1.57' }})")
+    tab.wait_until(lambda: button.count() == 1)
+    views = []
+    want = studio.session.thread.want
+    studio.session.thread.want = lambda watcher, wanted: (views.append(wanted.view), want(watcher, wanted))
+    try:
+        button.click()
+        tab.wait_until(lambda: views and views[-1].eye_map is RealEyeMap)
+        assert button.get_attribute("aria-pressed") == "true"
+        tab.page.keyboard.press("o")
+        tab.wait_until(lambda: views[-1].eye_map is EyeMap)
+        # Without a lens nothing is left of it.
+        tab.page.keyboard.press("o")
+        tab.evaluate(f"{STUDIO}.store.set({{ display: '{TINY}' }})")
+        tab.wait_until(lambda: button.count() == 0 and views[-1].eye_map is EyeMap)
+    finally:
+        studio.session.thread.want = want
     tab.assert_clean()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,9 @@ class PixelSet:
     number: NDArray[np.int32]
     blocks: NDArray[np.int32] | None = None
 
+    #: Whether values of the picture are sums over several pixels, of which ``number`` is the brightest.
+    is_mixed: ClassVar[bool] = False
+
     @property
     def channels(self) -> int:
         """3 where sub-pixels have rays of their own, else 1."""
@@ -65,13 +69,14 @@ class PixelSet:
             return self.arrange(values)
         return np.concatenate([values, np.zeros((1, 3), np.float32)])[self.blocks]
 
-    def values_of_lenses(self, picture: Floats) -> Floats:
-        """The pixels' values ``(n, 3)`` from a picture of lenses that are blocks."""
-        assert self.blocks is not None
+    def arrange_from_lenses(self, picture: Floats) -> Floats:
+        """The picture ``(height, width, 3)`` of what :meth:`arrange_lenses` gave."""
+        if self.blocks is None:
+            return picture
         values = np.zeros((len(self.column), 3), np.float32)
         shown = self.blocks >= 0
         values[self.blocks[shown]] = picture[shown]
-        return values
+        return self.arrange(values)
 
 
 class EyeMap:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,6 +49,13 @@ class EyeLight:
     places: Real
     weights: Real
     step: float
+
+    def through_pupil(self, width: float) -> EyeLight:
+        """The light of a pupil whose image on the panel is so many millimetres wide; this one's is a point."""
+        shape, weights = _disc(width, self.step), self.weights
+        for axis in (3,) if weights.shape[2] == 1 else (2, 3):
+            weights = _convolved(weights, shape, axis=axis)
+        return replace(self, weights=weights)
 
 
 def eye_light(

@@ -12,6 +12,7 @@ import anyio.to_thread
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.seen_pixels import EyeMap
 from lippmann.errors import LippmannError, UsageError
 from lippmann.studio_app.page_values import (
     display_size,
@@ -21,6 +22,7 @@ from lippmann.studio_app.page_values import (
     state_of_values,
     values_of_state,
 )
+from lippmann.studio_app.real_lens import RealEyeMap
 from lippmann.studio_app.render_jobs import KINDS, Job
 from lippmann.studio_app.render_thread import Shown, Watcher
 from lippmann.studio_app.session import WITHOUT_FILE, StudioSession, opened_state
@@ -178,7 +180,8 @@ class LiveSocket:
             view = state.native_view(window)
         else:
             x, y, z = numbers_of(said, "eye", 3, _FARTHEST)
-            view = state.view((x, y, z), (width, height))
+            is_real = said.get("real") is True and self._session.display(state).lens is not None
+            view = state.view((x, y, z), (width, height), RealEyeMap if is_real else EyeMap)
         self._session.thread.want(self._watcher, self._session.wanted(self._view, state, view))
 
     def _want_all(self) -> None:

@@ -1,10 +1,12 @@
 """All that the studio sets: one value from which live pictures and renders are made."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.seen_pixels import EyeMap
 from lippmann.errors import UsageError
 from lippmann.options.choices import Integrator, ToneMap
 from lippmann.options.light import LightOptions
@@ -86,9 +88,9 @@ class StudioState(QualityOptions, LightOptions, PlacementOptions, SceneOptions):
         tone_map: ToneMap = "none" if self.tone_map == "auto" and self.background is not None else self.tone_map
         return RenderRequest.from_options(QualityOptions.part_of(self), placement=self.placement(), tone_map=tone_map)
 
-    def view(self, eye: Vector, size: tuple[int, int]) -> LiveView:
+    def view(self, eye: Vector, size: tuple[int, int], eye_map: Callable[..., EyeMap] = EyeMap) -> LiveView:
         """What an eye sees, as a picture of ``size`` (width, height); see :class:`LiveView`."""
-        return LiveView(eye, size, request=self.request(), light=self.light())
+        return LiveView(eye, size, eye_map, request=self.request(), light=self.light())
 
     def native_view(self, window: PixelWindow | None = None) -> LiveView:
         """Native pixels of a window of the panel, or of all of it."""

@@ -20,7 +20,7 @@ from lippmann.viewing.replay import default_eye
 _ASIDE, _NEAREST = 2.5, 0.25
 
 #: Places are interpolated so much finer than the directions whose weights are known: the page does it linearly.
-_FINER = 8
+FINER = 8
 
 #: Largest slope of a direction, 63 degrees aside; the light of more slanting ones is taken for that of these.
 _SLOPE = 2.0
@@ -37,30 +37,34 @@ def lens_light(display: Display) -> dict[str, object] | None:
     """
     if display.lens is None:
         return None
-    slope = _largest_slope(display)
-    if display.lens_array.layout == "lenticular":
-        halves = (0.0, 0.5 * slope), (0.5 * slope, slope)
-        light = _joined(*(eye_light(display, (-slope, slope), half) for half in halves))
-    else:
-        light = eye_light(display, (-slope, slope), (-slope, slope))
+    light = light_everywhere(display)
     rows, columns, height, width = light.weights.shape
     largest = float(light.weights.max())
     panel = display.panel
     cells = panel.subpixel_cells or ((panel.subpixel_offsets,),)
     return {
-        "slope": slope,
+        "slope": float(light.slopes_x[-1]),
         "columns": columns,
         "rows": rows,
         "width": width,
         "height": height,
         "step": light.step,
-        "finer": _FINER,
-        "places": _base64(_finer_places(light).astype("<f4")),
+        "finer": FINER,
+        "places": _base64(finer_places(light).astype("<f4")),
         "largest": largest,
         "weights": _base64(np.rint(light.weights * (65535.0 / largest)).astype("<u2")),
         "cells": [[[list(pair) for pair in cell] for cell in row] for row in cells],
         "pupil": PUPIL,
     }
+
+
+def light_everywhere(display: Display) -> EyeLight:
+    """The light of a display with a lens for all places of the page's eye; of cylinders the rows begin at slope 0."""
+    slope = _largest_slope(display)
+    if display.lens_array.layout == "lenticular":
+        halves = (0.0, 0.5 * slope), (0.5 * slope, slope)
+        return _joined(*(eye_light(display, (-slope, slope), half) for half in halves))
+    return eye_light(display, (-slope, slope), (-slope, slope))
 
 
 def _largest_slope(display: Display) -> float:
@@ -86,12 +90,13 @@ def _joined(low: EyeLight, high: EyeLight) -> EyeLight:
     )
 
 
-def _finer_places(light: EyeLight) -> Real:
+def finer_places(light: EyeLight) -> Real:
+    """Middles of the light at :data:`FINER` steps between directions, ``(rows, columns, 2)`` in mm."""
     from scipy.interpolate import RectBivariateSpline
 
     slopes = (light.slopes_y, light.slopes_x)
     order_y, order_x = (min(3, len(each) - 1) for each in slopes)
-    dense = [np.linspace(each[0], each[-1], _FINER * (len(each) - 1) + 1) for each in slopes]
+    dense = [np.linspace(each[0], each[-1], FINER * (len(each) - 1) + 1) for each in slopes]
     parts = [RectBivariateSpline(*slopes, light.places[..., k], kx=order_y, ky=order_x)(*dense) for k in (0, 1)]
     return np.stack(parts, axis=-1)
 

@@ -72,12 +72,12 @@ def _light_of(display: Display, eye: Eye, pupil: float) -> EyeLight:
     """The light of all directions in which the eye stands over the display's corners."""
     half_x, half_y = (0.5 * side + display.lens_array.pitch for side in display.size_mm)
     corners = np.array([(x, y) for x in (-half_x, half_x) for y in (-half_y, half_y)])
-    x, y = _slopes(display, eye, corners[:, 0], corners[:, 1])
+    x, y = slopes_to_eye(display, eye, corners[:, 0], corners[:, 1])
     spans = [(float(each.min()), float(each.max())) for each in (x, y)]
     return eye_light(display, spans[0], spans[1], pupil / eye[2])
 
 
-def _slopes(display: Display, eye: Eye, x: Real, y: Real) -> tuple[Real, Real]:
+def slopes_to_eye(display: Display, eye: Eye, x: Real, y: Real) -> tuple[Real, Real]:
     """Slopes across and along the lenses of the directions from points of the lens plane to the eye."""
     right, up = (eye[0] - x) / eye[2], (eye[1] - y) / eye[2]
     if display.lens_array.layout != "lenticular":
@@ -95,7 +95,7 @@ def _gathered(image: Picture, light: EyeLight, eye: Eye, size: tuple[int, int], 
     v = (np.arange(rows.start, rows.stop) + 0.5) * (panel.height / size[1])
     x, y = display.panel_point(*np.meshgrid(u, v))
     center_x, center_y = lattice.center(*lattice.lens_at(x, y, NUMPY), x, y, NUMPY)
-    slope_x, slope_y = _slopes(display, eye, center_x, center_y)
+    slope_x, slope_y = slopes_to_eye(display, eye, center_x, center_y)
     number, place = _look_up(light, slope_x, slope_y)
     lines = np.empty((0, 0, 2))
     if is_line:

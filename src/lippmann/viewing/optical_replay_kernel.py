@@ -14,7 +14,7 @@ Real = NDArray[np.float64]
 
 
 @inlined
-def _weight(weights: Real, down: float, right: float) -> float:
+def weight_at(weights: Real, down: float, right: float) -> float:
     """Bilinear interpolation of ``weights`` ``(rows, columns)``; 0 outside. One row holds for all distances along."""
     rows, columns = weights.shape
     x = right + 0.5 * (columns - 1)
@@ -97,7 +97,7 @@ def gather_light(
                     for channel in range(3):
                         place_x, place_y = x + cell[channel, 0] * pixel, y - cell[channel, 1] * pixel
                         right = (place_x * cosine - place_y * sine - across) / step
-                        weight = share * _weight(table, (place_y - along) / step, right)
+                        weight = share * weight_at(table, (place_y - along) / step, right)
                         if weight != 0.0:
                             light = weight * values[row - top, column, channel]
                             if channel == 0:

@@ -11,7 +11,7 @@ import pytest
 
 import lippmann
 from lippmann.color.transfer import quantize
-from lippmann.display import Display, LensArray, Panel
+from lippmann.display import Display, LensArray, Panel, load_display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.light import LightOptions
@@ -25,6 +25,7 @@ from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import Splats
 from lippmann.scene.values.volume import TransferFunction, Volume
+from lippmann.studio_app.real_lens import RealEyeMap
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -32,6 +33,7 @@ DISPLAYS = {
     "lenticular": Display("lenticular", Panel(96, 64, 0.5), LensArray("lenticular", 4.0), 3.0, "", 300.0, 20.0),
     "slanted": Display("slanted", Panel(90, 60, 0.5), LensArray("lenticular", 2.3, 12.0), 3.0, "", 400.0, 20.0),
     "square": Display("square", Panel(96, 64, 0.5), LensArray("square", 4.0), 3.0, "", float("inf"), 20.0),
+    "print": load_display("print:lpi=60,ppi=360,size=8x5mm,thickness=0.6604,index=1.57"),
 }
 EYES = [(0.0, 0.0, 300.0), (25.0, -10.0, 220.0)]
 SIZE = 60, 40
@@ -94,6 +96,23 @@ def test_a_frame_is_the_replay_of_a_render(teapot, renderers, name, eye):
     replayed = quantize(image.replay(eye, size=SIZE), 8, "srgb")
     assert replayed.std() > 20
     assert psnr(frame.pixels, replayed) > 60
+
+
+@pytest.mark.slow
+def test_a_frame_through_the_real_lens_is_the_optical_replay_of_a_render(teapot, renderers):
+    request = RenderRequest(placement=PLACED, seed=5, tone_map="none")
+    eye, size = (10.0, 0.0, 300.0), (320, 200)
+    view = LiveView(eye, size, RealEyeMap, request=request)
+    image = render(teapot, "print", spp=1, seed=5, tone_map="none")
+    expected = quantize(image.replay(eye, size=size, optics=True), 8, "srgb")
+    assert psnr(renderers("print").frame(view).pixels, expected) > 32
+    for _ in range(20):
+        rest = refine(renderers("print"), view)
+        if rest is not None and rest.is_denoised:
+            break
+    # The light of whole paths, without noise, of the same place.
+    assert rest.is_denoised
+    assert np.isfinite(renderers("print").pick(view, 0.5, 0.5))
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ Codes = NDArray[np.uint8]
 
 def develop(values: Floats, pixels: PixelSet, request: RenderRequest) -> Codes:
     """Codes ``(height, width, 3)`` of the picture of pixels whose linear radiance is ``values`` ``(n, 3)``."""
-    if pixels.channels == 3:
+    if pixels.channels == 3 or pixels.is_mixed:
         return develop_picture(pixels.arrange(values), pixels, request)
     # Each pixel is coded once, and its three codes are copied as one 32-bit number; the last entry is black.
     codes = np.zeros((len(values) + 1, 4), np.uint8)

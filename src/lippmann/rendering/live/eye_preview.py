@@ -86,7 +86,7 @@ def render_eye_preview(
             return denoise_surfaces(light, albedo, normal, surfaces, effort=effort)
 
         clean = session.watch.stage("denoise", lambda: clean_light(noisy, None, take_noise_out, samples))
-        picture = clean if visible.blocks is None else visible.arrange(visible.values_of_lenses(clean))
+        picture = visible.arrange_from_lenses(clean)
         picture *= visible.number >= 0
         options = {"denoise": "oidn", "denoise_effort": effort}
     frame.pixels = picture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.display.seen_pixels import PixelSet
+from lippmann.display.seen_pixels import EyeMap, PixelSet
 from lippmann.errors import UsageError
 from lippmann.options.light import LightOptions
 from lippmann.rendering.request.render_request import RenderRequest
@@ -34,6 +35,8 @@ class LiveView:
         The eye's place in the display's frame, mm, in front of the lens plane. None: the native pixels themselves.
     size:
         Width and height in pixels of the eye's picture, which is the panel's rectangle in the lens plane.
+    eye_map:
+        Finds the pixels that the eye sees: through ideal lenses, or in the way of another :class:`EyeMap`.
     window:
         Where ``eye`` is None: the native pixels shown; None for the whole panel.
     row_step:
@@ -52,6 +55,7 @@ class LiveView:
 
     eye: Vector | None
     size: tuple[int, int] = (512, 512)
+    eye_map: Callable[..., EyeMap] = EyeMap
     window: PixelWindow | None = None
     row_step: int = 1
     request: RenderRequest = field(default_factory=RenderRequest)

@@ -124,12 +124,8 @@ class Progressive:
         if picture is None:
             return None
         self._task = None
-        return self._frame(self._developed(picture), seconds, is_denoised=True)
-
-    def _developed(self, picture: Floats) -> NDArray[np.uint8]:
-        if self._pixels.blocks is None:
-            return develop_picture(picture, self._pixels, self._view.request)
-        return develop(self._pixels.values_of_lenses(picture), self._pixels, self._view.request)
+        whole = self._pixels.arrange_from_lenses(picture)
+        return self._frame(develop_picture(whole, self._pixels, self._view.request), seconds, is_denoised=True)
 
     def _frame(self, pixels: NDArray[np.uint8], seconds: dict[str, float], *, is_denoised: bool) -> LiveFrame:
         return LiveFrame(pixels, self.samples, is_denoised, self._view.placement, self._exposure, seconds)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.display.seen_pixels import EyeMap, window_pixels
+from lippmann.display.seen_pixels import window_pixels
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.choices import POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
@@ -70,7 +70,7 @@ class LiveRenderer:
         self._progress = progress
         self._display = display
         # Caches for the eyes of some pages, and for the whole panel in motion and at rest.
-        self._map = lru_cache(4)(EyeMap)
+        self._map = lru_cache(4)(lambda kind, *of, subpixels: kind(*of, subpixels=subpixels))
         self._visible = lru_cache(4)(lambda map, eye: map.seen_by(eye))
         self._window = lru_cache(2)(window_pixels)
         self._latest: PlacedView | None = None
@@ -253,7 +253,7 @@ class LiveRenderer:
             if view.eye is None:
                 pixels = self._window(display, view.window, subpixels=subpixels, row_step=view.row_step)
             else:
-                pixels = self._visible(self._map(display, view.size, subpixels=subpixels), view.eye)
+                pixels = self._visible(self._map(view.eye_map, display, view.size, subpixels=subpixels), view.eye)
         stand = PlacedView(kernels, display, view, resolved, placement, placed, pixels)
         kernels.lit_for = stand
         return stand

@@ -138,6 +138,7 @@ class Studio {
   redo = () => this.store?.redo();
   sway = () => this.stage.setSwaying(!this.stage.isSwaying);
   native = () => this.stage.setNative(!this.stage.isNative);
+  real = () => this.stage.hasLens && this.stage.setReal(!this.stage.isReal);
   render = () => this.jobs.start();
   help = () => this.page.help.showModal();
   save = () => this.#sendState({ type: "save" });

@@ -15,6 +15,7 @@ export const KEYS = [
   ["Page ↑ ↓", "eye nearer, farther (Ctrl + wheel)"],
   ["S", "sway the eye"],
   ["N", "native pixels"],
+  ["O", "light of the real lens (optics)"],
   ["Home", "eye to the middle (double click)"],
   ["Ctrl + Z, Y", "undo, redo"],
   ["R", "render"],
@@ -132,6 +133,7 @@ export function listenToKeys(actions) {
       : {
           s: () => actions.sway(),
           n: () => actions.native(),
+          o: () => actions.real(),
           r: () => actions.render(),
           "?": () => actions.help(),
           "+": () => actions.size(1.05),

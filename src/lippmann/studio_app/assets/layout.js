@@ -47,6 +47,10 @@ export function buildPage(root, actions) {
   });
   const sway = toggle("Sway", actions.sway, { class: "toggle", title: "Move the eye by itself (S)" });
   const native = toggle("Native pixels", actions.native, { class: "toggle", title: "The panel's own pixels (N)" });
+  const real = toggle("Real lens", actions.real, {
+    class: "toggle",
+    title: "With crosstalk, blur and strips of the lenses as they are made (O)",
+  });
   const hint = h("span", { class: "hint" });
   const status = h("output", { class: "status", "aria-label": "State of the picture" });
   const help = helpDialog();
@@ -56,6 +60,7 @@ export function buildPage(root, actions) {
     tools.row,
     sway.button,
     native.button,
+    real.button,
     hint,
     h("span", { class: "space" }),
     status,
@@ -95,6 +100,8 @@ export function buildPage(root, actions) {
       tools.show(tool);
       sway.show(shown?.isSwaying ?? false);
       native.show(shown?.isNative ?? false);
+      real.show(shown?.isReal ?? false);
+      real.button.hidden = !(shown?.hasLens ?? false);
       canvas.dataset.tool = shown?.isNative ? "pan" : tool;
       hint.textContent = shown?.isNative
         ? `${shown.nativeZoom} : 1; drag to move, wheel to zoom`

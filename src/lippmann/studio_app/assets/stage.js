@@ -25,6 +25,7 @@ export class Stage {
     this.eye = { x: 0, y: 0, z: 400 };
     this.isNative = false;
     this.isSwaying = false;
+    this.isReal = false;
     this.corner = { x: 0, y: 0 };
     this.zoomIndex = 2;
     this.#context = canvas.getContext("2d", { alpha: false, desynchronized: true });
@@ -38,12 +39,13 @@ export class Stage {
     if (isFirst) this.eye = { x: 0, y: 0, z: optics.eye[2] };
     this.corner = { x: 0, y: 0 };
     this.#layOut();
+    this.onmode();
   }
 
   /** What the studio is to show. */
   view() {
     const { width, height } = this.#fit;
-    if (!this.isNative) return { eye: [this.eye.x, this.eye.y, this.eye.z], size: [width, height], window: null };
+    if (!this.isNative) return { eye: [this.eye.x, this.eye.y, this.eye.z], size: [width, height], window: null, real: this.isReal };
     const [columns, rows] = this.#nativeSize();
     const { x, y } = this.corner;
     return { eye: null, size: [columns, rows], window: [Math.round(x), Math.round(y), columns, rows] };
@@ -90,6 +92,18 @@ export class Stage {
       requestAnimationFrame(() => this.#sway());
     }
     this.onmode();
+  }
+
+  /** Shows the light that lenses send as they are made, or as ideal ones; displays without a lens have ideal ones. */
+  setReal(isOn) {
+    this.isReal = isOn;
+    this.setNative(false);
+    this.onview();
+    this.onmode();
+  }
+
+  get hasLens() {
+    return (this.optics?.lens ?? null) !== null;
   }
 
   setNative(isOn) {

@@ -1,0 +1,183 @@
+"""The (sub-)pixels whose light real lenses send to an eye: the studio's switch *Real lens*.
+
+The weights are those of the viewer's page, see :mod:`lippmann.viewer.lens_light`. Along a cylinder the light comes from
+the height of one pixel about the place that the eye sees, in a coarse picture, too.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display import NUMPY, Display
+from lippmann.display.seen_pixels import EyeMap, Floats, PixelSet, Vector
+from lippmann.optics.eye_light import EyeLight
+from lippmann.optics.lens import Real
+from lippmann.runtime.machine import usable_cores
+from lippmann.runtime.row_threads import Bands
+from lippmann.viewer.lens_light import FINER, finer_places, light_everywhere
+from lippmann.viewing.optical_replay import PUPIL, slopes_to_eye
+
+#: Weight below which a pixel is not traced: a quarter of a code in an even white picture.
+_LEAST = 1e-3
+
+#: Lenses at least so many pixels of the picture wide are denoised as one pixel each.
+_BLOCK_WIDTH = 1.5
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MixedPixels(PixelSet):
+    """Pixels of which each lens sends a mixture.
+
+    Attributes
+    ----------
+    starts, members, weights:
+        The mixture of lens ``k`` has the entries from ``starts[k]`` to ``starts[k + 1]``: ``(m, channels)`` numbers of
+        pixels, and ``(m, 3)`` weights of colours.
+    lenses:
+        ``(height, width)`` int32: the lens (and row along a cylinder) of each place of the picture.
+    grid:
+        ``(rows, columns)`` int32 lenses as they lie, -1 where there is none; None for lenses that are no blocks.
+    """
+
+    starts: NDArray[np.int64]
+    members: NDArray[np.int32]
+    weights: Floats
+    lenses: NDArray[np.int32]
+    grid: NDArray[np.int32] | None
+
+    is_mixed: ClassVar[bool] = True
+
+    def arrange(self, values: Floats) -> Floats:
+        """The picture ``(height, width, 3)`` of the pixels' values ``(n, 3)``."""
+        return self._mixtures(values)[self.lenses]
+
+    def arrange_lenses(self, values: Floats) -> Floats:
+        """The picture of the lenses, where they are blocks."""
+        if self.grid is None:
+            return self.arrange(values)
+        return np.concatenate([self._mixtures(values), np.zeros((1, 3), np.float32)])[self.grid]
+
+    def arrange_from_lenses(self, picture: Floats) -> Floats:
+        """The picture ``(height, width, 3)`` of what :meth:`arrange_lenses` gave."""
+        if self.grid is None:
+            return picture
+        mixtures = np.zeros((len(self.starts) - 1, 3), np.float32)
+        mixtures[self.grid[self.grid >= 0]] = picture[self.grid >= 0]
+        return mixtures[self.lenses]
+
+    def _mixtures(self, values: Floats) -> Floats:
+        from lippmann.studio_app.real_lens_kernel import mix
+
+        out = np.empty((len(self.starts) - 1, 3), np.float32)
+        Bands(usable_cores()).pixels(mix, len(out), self.starts, self.members, self.weights, values, out)
+        return out
+
+
+class RealEyeMap(EyeMap):
+    """Finds the pixels behind pictures of one size of a display with a lens; parameters as of :class:`EyeMap`."""
+
+    def __init__(self, display: Display, size: tuple[int, int], *, subpixels: bool) -> None:
+        self.display, self.size, self.subpixels = display, size, subpixels
+        (width, height), panel, lattice = size, display.panel, display.lattice
+        u = (np.arange(width) + 0.5) * (panel.width / width)
+        v = (np.arange(height) + 0.5) * (panel.height / height)
+        x, y = display.panel_point(*np.meshgrid(u, v))
+        i, j = lattice.lens_at(x, y, NUMPY)
+        self._is_line = lattice.layout == "lenticular"
+        column = np.rint(i - i.min()).astype(np.int64)
+        row = np.broadcast_to(np.arange(height)[:, None], x.shape) if self._is_line else np.rint(j - j.min())
+        if lattice.slant:  # along slanted cylinders each place shows other rows
+            column = np.broadcast_to(np.arange(width), x.shape)
+        shape = int(row.max()) + 1, int(column.max()) + 1
+        keys, first, lenses = np.unique(
+            row.astype(np.int64) * shape[1] + column, return_index=True, return_inverse=True
+        )
+        self._lenses = lenses.reshape(x.shape).astype(np.int32)
+        self._x, self._y = x.ravel()[first], y.ravel()[first]
+        center = lattice.center(i.ravel()[first], j.ravel()[first], self._x, self._y, NUMPY)
+        self._center_x, self._center_y = center
+        self._grid = None
+        if not lattice.slant and lattice.pitch * width / display.size_mm[0] >= _BLOCK_WIDTH:
+            grid = np.full(shape, -1, np.int32)
+            grid.ravel()[keys] = np.arange(len(keys))
+            self._grid = grid
+
+    def seen_by(self, eye: Vector) -> PixelSet:
+        """The pixels whose light an eye at ``eye`` (mm in the display's frame, z > 0) gets, with their weights."""
+        from lippmann.studio_app.real_lens_kernel import weigh
+
+        display, panel, lattice = self.display, self.display.panel, self.display.lattice
+        light, finer = _light_of(display)
+        light = light.through_pupil(PUPIL / eye[2] * display.gap)
+        at, places = self._at(light, finer, eye)
+        if self._is_line:
+            places[:, 0] += lattice.across(self._center_x, self._center_y)
+            seen = display.panel_point_seen_by(*eye, self._x, self._y, NUMPY)
+            places[:, 1] = display.pixel_coordinates(*seen)[1]
+        else:
+            places += np.stack([self._center_x, self._center_y], axis=-1)
+        slant = math.radians(lattice.slant if self._is_line else 0.0)
+        shape = np.array([panel.width, panel.height, panel.pixel_pitch, math.sin(slant), math.cos(slant)])
+        cells = np.array(panel.subpixel_cells or ((panel.subpixel_offsets,),), dtype=np.float64)
+        bands, count = Bands(usable_cores()), len(at)
+        starts, pixels, weights = np.zeros(count + 1, np.int64), np.empty(0, np.int64), np.empty((0, 3), np.float32)
+        asked = at, places, light.weights, light.step, shape, cells, self._is_line, not cells.any(), _LEAST
+        bands.pixels(weigh, count, *asked, starts, pixels, weights)
+        np.cumsum(starts, out=starts)
+        pixels, weights = np.empty(starts[-1], np.int64), np.empty((starts[-1], 3), np.float32)
+        bands.pixels(weigh, count, *asked, starts, pixels, weights)
+        return self._set_of(starts, pixels, weights)
+
+    def _at(self, light: EyeLight, finer: Real, eye: Vector) -> tuple[Real, Real]:
+        """Place of each lens among the tables (rows, columns), and the middle of its light in mm (across, along)."""
+        from scipy.ndimage import map_coordinates
+
+        across, along = slopes_to_eye(self.display, eye, self._center_x, self._center_y)
+        at = np.empty((len(across), 2))
+        for axis, slopes, slope in (
+            (1, light.slopes_x, across),
+            (0, light.slopes_y, np.abs(along) if self._is_line else along),
+        ):
+            at[:, axis] = np.clip((slope - slopes[0]) / (slopes[1] - slopes[0]), 0.0, len(slopes) - 1.0)
+        places = np.stack([map_coordinates(finer[..., k], FINER * at.T, order=1) for k in (0, 1)], axis=-1)
+        return at, places
+
+    def _set_of(self, starts: NDArray[np.int64], pixels: NDArray[np.int64], weights: Floats) -> MixedPixels:
+        panel, channels = self.display.panel, 3 if self.subpixels else 1
+        is_lit = weights > 0 if self.subpixels else np.ones((len(pixels), 1), bool)
+        keys = pixels[:, None] * channels + np.arange(channels)
+        is_traced = np.zeros(panel.width * panel.height * channels, bool)
+        is_traced[keys[is_lit]] = True
+        is_traced[:2] |= np.count_nonzero(is_traced) < 2  # a wavefront has at least two lanes
+        traced = np.flatnonzero(is_traced)
+        number = np.empty(len(is_traced), np.int32)
+        number[traced] = np.arange(len(traced), dtype=np.int32)
+        members = np.where(is_lit, number[np.where(is_lit, keys, traced[0])], 0)
+        # The brightest of each mixture, of which there is one last place more for lenses without light.
+        brightest = np.full((len(starts) - 1, channels), -1, np.int32)
+        is_full = np.diff(starts) > 0
+        for channel in range(channels):
+            light = weights[:, channel] if self.subpixels else weights.sum(axis=1)
+            most = np.zeros(len(is_full), np.float32)
+            most[is_full] = np.maximum.reduceat(light, starts[:-1][is_full]) if len(light) else 0.0
+            of = np.repeat(np.arange(len(is_full)), np.diff(starts))
+            is_most = (light == most[of]) & (light > 0)
+            brightest[of[is_most], channel] = members[is_most, channel]
+        pixel = traced // channels
+        parts = (part.astype(np.uint32) for part in (pixel % panel.width, pixel // panel.width, traced % channels))
+        column, row, channel_of = parts
+        shown = brightest[self._lenses]
+        mixture = {"starts": starts, "members": members, "weights": weights}
+        return MixedPixels(column, row, channel_of, shown, lenses=self._lenses, grid=self._grid, **mixture)
+
+
+@lru_cache(2)
+def _light_of(display: Display) -> tuple[EyeLight, Real]:
+    light = light_everywhere(display)
+    return light, finer_places(light)
