@@ -29,3 +29,12 @@ def test_pipes_devices_and_sockets_are_refused(tmp_path, monkeypatch):
         server.bind("s")
         with pytest.raises(SceneError, match="is a socket, no file"):
             check_kind(tmp_path / "s", SceneError)
+
+
+def test_pointers_of_git_lfs_are_refused(tmp_path):
+    text = f"version https://git-lfs.github.com/spec/v1\noid sha256:{'0' * 64}\nsize 344\n"
+    (tmp_path / "model.glb").write_text(text)
+    with pytest.raises(SceneError, match=r"model\.glb: is only a pointer of Git LFS; fetch .* git lfs pull"):
+        check_kind(tmp_path / "model.glb", SceneError)
+    (tmp_path / "long.obj").write_text(text + "#" * 1024)
+    check_kind(tmp_path / "long.obj", SceneError)

@@ -1,4 +1,4 @@
-"""Files that are read are plain ones: a pipe would be waited for, and a device may never end."""
+"""Files that are read are plain ones: a pipe would be waited for, a device may never end, a pointer holds nothing."""
 
 from __future__ import annotations
 
@@ -16,6 +16,9 @@ _KINDS = (
     (stat.S_ISSOCK, "a socket"),
 )
 
+#: What a file begins with that Git Large File Storage has not fetched, and how large such a pointer can be, bytes.
+_LFS_POINTER, _LFS_MOST = b"version https://git-lfs.github.com/spec/", 1024
+
 
 def other_kind(path: str | os.PathLike[str]) -> str | None:
     """What ``path`` is, wherever links lead, in place of a plain file; None for such a file, or for nothing at all.
@@ -30,7 +33,19 @@ def other_kind(path: str | os.PathLike[str]) -> str | None:
 
 
 def check_kind(path: Path, error: type[LippmannError]) -> None:
-    """Raise ``error`` if ``path`` is a pipe, a device or a socket; of folders and missing files others tell."""
+    """Raise ``error`` for a pipe, device, socket or pointer of Git LFS; others tell of folders and missing files."""
     kind = other_kind(path)
     if kind is not None and kind != "a folder":
         raise error(f"is {kind}, no file", where=str(path), fix="save it as a file first")
+    if kind is None and _is_lfs_pointer(path):
+        raise error("is only a pointer of Git LFS", where=str(path), fix="fetch the file itself: git lfs pull")
+
+
+def _is_lfs_pointer(path: Path) -> bool:
+    try:
+        if path.stat().st_size > _LFS_MOST:
+            return False
+        with path.open("rb") as file:
+            return file.read(len(_LFS_POINTER)) == _LFS_POINTER
+    except (OSError, ValueError):
+        return False

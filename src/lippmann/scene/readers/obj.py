@@ -22,7 +22,15 @@ from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.readers.mtl import MtlRecord, parse_mtl
 from lippmann.scene.readers.mtl_to_pbr import MaterialMapper
 from lippmann.scene.readers.obj_points_lines import draw_points_and_lines
-from lippmann.scene.readers.obj_tables import Integers, Lines, Points, check_range, read_corners, read_table
+from lippmann.scene.readers.obj_tables import (
+    Integers,
+    Lines,
+    Points,
+    check_range,
+    drop_absent,
+    read_corners,
+    read_table,
+)
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 
 # Curves, surfaces and display hints: drawn by no renderer of triangles.
@@ -94,13 +102,13 @@ def read_obj(path: Path, *, files: NamedFiles | None = None) -> SceneDescription
     if not (statements.faces.bodies or statements.points.bodies or statements.lines.bodies):
         fix = "points are drawn where 'p' names them" if statements.positions.bodies else "is it an OBJ file?"
         raise SceneError("holds no faces, lines or points", where=where, fix=fix)
-    geometry = _assemble(statements, where)
+    geometry, notes = _assemble(statements, where)
     named = NamedFiles.of(path, files)
     records, missing = _read_libraries(statements.libraries, where, named)
     mapper = MaterialMapper(named)
     meshes: list[Mesh] = []
     materials: list[Material] = []
-    notes = [f"{count} {what} are not rendered" for what, count in statements.ignored.items()]
+    notes += [f"{count} {what} are not rendered" for what, count in statements.ignored.items()]
     thin, sizes = _draw_points_and_lines(statements, geometry, where)
     for index, name in enumerate(statements.materials):
         rows = np.flatnonzero(geometry.material_of == index)
@@ -226,7 +234,7 @@ def _per_face(runs: Sequence[tuple[int, int]], count: int) -> Integers:
     return np.repeat(np.array([value for _, value in runs], np.int64), np.diff(first))
 
 
-def _assemble(statements: _Statements, where: str) -> _Geometry:
+def _assemble(statements: _Statements, where: str) -> tuple[_Geometry, list[str]]:
     positions = read_table(statements.positions, "vertex", 3, where, colored=True)
     # "v x y z r g b" is a vertex colour, "v x y z w" a rational weight, which faces do not use.
     colors = positions[:, 3:6] if positions.shape[1] in (6, 7) else None
@@ -236,7 +244,9 @@ def _assemble(statements: _Statements, where: str) -> _Geometry:
     normals = read_table(statements.normals, "normal", 3, where)[:, :3]
     corners, sizes = read_corners(statements.faces, where)
     numbers = np.repeat(np.array(statements.faces.numbers, np.int64), sizes)
-    check_range(corners, (len(positions), len(uvs), len(normals)), numbers, where)
+    counts = (len(positions), len(uvs), len(normals))
+    notes = drop_absent(corners, counts)
+    check_range(corners, counts, numbers, where)
     positions = positions[:, :3]
     triangles, owners = triangulate(positions, corners[:, 0] - 1, sizes)
     cut = corners[triangles] - 1
@@ -251,7 +261,7 @@ def _assemble(statements: _Statements, where: str) -> _Geometry:
         _per_face(statements.material_runs, len(sizes))[owners],
     )
     _complete_normals(geometry, _per_face(statements.smoothing_runs, len(sizes))[owners])
-    return geometry
+    return geometry, notes
 
 
 def _draw_points_and_lines(statements: _Statements, geometry: _Geometry, where: str) -> tuple[list[Mesh], list[str]]:

@@ -135,6 +135,16 @@ def _mixed_corners(flat: Sequence[str], numbers: Integers, where: str) -> Intege
     return corners
 
 
+def drop_absent(corners: Integers, counts: Sequence[int]) -> list[str]:
+    """Drop the indices into tables that the file lacks, as in OpenSubdiv's shapes, with a note on each table."""
+    notes = []
+    for slot, what in ((1, "texture coordinates"), (2, "normals")):
+        if not counts[slot] and (corners[:, slot] > 0).any():
+            corners[:, slot] = 0
+            notes.append(f"faces name {what}, but the file has none: taken without")
+    return notes
+
+
 def check_range(corners: Integers, counts: Sequence[int], numbers: Integers, where: str) -> None:
     least = (1, 0, 0)
     for slot, what in enumerate(("vertex", "texture coordinate", "normal")):
@@ -145,5 +155,5 @@ def check_range(corners: Integers, counts: Sequence[int], numbers: Integers, whe
             raise SceneError(
                 f"face uses {what} {column[row]}",
                 where=f"{where}:{numbers[row]}",
-                rule=f"the file has 1 to {counts[slot]}" if counts[slot] else f"the file has no {what}",
+                rule=f"the file has 1 to {counts[slot]}",
             )

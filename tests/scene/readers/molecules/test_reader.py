@@ -1,5 +1,7 @@
 """Molecules: atoms of every kind of file, bonds by distance, colours, damaged files."""
 
+import gzip
+
 import numpy as np
 import pytest
 
@@ -151,6 +153,21 @@ ATOM      4  OG1BTHR A   2       1.430   0.120   0.000  0.40 10.00           O
     scene = read(residues)
     assert places(scene, "balls of element 6").tolist() == [[0, 0, 0]]
     assert scene.notes == ["2 atoms, 1 bonds by their distance", "2 atoms at alternative places are left out"]
+
+
+@pytest.mark.parametrize("form", ["x y z", "model_Cartn_x model_Cartn_y model_Cartn_z"])
+def test_chemical_components(read, form):
+    """The wwPDB's files of ligands, and those of refinement programs, whose first block is a list."""
+    tags = [f"_chem_comp_atom.{tag}" for tag in ("comp_id", "atom_id", "type_symbol", *form.split())]
+    head = "data_comp_list\n_chem_comp.id NIO\n\ndata_comp_NIO\n_chem_comp.id NIO\nloop_\n"
+    scene = read(head + "\n".join(tags) + "\nNIO N N 0 0 0\nNIO O O 1.2 0 0\n", "NIO.cif")
+    assert places(scene, "balls of element 8") == pytest.approx(np.array([[1.2, 0, 0]]))
+    assert scene.notes == ["2 atoms, 1 bonds by their distance"]
+
+
+def test_packed_files(read):
+    assert read(gzip.compress(WATER.encode()), "w.pdb.gz").notes[0] == "4 atoms, 2 bonds by their distance"
+    assert read(gzip.compress(SALT.encode()), "salt.cif.gz").notes == ["2 atoms, 1 bonds by their distance"]
 
 
 def test_of_models_the_first_is_shown(read):

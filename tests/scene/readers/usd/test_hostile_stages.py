@@ -9,6 +9,7 @@ import threading
 import time
 import zipfile
 
+import numpy as np
 import pytest
 
 from lippmann.errors import LippmannError, MemoryLimitError, SceneError
@@ -53,6 +54,29 @@ def test_layers_in_the_folder_are_read(read):
 def test_a_layer_that_is_not_there_is_named(read):
     scene = read(triangle() + 'def Xform "x" (prepend references = @none.usda@) {}\n')
     assert scene.notes == ["layer 'none.usda' not found: the scene lacks what it holds"]
+
+
+@pytest.mark.parametrize("ending", ["mtlx", "obj"])
+def test_a_layer_of_a_format_without_plugin_is_left_out(read, ending):
+    body = triangle() + f'def Scope "x" (prepend references = @look.{ending}@</MaterialX>) {{}}\n'
+    scene = read(body, files={f"look.{ending}": "<materialx/>"})
+    assert len(scene.meshes) == 1
+    assert f"layer 'look.{ending}' is of a format that the installed USD does not read: left out" in scene.notes
+
+
+def test_a_unit_that_is_stored_in_single_precision_counts(tmp_path):
+    from pxr import Usd, UsdGeom
+
+    path = tmp_path / "float.usdc"
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageMetersPerUnit(stage, 0.5)
+    UsdGeom.Cube.Define(stage, "/cube")
+    stage.Save()
+    double, single = b"\0\0\0?\0\0\x09@", b"\0\0\0?\0\0\x08@"  # 0.5 as a value of the file, and its type
+    content = path.read_bytes()
+    assert content.count(double) == 1
+    path.write_bytes(content.replace(double, single))
+    assert load_scene(path).bounds == pytest.approx(np.array([[-0.5] * 3, [0.5] * 3]))
 
 
 def test_layers_that_name_each_other_end(read):

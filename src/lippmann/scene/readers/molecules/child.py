@@ -15,6 +15,11 @@ from lippmann.runtime.helper_process import serve_arrays
 MOST_ATOMS = 1 << 20
 #: Places of atoms in mmCIF, in fractions of a crystal's cell, and in the core dictionary's Cartesian form.
 _PLACE_TAGS = ("_atom_site.Cartn_x", "_atom_site_fract_x", "_atom_site_Cartn_x")
+#: Places of atoms of a chemical component (ligand): of refinement programs' libraries, measured, and ideal.
+_COMPONENT_TAGS = (
+    *("_chem_comp_atom.x", "_chem_comp_atom.model_Cartn_x"),
+    "_chem_comp_atom.pdbx_model_Cartn_x_ideal",
+)
 
 
 def main() -> None:
@@ -30,10 +35,12 @@ def _read(request: dict[str, Any]) -> dict[str, NDArray[np.generic]]:
 
 def _atoms(path: str, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Atomic numbers ``(n,)`` and positions ``(n, 3)``, angstroms, of the first model and first of alternatives."""
-    if not path.lower().endswith(".cif"):
+    if not path.lower().endswith((".cif", ".cif.gz")):
         return _of_structure(gemmi.read_structure(path), notes)
     document = gemmi.cif.read(path)
-    with_atoms = [block for block in document if any(block.find_values(tag) for tag in _PLACE_TAGS)]
+    with_atoms = [block for block in document if any(map(block.find_values, _PLACE_TAGS))]
+    if not with_atoms:
+        with_atoms = [block for block in document if any(map(block.find_values, _COMPONENT_TAGS))]
     block = (with_atoms or document)[0]
     if len(with_atoms) > 1:
         notes.append(f"{len(with_atoms)} blocks hold atoms: the first, '{block.name}', is shown")
@@ -41,7 +48,9 @@ def _atoms(path: str, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.f
         return _of_structure(gemmi.make_structure_from_block(block), notes)
     if block.find_values(_PLACE_TAGS[1]):
         return _of_crystal(gemmi.make_small_structure_from_block(block), notes)
-    return _of_cartesian(block, notes)
+    if block.find_values(_PLACE_TAGS[2]):
+        return _of_cartesian(block, notes)
+    return _of_structure(gemmi.make_structure_from_chemcomp_block(block), notes)
 
 
 def _of_structure(structure: gemmi.Structure, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

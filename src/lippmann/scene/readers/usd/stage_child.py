@@ -67,7 +67,8 @@ def _read(request: Record, arrays: Arrays) -> Record:
     traversal.run()
     return {
         **traversal.tree(),
-        "meters_per_unit": UsdGeom.GetStageMetersPerUnit(stage),
+        # pxr's own call refuses a float, as Blender 2.8 and TinyUSDZ write it.
+        "meters_per_unit": float(stage.GetMetadata(UsdGeom.Tokens.metersPerUnit)),
         "up": str(UsdGeom.GetStageUpAxis(stage)),
         "duration": (end - start) / rate if is_timed else 0.0,
         "files": used_files(stage),

@@ -30,7 +30,7 @@ def check_layers(path: str, folder: str | None) -> list[str]:
 
     Returns
     -------
-    Notes on layers that are not there.
+    Notes on layers that are not there or not understood.
 
     Raises
     ------
@@ -56,10 +56,12 @@ def check_layers(path: str, folder: str | None) -> list[str]:
                     rule="a scene file may name only files in its own folder and below",
                     fix="move it there, or trust the scene file with allow_outside=True",
                 )
-            if os.path.isfile(_outer(found)):
-                waiting.append(found)
-            else:
+            if not os.path.isfile(_outer(found)):
                 notes.append(f"layer '{name}' not found: the scene lacks what it holds")
+            elif Sdf.FileFormat.FindByExtension(found) is None:  # MaterialX and others whose plugin is not installed
+                notes.append(f"layer '{name}' is of a format that the installed USD does not read: left out")
+            else:
+                waiting.append(found)
     return notes
 
 
