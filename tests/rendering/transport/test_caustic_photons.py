@@ -380,3 +380,20 @@ def test_kernels_of_any_size_shoot_the_same_photons(monkeypatch):
     assert np.array_equal(whole.surfaces[other], in_parts.surfaces)
     assert np.allclose(whole.power[other], in_parts.power, rtol=1e-3)
     assert np.allclose(whole.toward[other], in_parts.toward, atol=1e-3)
+
+
+@pytest.mark.parametrize("count", [40, 9000])
+def test_radius_holds_the_neighbours_asked_for_and_loads_no_search_tree(monkeypatch, count):
+    import sys
+
+    from scipy.spatial import cKDTree
+
+    from lippmann.rendering.transport.caustic_photons import _radius
+    from lippmann.rendering.transport.photon_map import Photons
+
+    photons = Photons.dark(count)
+    photons.position[:] = np.random.default_rng(1).random((count, 3), np.float32)
+    distances, _ = cKDTree(photons.position).query(photons.position, k=[16])
+    for name in [name for name in sys.modules if name.startswith("scipy.spatial")]:
+        monkeypatch.setitem(sys.modules, name, None)  # takes longer to load than the photons to shoot
+    assert _radius(photons, 16.2) == pytest.approx(np.median(distances), rel=0.05)

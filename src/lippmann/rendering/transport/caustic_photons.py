@@ -134,12 +134,13 @@ def radius_of_pass(number: int) -> float:
 
 def _radius(photons: Photons, neighbours: float) -> float:
     """Median distance of photons to their neighbour number ``neighbours``."""
-    from scipy.spatial import cKDTree
-
     number = int(min(max(2, round(neighbours)), max(2, len(photons) // 2)))
     if len(photons) < 3:
         return float(np.ptp(photons.position, axis=0).max()) or 1.0
-    # As many photons apart as each has neighbours.
-    probed = photons.position[::number]
-    distances, _ = cKDTree(photons.position).query(probed, k=[number])
-    return float(np.median(distances)) or float(distances.max()) or 1.0
+    places = photons.position.astype(np.float64)
+    lengths = np.square(places).sum(axis=1)
+    distances = []
+    for point in places[:: max(1, len(places) // TUNING.probe_side)]:  # a median needs no more of them
+        square = np.partition(lengths - 2 * places @ point, number - 1)[number - 1] + np.square(point).sum()
+        distances.append(math.sqrt(max(square, 0.0)))
+    return float(np.median(distances)) or max(distances) or 1.0
