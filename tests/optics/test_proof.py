@@ -131,3 +131,9 @@ def test_micro_lenses_over_dark_lines(layout):
     slowest = moire_waves(display)[0]
     assert slowest.period == pytest.approx(lenses.pitch / 0.02, rel=0.02) or layout == "mla-hexagonal"
     assert slowest.period > 10 * lenses.pitch
+
+
+def test_no_share_is_written_as_a_power_of_ten():
+    # Small lit spots behind ideal pinholes: bars of more than twice the mean.
+    said = prove(load_display("mla-hexagonal")).in_words()["moire"]
+    assert "170 % of contrast" in said

@@ -38,6 +38,16 @@ def test_rays_are_those_of_the_rendering(monkeypatch, seconds):
         assert foreseen.rays[kind] == pytest.approx(rays[kind], rel=0.1)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("width", "size"), [("full", (640, 200)), ("half", (320, 200))])
+def test_a_pair_has_the_rays_of_both_eyes(width, size):
+    monitor = load_display("lume-pad").resized(320, 200)
+    monitor = replace(monitor, stereo=replace(monitor.stereo, width=width))
+    foreseen = lippmann.plan("teapot", monitor, spp=2)
+    assert foreseen.size == size
+    assert foreseen.rays["primary"] == size[0] * size[1] * 2
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("spp", [2, 64])
 def test_later_samples_take_fewer_shadow_rays(monkeypatch, spp):

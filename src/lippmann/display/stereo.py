@@ -55,6 +55,11 @@ class StereoPair:
             raise DisplayError.unknown("layout", self.width, get_args(PairWidth), where="stereo.layout")
 
     @property
+    def panels(self) -> int:
+        """How many panels' pixels both eyes' pictures have together."""
+        return 2 if self.width == "full" else 1
+
+    @property
     def ending(self) -> str:
         """The ending of the stem of a file with such a picture, by which players know it."""
         return "_2x1" if self.width == "full" else "_half_2x1"

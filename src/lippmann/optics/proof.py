@@ -288,7 +288,7 @@ def _advice(display: Display, straight: float, depth: float, tolerances: PrintTo
 
 def _share(share: float) -> str:
     """A share of light in percent."""
-    return f"{100 * share:.2g} %" if share >= 5e-4 else "0 %"
+    return f"{float(f'{100 * share:.2g}'):g} %" if share >= 5e-4 else "0 %"
 
 
 def _ghost(share: float) -> str:

@@ -165,7 +165,8 @@ def forecast(
     window = traced_window(session, display, placement)
     source = whole if window is None else WindowRays(whole, window)
     probe = _Probe(source, request.seed)
-    samples = source.width * source.height * request.channels * request.samples
+    panels = 1 if display.stereo is None else display.stereo.panels
+    samples = panels * source.width * source.height * request.channels * request.samples
     integrator = session.integrator(whole, placement.display_from_world, placement.exposure)
     probed = probe.trace(integrator, session)
     seconds = {
@@ -174,14 +175,14 @@ def forecast(
         "trace": probed.compile + frames * samples * probed.seconds_per_sample,
     }
     if request.denoises:
-        seconds["denoise"] = frames * _denoise_seconds(session, source, placement)
+        seconds["denoise"] = frames * panels * _denoise_seconds(session, source, placement)
     seconds["total"] = sum(seconds.values())
     per_pixel = 0.0 if display.stereo else display.panel.pixel_pitch / display.gap / display.lens_array.pitch
     share_beyond = probe.share_beyond(session, placement) * source.width * source.height / (width * height)
     return Forecast(
         scene=scene.name,
         display=display.name,
-        size=(width, height),
+        size=(panels * width, height),
         frames=frames,
         subpixels=bool(request.subpixels),
         spp=request.samples,
@@ -198,7 +199,7 @@ def forecast(
             **{kind: round(frames * samples * share) for kind, share in probed.rays.items()},
         },
         memory={
-            "expected": _resident() + width * height * memory_model.PICTURE + _working_bytes(source, session),
+            "expected": _resident() + panels * width * height * memory_model.PICTURE + _working_bytes(source, session),
             "limit": session.memory,
         },
         seconds=seconds,
