@@ -50,7 +50,7 @@ def render_corrected(
     parts = parts_of(finer.pixels)
     pixels = correction.rows(parts)
     told = rows_told(display.panel.height)
-    options, note = correction.told(pixels[told], [part[told] for part in parts])
+    options, note = correction.told(pixels[told], [part[told] for part in parts], told.start)
     provenance = replace(
         finer.provenance,
         options={**finer.provenance.options, **options},

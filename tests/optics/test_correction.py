@@ -9,6 +9,7 @@ import pytest
 from eyes import lenses_seen_by
 
 from lippmann.display import load_display
+from lippmann.display.panel import RGB_STRIPE
 from lippmann.errors import DisplayError
 from lippmann.optics.correction import LensCorrection, parts_beside
 
@@ -57,7 +58,7 @@ def error_to_eyes(display, pixels, z=-3.0):
 
 def test_it_is_the_least_squares_picture(solved):
     display, correction, parts, pixels = solved
-    shares, _ = correction._systems[0]
+    shares, _ = correction._rows._systems[0]
     matrix = np.zeros((len(shares.first), display.panel.width))
     for n, first in enumerate(shares.first):
         for k, share in enumerate(shares.shares[n]):
@@ -108,10 +109,10 @@ def test_light_beyond_white_is_white(solved):
     np.testing.assert_allclose(bright[:, 20:-20], 1.0, atol=1e-3)
 
 
-@pytest.mark.parametrize(("name", "what"), [("seed-lenticular", "gives no lens"), ("print", "cannot be corrected")])
+@pytest.mark.parametrize(("name", "what"), [("seed-lenticular", "gives no lens"), ("cells", "cannot be corrected")])
 def test_other_displays_are_refused(name, what):
-    display = load_display(WIDE if name == "print" else name)
-    if name == "print":
-        display = replace(display, sheet=None, lens_array=replace(display.lens_array, slant=9.0))
+    display = load_display(WIDE if name == "cells" else name)
+    if name == "cells":
+        display = replace(display, panel=replace(display.panel, subpixel_cells=((RGB_STRIPE, RGB_STRIPE),)))
     with pytest.raises(DisplayError, match=what):
         LensCorrection(display)

@@ -2,7 +2,8 @@
 
 Box-constrained least squares: with W the shares of pixels in the light of each direction, and T the light that is
 meant, the pixels P between black and white that make ``|W P - T|`` least, by FISTA from the picture along true
-directions. All rows under upright cylinders have the same ``W``; of it only ``W'W``, a band, is kept.
+directions. All rows under upright cylinders have the same ``W``; of it only ``W'W``, a band, is kept. Slanted ones are
+those of :mod:`lippmann.optics.slanted_correction`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from lippmann.display.lens_profile import INDICES, LensProfile
 from lippmann.errors import DisplayError
 from lippmann.optics.lens import Lens
 from lippmann.optics.seen import PixelShares, pixel_shares
+from lippmann.optics.slanted_correction import SlantedRows
 from lippmann.runtime.engine_lock import cached_property
 from lippmann.runtime.machine import usable_cores
 from lippmann.runtime.row_threads import Bands
@@ -54,7 +56,7 @@ _NO_LIMITS = (0.0, np.inf)
 
 @dataclass(frozen=True, eq=False)
 class LensCorrection:
-    """The correction of pictures for a display with upright cylinders.
+    """The correction of pictures for a display with cylinders.
 
     Raises
     ------
@@ -67,47 +69,38 @@ class LensCorrection:
 
     def __post_init__(self) -> None:
         Lens.of(self.display)
-        if not self.display.lattice.rows_are_alike or self.display.panel.subpixel_cells is not None:
-            rule = "pictures are corrected for upright cylinders before pixels that are all alike"
+        if self.display.lens_array.layout != "lenticular" or self.display.panel.subpixel_cells is not None:
+            rule = "pictures are corrected for cylinders before pixels that are all alike"
             fix = "leave the correction out: its rays follow the true directions of the lens all the same"
             raise DisplayError("cannot be corrected for its lens", where=self.display.name, rule=rule, fix=fix)
 
-    def rows(self, parts: Sequence[Floats]) -> Floats:
-        """Corrected pixels ``(rows, width, 3)``, of the light that is meant: one such array for each part of a pixel.
+    @property
+    def margin(self) -> int:
+        """Rows beyond which others have no say in a row."""
+        return self._rows.margin
 
-        Light is linear, with white at 1.
+    def rows(self, parts: Sequence[Floats], first: int = 0) -> Floats:
+        """Corrected pixels ``(rows, width, 3)`` of the rows from ``first`` on, as if there were no others.
+
+        ``parts`` is the light that is meant, one such array for each part of a pixel. Light is linear, with white at 1.
         """
-        from lippmann.optics.correction_kernel import solve
+        meant = _clipped(parts)
+        solved = [self._rows.solve(np.ascontiguousarray(meant[..., c]), c, first) for c in range(3)]
+        return np.stack(solved, axis=-1)
 
-        corrected = np.empty_like(parts[0])
-        meant = np.stack([np.clip(part, 0.0, 1.0) for part in parts])
-        for channel in range(3):
-            shares, band = self._systems[channel]
-            rows = np.ascontiguousarray(meant[..., channel])
-            solved = np.empty(rows.shape[1:], dtype=np.float32)
-            Bands(usable_cores()).lines(
-                solve, len(solved), rows, shares.first, shares.shares.astype(np.float32), band, _STEPS, solved
-            )
-            corrected[..., channel] = solved
-        return corrected
-
-    def seen_error(self, pixels: Floats, parts: Sequence[Floats], profile: LensProfile | None = None) -> float:
+    def seen_error(
+        self, pixels: Floats, parts: Sequence[Floats], profile: LensProfile | None = None, first: int = 0
+    ) -> float:
         """Mean squared error of the light that an eye sees of ``pixels``, over all lenses and directions meant.
 
-        ``profile`` is the lens that is there; by default the display's own.
+        ``profile`` is the lens that is there; by default the display's own. ``first`` is the number of the first row.
         """
-        display = self.display if profile is None else replace(self.display, lens=profile)
-        squares = []
-        for channel in range(3):
-            shares = self._systems[channel][0] if profile is None else self._shares(display, channel)
-            meant = np.stack([np.clip(part[..., channel], 0.0, 1.0) for part in parts], axis=-1)
-            seen = shares.seen(pixels[..., channel].astype(np.float64))
-            squares.append(np.mean((seen - meant.reshape(len(seen), -1)) ** 2))
-        return float(np.mean(squares))
+        there = self.display if profile is None else replace(self.display, lens=profile)
+        return self._rows.squared_error(pixels, _clipped(parts), first, there)
 
-    def told(self, pixels: Floats, parts: Sequence[Floats]) -> tuple[dict[str, object], str]:
+    def told(self, pixels: Floats, parts: Sequence[Floats], first: int = 0) -> tuple[dict[str, object], str]:
         """What a file says of corrected ``pixels``, and a line for people."""
-        gains = self.gains(pixels, parts)
+        gains = self.gains(pixels, parts, first)
         limited = float(np.mean((pixels <= 0.0) | (pixels >= 1.0)))
         options: dict[str, object] = {"correct": "lens", "correction_limited": limited}
         options |= {f"correction_gain_{name}": gain for name, gain in gains.items()}
@@ -117,15 +110,15 @@ class LensCorrection:
             f"{worst} is {TOLERANCE:.0%} off; {limited:.0%} of the values at black or white"
         )
 
-    def gains(self, pixels: Floats, parts: Sequence[Floats]) -> dict[str, float]:
+    def gains(self, pixels: Floats, parts: Sequence[Floats], first: int = 0) -> dict[str, float]:
         """Decibels by which an eye sees corrected ``pixels`` nearer to what is meant, by the lens that is there.
 
         Keys: ``exact``, and ``radius``, ``thickness`` and ``index``, each the worse of 3 % more and less.
         """
-        before = np.mean(np.stack([np.clip(part, 0.0, 1.0) for part in parts]), axis=0)
+        before = np.mean(_clipped(parts), axis=0)
 
         def gain(profile: LensProfile | None) -> float:
-            worse, better = (self.seen_error(picture, parts, profile) for picture in (before, pixels))
+            worse, better = (self.seen_error(picture, parts, profile, first) for picture in (before, pixels))
             return 10.0 * float(np.log10(max(worse, 1e-12) / max(better, 1e-12)))
 
         lens = Lens.of(self.display).profile
@@ -136,15 +129,57 @@ class LensCorrection:
         return told
 
     @cached_property
+    def _rows(self) -> _UprightRows | SlantedRows:
+        offsets = self.display.panel.subpixel_offsets if self.subpixels else ((0.0, 0.0),) * 3
+        if self.display.lattice.rows_are_alike:
+            return _UprightRows(self.display, tuple(right for right, _ in offsets))
+        return SlantedRows(self.display, offsets, parts_beside())
+
+
+def _clipped(parts: Sequence[Floats]) -> Floats:
+    """``(parts, rows, width, 3)`` between black and white."""
+    return np.stack([np.clip(part, 0.0, 1.0) for part in parts])
+
+
+@dataclass(frozen=True, eq=False)
+class _UprightRows:
+    """Rows of a display of upright cylinders, one by one; its colours lie ``offsets`` pixels to the right."""
+
+    display: Display
+    offsets: tuple[float, ...]
+    margin = 0
+
+    def solve(self, meant: Floats, channel: int, first: int) -> Floats:
+        """Pixels ``(rows, width)`` of the meant light ``(parts, rows, width)``."""
+        from lippmann.optics.correction_kernel import solve
+
+        shares, band = self._systems[channel]
+        solved = np.empty(meant.shape[1:], dtype=np.float32)
+        Bands(usable_cores()).lines(
+            solve, len(solved), meant, shares.first, shares.shares.astype(np.float32), band, _STEPS, solved
+        )
+        return solved
+
+    def squared_error(self, pixels: Floats, meant: Floats, first: int, there: Display) -> float:
+        """Mean squared error of what eyes see of pixels ``(rows, width, 3)``, against ``(parts, rows, width, 3)``."""
+        squares = []
+        for channel in range(3):
+            is_own = there is self.display
+            shares = self._systems[channel][0] if is_own else self._shares(there, channel)
+            seen = shares.seen(pixels[..., channel].astype(np.float64))
+            goal = np.moveaxis(meant[..., channel], 0, -1).reshape(len(seen), -1)
+            squares.append(np.mean((seen - goal) ** 2))
+        return float(np.mean(squares))
+
+    @cached_property
     def _systems(self) -> list[tuple[PixelShares, Floats]]:
         """By channel: the shares of all directions meant, those of a pixel one after the other, and the band of W'W."""
         from lippmann.optics.correction_kernel import add_normal_band
 
         systems: list[tuple[PixelShares, Floats]] = []
-        offsets = [self._offset(channel) for channel in range(3)]
-        for channel, offset in enumerate(offsets):
-            if offset in offsets[:channel]:
-                systems.append(systems[offsets.index(offset)])
+        for channel, offset in enumerate(self.offsets):
+            if offset in self.offsets[:channel]:
+                systems.append(systems[self.offsets.index(offset)])
                 continue
             shares = self._shares(self.display, channel)
             band = np.zeros((self.display.panel.width, 2 * shares.shares.shape[1] - 1))
@@ -152,11 +187,8 @@ class LensCorrection:
             systems.append((shares, band.astype(np.float32)))
         return systems
 
-    def _offset(self, channel: int) -> float:
-        return self.display.panel.subpixel_offsets[channel][0] if self.subpixels else 0.0
-
     def _shares(self, display: Display, channel: int) -> PixelShares:
-        own, offset, panel = self.display, self._offset(channel), self.display.panel
+        own, offset, panel = self.display, self.offsets[channel], self.display.panel
         beside = np.array(parts_beside()) + offset
         u = (np.arange(panel.width)[:, None] + 0.5 + beside).ravel()
         x, y = own.panel_point(u, np.full_like(u, 0.5 * panel.height))

@@ -114,3 +114,52 @@ def _solve(
         for lane in range(lanes):
             for c in range(width):
                 solved[top + lane, c] = state[1, c, lane]
+
+
+@uncounted
+def add_stencil(
+    first_row: int,
+    last_row: int,
+    values: Floats,
+    numbers: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    weights: Floats,
+    sums: Floats,
+) -> None:
+    """Add to rows of ``sums`` ``(rows, width)`` the ``values`` ``(parts, rows, width)`` about each pixel.
+
+    ``numbers`` ``(rows, width)`` choose each pixel's ``weights`` ``(n, numbers)`` of the values at ``offsets``
+    ``(n, 3)``: part, rows down and columns to the right. There is nothing beside the panel.
+    """
+    height, width = sums.shape
+    for row in range(first_row, last_row):
+        for m in range(offsets.shape[0]):
+            part, other, right = offsets[m, 0], row + offsets[m, 1], offsets[m, 2]
+            if 0 <= other < height:
+                for column in range(max(0, -right), min(width, width - right)):
+                    sums[row, column] += weights[m, numbers[row, column]] * values[part, other, column + right]
+
+
+@uncounted
+def descend(
+    first_row: int,
+    last_row: int,
+    now: Floats,
+    numbers: NDArray[np.int32],
+    offsets: NDArray[np.int64],
+    weights: Floats,
+    goal: Floats,
+    step: float,
+    speed: float,
+    solved: Floats,
+    ahead: Floats,
+) -> None:
+    """A step of FISTA: from ``now`` ``(1, rows, width)`` to ``solved`` and, beyond it, ``ahead`` ``(rows, width)``."""
+    ahead[first_row:last_row] = np.float32(0.0)
+    add_stencil(first_row, last_row, now, numbers, offsets, weights, ahead)
+    for row in range(first_row, last_row):
+        for column in range(goal.shape[1]):
+            value = now[0, row, column] - step * (ahead[row, column] - goal[row, column])
+            value = min(max(value, np.float32(0.0)), np.float32(1.0))
+            ahead[row, column] = value + speed * (value - solved[row, column])
+            solved[row, column] = value

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lippmann.display.display import Display
 from lippmann.display.pixel_aperture import PixelAperture
@@ -56,6 +57,21 @@ class EyeLight:
         for axis in (3,) if weights.shape[2] == 1 else (2, 3):
             weights = _convolved(weights, shape, axis=axis)
         return replace(self, weights=weights)
+
+    def look_up(self, slope_x: Real, slope_y: Real) -> tuple[NDArray[np.int32], Real]:
+        """Number of the nearest direction's weights, row by row, and ``(..., 2)`` middle of the light, interpolated."""
+        columns, rows = len(self.slopes_x), len(self.slopes_y)
+        at_x, at_y = (
+            np.clip((slope - slopes[0]) / (slopes[1] - slopes[0]), 0.0, len(slopes) - 1.0)
+            for slope, slopes in ((slope_x, self.slopes_x), (slope_y, self.slopes_y))
+        )
+        number = (np.rint(at_y) * columns + np.rint(at_x)).astype(np.int32)
+        left, low = np.minimum(at_x.astype(np.intp), columns - 2), np.minimum(at_y.astype(np.intp), rows - 2)
+        part_x, part_y = (at_x - left)[..., None], (at_y - low)[..., None]
+        lower, upper = (
+            self.places[low + up, left] * (1.0 - part_x) + self.places[low + up, left + 1] * part_x for up in (0, 1)
+        )
+        return number, lower * (1.0 - part_y) + upper * part_y
 
 
 def eye_light(

@@ -183,7 +183,9 @@ class Weaving:
         """Rows ``first`` to before ``last``, ``(rows, width, 3)`` float32 linear RGB."""
         if self._correction is None:
             return weave_window(self.quilt, self.display, self.choice, (first, last))
-        return self._correction.rows(self._parts(first, last))
+        margin = self._correction.margin
+        start, stop = max(0, first - margin), min(self.display.panel.height, last + margin)
+        return self._correction.rows(self._parts(start, stop), start)[first - start : last - start]
 
     def told(self) -> tuple[dict[str, object], tuple[str, ...]]:
         """What a file says of the correction, and lines for people: of the rows about the middle."""
@@ -193,7 +195,7 @@ class Weaving:
 
         rows = rows_told(self.display.panel.height)
         parts = self._parts(rows.start, rows.stop)
-        options, note = self._correction.told(self._correction.rows(parts), parts)
+        options, note = self._correction.told(self._correction.rows(parts, rows.start), parts, rows.start)
         return options, (note,)
 
     def _parts(self, first: int, last: int) -> list[FloatArray]:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.image.stored_values import FloatArray
+from lippmann.optics.eye_light_kernel import weight_at
 from lippmann.runtime.numba_jit import inlined, uncounted
-from lippmann.viewing.optical_replay_kernel import weight_at
 
 Real = NDArray[np.float64]
 

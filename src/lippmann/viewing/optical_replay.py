@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lippmann.display import NUMPY, Display
 from lippmann.errors import UsageError
@@ -87,7 +86,7 @@ def slopes_to_eye(display: Display, eye: Eye, x: Real, y: Real) -> tuple[Real, R
 
 def _gathered(image: Picture, light: EyeLight, eye: Eye, size: tuple[int, int], rows: slice) -> FloatArray:
     """Rows of a picture of ``size`` (width, height), each point of which shows one lens."""
-    from lippmann.viewing.optical_replay_kernel import gather_light
+    from lippmann.optics.eye_light_kernel import gather_light
 
     display, panel = image.display, image.display.panel
     lattice, is_line = display.lattice, display.lens_array.layout == "lenticular"
@@ -96,7 +95,7 @@ def _gathered(image: Picture, light: EyeLight, eye: Eye, size: tuple[int, int], 
     x, y = display.panel_point(*np.meshgrid(u, v))
     center_x, center_y = lattice.center(*lattice.lens_at(x, y, NUMPY), x, y, NUMPY)
     slope_x, slope_y = slopes_to_eye(display, eye, center_x, center_y)
-    number, place = _look_up(light, slope_x, slope_y)
+    number, place = light.look_up(slope_x, slope_y)
     lines = np.empty((0, 0, 2))
     if is_line:
         place[..., 0] += lattice.across(center_x, center_y)
@@ -120,19 +119,3 @@ def _gathered(image: Picture, light: EyeLight, eye: Eye, size: tuple[int, int], 
         gathering = values, top, shape, cells, tables, light.step, number, place, lines, out
         Bands(usable_cores()).lines(gather_light, len(v), *gathering)
     return out
-
-
-def _look_up(light: EyeLight, slope_x: Real, slope_y: Real) -> tuple[NDArray[np.int32], Real]:
-    """The number of the nearest direction's table, and the middle of the light in mm, interpolated."""
-    columns, rows = len(light.slopes_x), len(light.slopes_y)
-    at_x, at_y = (
-        np.clip((slope - slopes[0]) / (slopes[1] - slopes[0]), 0.0, len(slopes) - 1.0)
-        for slope, slopes in ((slope_x, light.slopes_x), (slope_y, light.slopes_y))
-    )
-    number = (np.rint(at_y) * columns + np.rint(at_x)).astype(np.int32)
-    left, low = np.minimum(at_x.astype(np.intp), columns - 2), np.minimum(at_y.astype(np.intp), rows - 2)
-    part_x, part_y = (at_x - left)[..., None], (at_y - low)[..., None]
-    lower, upper = (
-        light.places[low + up, left] * (1.0 - part_x) + light.places[low + up, left + 1] * part_x for up in (0, 1)
-    )
-    return number, lower * (1.0 - part_y) + upper * part_y

@@ -25,7 +25,7 @@ Correct = Annotated[
     typer.Option(
         "--correct",
         help="lens: choose the pixels whose light through the display's real lenses comes nearest to what is meant, "
-        "for upright lenses of a known thickness.",
+        "for cylindrical lenses of a known thickness.",
         rich_help_panel="Display",
     ),
 ]

@@ -1,4 +1,4 @@
-"""The compiled kernel of replays through real lenses. It is imported late: loading Numba takes half a second."""
+"""Compiled gathering of the light that an eye sees. It is imported late: loading Numba takes half a second."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.image.stored_values import FloatArray
 from lippmann.runtime.numba_jit import inlined, uncounted
 
 Real = NDArray[np.float64]
+FloatArray = NDArray[np.float32]
 
 
 @inlined

@@ -1,0 +1,274 @@
+"""Least squares of pictures under slanted cylinders, as an eye sees them: a lens by as many rows as it is wide.
+
+Beside the sub-pixels of one row lie gaps under a slanted lens, which the rows about it fill: an eye takes them
+together. So rows are not independent; but the shares of a pixel depend on its place under the lens alone. With ``W``
+the shares of a row's pixels in the light of each lens and direction, ``T`` the light that is meant of them, and ``G``
+the mean over a window of rows, all windows together are solved for: ``|G (W P - T)|`` is least. ``W'G'GW`` and
+``W'G'G`` of the meant light are stencils, known by the place under the lens.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display.display import Display
+from lippmann.optics.eye_light import EyeLight, eye_light
+from lippmann.optics.lens import Real
+from lippmann.runtime.engine_lock import cached_property
+from lippmann.runtime.machine import usable_cores
+from lippmann.runtime.row_threads import Bands
+
+Floats = NDArray[np.float32]
+Offset = tuple[int, int, int]
+
+#: Directions, and places whose stencils are known, for each pixel under a lens; a sub-pixel is a third of one wide.
+_DIRECTIONS, _PLACES = 8, 40
+
+#: Parts of the panel, from left to right, whose lenses have the same directions.
+_ZONES = 9
+
+#: Entries of a stencil that are nowhere so large a share of the largest one are left out.
+_LEAST = 2e-3
+
+#: Steps of FISTA: 10 are within 0.1 dB of 100.
+_STEPS = 10
+
+#: Of the directions, and of the windows of rows, one of so many is judged.
+_JUDGED = 3
+
+
+@dataclass(frozen=True, eq=False)
+class _Stencil:
+    """Weights of the pixels about one, by the zone and place of that one.
+
+    ``offsets`` is ``(n, 3)``: part of the pixel, rows down, columns to the right; ``weights`` ``(n, zones x places)``.
+    """
+
+    offsets: NDArray[np.int64]
+    weights: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class SlantedRows:
+    """Rows of a display, solved and judged as an eye sees them.
+
+    Parameters
+    ----------
+    display:
+        A display of cylinders, whose pixels are all alike.
+    offsets:
+        Places (right, down) of the three colours in a pixel.
+    parts:
+        Places of the light that is meant, in pixels to the right of these; evenly spaced over a pixel.
+    """
+
+    display: Display
+    offsets: tuple[tuple[float, float], ...]
+    parts: tuple[float, ...]
+
+    @property
+    def window(self) -> int:
+        """Rows that an eye sees together."""
+        return max(1, round(self.display.lens_array.pitch / self.display.panel.pixel_pitch))
+
+    @property
+    def margin(self) -> int:
+        """Rows beyond which others have no say in a row."""
+        return 2 * self.window
+
+    def solve(self, meant: Floats, channel: int, first: int) -> Floats:
+        """Pixels ``(rows, width)`` of the meant light ``(parts, rows, width)`` of the rows from ``first`` on."""
+        from lippmann.optics.correction_kernel import add_stencil, descend
+
+        # An eye sees no window of rows beside the panel: the outermost go on.
+        meant = np.pad(meant, ((0, 0), (self.margin, self.margin), (0, 0)), mode="edge")
+        bands, count = Bands(usable_cores()), meant.shape[1]
+        numbers = self._numbers(channel, first - self.margin, count)
+        normal, of_meant = self._stencils
+        goal = np.zeros(meant.shape[1:], dtype=np.float32)
+        solved: Floats = np.asarray(np.mean(meant, axis=0, dtype=np.float32))
+        bands.lines(add_stencil, count, meant, numbers, of_meant.offsets, of_meant.weights, goal)
+        step = np.float32(1.0) / normal.weights.sum(axis=0).max()
+        now, ahead, t = solved[None].copy(), np.empty_like(solved[None]), 1.0
+        for _ in range(_STEPS):
+            following = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * t * t))
+            speed, t = np.float32((t - 1.0) / following), following
+            bands.lines(
+                descend, count, now, numbers, normal.offsets, normal.weights, goal, step, speed, solved, ahead[0]
+            )
+            now, ahead = ahead, now
+        return solved[self.margin : -self.margin]
+
+    def squared_error(self, pixels: Floats, meant: Floats, first: int, there: Display) -> float:
+        """Mean squared error of what eyes see of pixels ``(rows, width, 3)``, against ``(parts, rows, width, 3)``.
+
+        ``there`` is the display with the lens that is there.
+        """
+        from lippmann.optics.eye_light_kernel import gather_light
+
+        display, panel, n = self.display, self.display.panel, self.window
+        count = np.arange(0, len(pixels) - n + 1, _JUDGED)
+        lens = np.arange(display.lens_grid.columns, dtype=np.float64)
+        axis, place = (each[:, ::_JUDGED] for each in self._directions(lens))
+        light = _even_light(self.display, there)
+        number, middle = light.look_up(self._slopes(place), np.zeros_like(place))
+        middle[..., 0] += axis
+        shape = (len(count), place.size)
+        numbers = np.broadcast_to(number.ravel(), shape)
+        places = np.broadcast_to(middle.reshape(-1, 2), (*shape, 2))
+        lines = np.broadcast_to((count[:, None] + np.array([0.0, n]))[:, None], (*shape, 2)) + float(first)
+        slant = math.radians(display.lens_array.slant)
+        frame = np.array([panel.width, panel.height, panel.pixel_pitch, math.sin(slant), math.cos(slant)])
+        tables = light.weights.reshape(-1, *light.weights.shape[2:])
+        cells = np.array(((self.offsets,),), dtype=np.float64)
+        seen = np.zeros((*shape, 3), dtype=np.float32)
+        Bands(usable_cores()).lines(
+            gather_light, len(count), pixels, first, frame, cells, tables, light.step, numbers, places, lines, seen
+        )
+        squares = []
+        for channel in range(3):
+            goal, is_there = self._meant(meant[..., channel], channel, first, axis, place)
+            sums = np.concatenate([np.zeros((1, place.size)), np.cumsum(goal, axis=0)])
+            windows = (sums[count + n] - sums[count]) / n
+            inside = np.array([is_there[k : k + n].all(axis=0) for k in count])
+            squares.append(np.mean((seen[..., channel] - windows)[inside] ** 2))
+        return float(np.mean(squares))
+
+    def _directions(self, lens: Real) -> tuple[Real, Real]:
+        """``(lenses, directions)``: axis in mm across, and place of each direction relative to it."""
+        display = self.display
+        per_lens = math.ceil(_DIRECTIONS * display.pixels_per_lens[0])
+        steps = ((np.arange(per_lens) + 0.5) / per_lens - 0.5) * display.micro_image_pitch
+        axis = (display.lattice.origin_x + lens * display.lattice.pitch)[:, None]
+        return np.broadcast_to(axis, (len(lens), per_lens)), steps + axis * (display.magnification - 1.0)
+
+    def _slopes(self, place: Real) -> Real:
+        slopes: Real = -self.display.pinhole_place(place) / self.display.gap
+        return slopes
+
+    def _across(self, channel: int, rows: Real, columns: Real) -> Real:
+        """Places across the lenses in mm of the middles of pixels."""
+        right, down = self.offsets[channel]
+        x, y = self.display.panel_point(columns + 0.5 + right, rows + 0.5 + down)
+        across: Real = self.display.lattice.across(x, y)
+        return across
+
+    def _numbers(self, channel: int, first: int, count: int) -> NDArray[np.int32]:
+        """Zone and place of pixels, as one number: ``(count, width)``."""
+        display = self.display
+        panel = display.panel
+        numbers = np.empty((count, panel.width), dtype=np.int32)
+        columns, places = np.arange(panel.width, dtype=np.float64), self._places
+        for row, line in enumerate(numbers):
+            across = self._across(channel, np.full_like(columns, first + row), columns) / display.magnification
+            at = (across - display.lattice.origin_x) / display.lattice.pitch + 0.5
+            lens = np.floor(at)
+            zone = np.clip(lens * (_ZONES / display.lens_grid.columns), 0, _ZONES - 1).astype(np.int32)
+            line[:] = zone * places + np.minimum((at - lens) * places, places - 1).astype(np.int32)
+        return numbers
+
+    @property
+    def _places(self) -> int:
+        return math.ceil(_PLACES * self.display.pixels_per_lens[0])
+
+    def _meant(
+        self, meant: Floats, channel: int, first: int, axis: Real, place: Real
+    ) -> tuple[Real, NDArray[np.bool_]]:
+        """Light ``(rows, lenses x directions)`` that is meant, between the parts beside it of the same lens and row.
+
+        And whether the row has the lens.
+        """
+        display, panel = self.display, self.display.panel
+        count, rows, width = meant.shape
+        line = np.moveaxis(meant, 0, -1).reshape(rows, width * count)
+        parts = np.arange(width * count)
+        result, is_there = np.empty((rows, place.size)), np.empty((rows, place.size), dtype=bool)
+        cosine = math.cos(math.radians(display.lens_array.slant)) * panel.pixel_pitch / count
+        for row in range(rows):
+            start = self._across(channel, np.array([first + row + 0.0]), np.array([self.parts[0]]))
+            at = ((axis + place - start) / cosine).ravel()
+            half, middle = (
+                0.5 * display.micro_image_pitch / cosine,
+                ((axis * display.magnification - start) / cosine).ravel(),
+            )
+            low, high = np.ceil(middle - half), np.floor(middle + half)
+            is_there[row] = (low >= 0) & (high < len(parts))
+            result[row] = np.interp(np.clip(at, low, high), parts, line[row])
+        return result, is_there
+
+    @cached_property
+    def _stencils(self) -> tuple[_Stencil, _Stencil]:
+        """Those of ``W'G'GW`` and of ``W'G'G`` of the meant light."""
+        display, n, places = self.display, self.window, self._places
+        light = _even_light(display, display)
+        slant = math.radians(display.lens_array.slant)
+        right, down = (display.panel.pixel_pitch * each for each in (math.cos(slant), math.sin(slant)))
+        tables = light.weights.reshape(-1, light.weights.shape[3])
+        half, reach = tables.shape[1] // 2, (0.5 * tables.shape[1] + 1.0) * light.step
+        pitch, finer = display.micro_image_pitch, right / len(self.parts)
+
+        def share(number: NDArray[np.int32], away: Real) -> Real:
+            at = np.clip(away / light.step + half, 0.0, 2.0 * half - 1e-9)
+            index = at.astype(np.int64)
+            value = tables[number, index] * (1.0 - at + index) + tables[number, index + 1] * (at - index)
+            shares: Real = np.where(np.abs(away) < reach, value, 0.0)
+            return shares
+
+        normal: dict[Offset, Real] = {}
+        of_meant: dict[Offset, Real] = {}
+
+        def add(to: dict[Offset, Real], key: Offset, at: NDArray[np.int64], values: Real) -> None:
+            to.setdefault(key, np.zeros(_ZONES * places))
+            to[key] += np.bincount(at, values, _ZONES * places)
+
+        middles = (np.arange(places) + 0.5) / places - 0.5
+        for zone in range(_ZONES):
+            lens = np.array([(zone + 0.5) / _ZONES * display.lens_grid.columns - 0.5])
+            axis, place = self._directions(lens)
+            aside = float(axis[0, 0]) * (display.magnification - 1.0)
+            number, middle = light.look_up(self._slopes(place), np.zeros_like(place))
+            b, j, k = (each.ravel() for each in np.indices((places, 3, place.shape[1])))
+            own = middles[b] * pitch - (j - 1) * pitch
+            away = own + aside - middle[0, k, 0]
+            is_lit = share(number[0, k], away) > 0.0
+            b, k, own, away = b[is_lit], k[is_lit], own[is_lit], away[is_lit]
+            at, numbers, value = zone * places + b, number[0, k], share(number[0, k], away)
+            for rows in range(1 - n, n):
+                windows = (n - abs(rows)) / n**2
+                nearest, beyond = -rows * down / right, 2.0 * reach / right
+                for column in range(math.floor(nearest - beyond), math.ceil(nearest + beyond) + 1):
+                    other = share(numbers, away + rows * down + column * right)
+                    if other.any():
+                        add(normal, (0, rows, column), at, windows * value * other)
+                # Parts of the row that lie under the lens, counted from the first part of the pixel itself.
+                start = own + rows * down + self.parts[0] * right
+                edge = 0.5 * pitch - pitch / places
+                low, high = np.ceil((-edge - start) / finer), np.floor((edge - start) / finer)
+                part = np.clip((place[0, k] - aside - start) / finer, low, high)
+                before = np.floor(part)
+                for step, weight in ((0, 1.0 - part + before), (1, part - before)):
+                    for each in np.unique(before + step):
+                        chosen = before + step == each
+                        right_of, which = divmod(int(each), len(self.parts))
+                        add(of_meant, (which, rows, right_of), at[chosen], (windows * value * weight)[chosen])
+        return _pruned(normal), _pruned(of_meant)
+
+
+def _even_light(display: Display, there: Display) -> EyeLight:
+    """Light of the lenses that are there, for the directions of a display; as bright in all of them."""
+    tilt = 0.5 * display.size_mm[0] / display.viewing_distance
+    reach = 0.5 * display.micro_image_pitch * display.edge_factor / display.gap + tilt
+    # Cylinders are alike along: any two slopes do.
+    light = eye_light(there, (-reach, reach), (-1e-3, 1e-3))
+    room = display.panel.pixel_pitch * math.cos(math.radians(display.lens_array.slant)) / light.step
+    return replace(light, weights=light.weights * (room / light.weights.sum(axis=3, keepdims=True)))
+
+
+def _pruned(entries: dict[Offset, Real]) -> _Stencil:
+    largest = max(float(weights.max()) for weights in entries.values())
+    chosen = {key: weights for key, weights in sorted(entries.items()) if weights.max() >= _LEAST * largest}
+    return _Stencil(np.array(list(chosen)), np.array(list(chosen.values()), dtype=np.float32))
