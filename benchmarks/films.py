@@ -7,7 +7,7 @@ python benchmarks/films.py OTHER [--today CHECKOUT] [--films "KIND OF SCENE"...]
 
 ``OTHER`` is the folder of an earlier checkout, run as ``defaults.py`` runs it. The seconds of a frame are those of a
 command for many frames less those of one for few, divided by how many more: starting up falls out. Processor time of
-the whole tree of processes, the two checkouts in turn, after a frame that compiles the kernels. ``--depth-scale 0.5``
+the whole tree of processes, the two checkouts in turn, after a run that compiles the kernels. ``--depth-scale 0.5``
 is said everywhere, so that both show much the same native pixels; where the files say that they stand otherwise, each
 checkout has its own reference.
 
@@ -35,8 +35,8 @@ from defaults import HERE, Checkout, psnr
 from films_scenes import Film, films
 from harness import save, saved
 
-#: Frames of the two commands whose times are taken from each other.
-MANY, FEW = 5, 2
+#: Frames of the two commands whose times are taken from each other; a film of one frame is a still.
+MANY, FEW = 5, 1
 #: Frames that are judged, and samples of each of their two references.
 JUDGED, REFERENCE_SAMPLES = 2, 128
 SEEDS = (991, 992)
@@ -97,11 +97,10 @@ def measure(
     checkouts: dict[str, Checkout], film: Film, display: str, cache: Path, judged: bool, scratch: Path
 ) -> dict[str, Any]:
     """Figures of one film by checkout."""
-    sides: dict[str, dict[str, Any]] = {}
+    sides: dict[str, dict[str, Any]] = {name: {} for name in checkouts}
     for name, checkout in checkouts.items():
         (scratch / name).mkdir()
-        # The first frame alone is a still picture; it also compiles the kernels.
-        sides[name] = {"still_peak": render(checkout, film, display, 1, scratch / name)["peak"]}
+        render(checkout, film, display, MANY, scratch / name)  # compiles the kernels: not all are the first frame's
     spent = {
         (name, frames): render(checkout, film, display, frames, scratch / name)
         for frames in (FEW, MANY)
@@ -111,7 +110,7 @@ def measure(
     shows = {name: [all_[0].provenance.options.get(key) for key in SHOWN] for name, all_ in images.items()}
     for name, side in sides.items():
         side["seconds"] = (spent[name, MANY]["cpu"] - spent[name, FEW]["cpu"]) / (MANY - FEW)
-        side["peak"] = spent[name, MANY]["peak"]
+        side |= {"still_peak": spent[name, FEW]["peak"], "peak": spent[name, MANY]["peak"]}
         first = images[name][0].provenance
         side |= {"spp": first.spp, "stated": (first.estimate or {}).get("psnr")}
     if not judged:
