@@ -119,7 +119,7 @@ def test_nothing_is_compiled_for_later_frames(engine, moving_ball, room, kind, m
     options = {"integrator": "direct", "method": "full"} if kind == "animation" else {}
     kernels: list[set[object]] = []
 
-    def look() -> float:
+    def look(started: float) -> float:
         kernels[-1] |= {kernel["hash"] for kernel in dr.kernel_history() if "hash" in kernel}
         return 0.0
 

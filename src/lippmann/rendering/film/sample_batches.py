@@ -124,7 +124,7 @@ class FullInBatches(BatchedPicture):
                 with dr.scoped_set_flag(dr.JitFlag.KernelHistory, done == 0):
                     sums = self._trace(integrator, run, together)
                     if done == 0:
-                        compiled = compile_seconds()
+                        compiled = compile_seconds(started)
                 self._keep(run, sums)
                 if run.last == pixels:
                     for batch in run.batches:

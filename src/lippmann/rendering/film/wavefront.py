@@ -133,7 +133,7 @@ def trace_frame(
             evaluate(sample, lanes, frame.rays)
             sums = sum_samples(sample, plan.channels, 1, run.count)
             if done == 0:
-                frame.seconds_compile = compile_seconds()
+                frame.seconds_compile = compile_seconds(started)
         for name, values in sums.items():
             part = values[:, 0] * np.float32(1 / plan.samples)
             if name not in parts:
@@ -239,9 +239,14 @@ def lane_total(counts: UInt32) -> int:
     return int(dr.sum(mi.UInt64(counts))[0])
 
 
-def compile_seconds() -> float:
+def compile_seconds(started: float) -> float:
+    """Seconds of compilation since ``started`` (:func:`time.perf_counter`), from Dr.Jit's history of kernels.
+
+    The history belongs to the process: kernels of an interrupted render or of another thread may be in it.
+    """
     history = dr.kernel_history()
-    return sum(float(k.get("codegen_time", 0.0)) + float(k.get("backend_time", 0.0)) for k in history) / 1000.0
+    seconds = sum(float(k.get("codegen_time", 0.0)) + float(k.get("backend_time", 0.0)) for k in history) / 1000.0
+    return min(seconds, time.perf_counter() - started)
 
 
 def in_strips(pixels: int, width: int) -> int:

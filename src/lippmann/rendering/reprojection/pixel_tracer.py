@@ -69,7 +69,7 @@ class PixelTracer:
             # For all parts: with the flag changed, the kernel would be recorded again.
             with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
                 samples = self._trace(part)
-                compiling = compile_seconds()
+                compiling = compile_seconds(started)
             self.seconds_compile += compiling
             self.seconds_trace += time.perf_counter() - started - compiling
             self._bands.pixels(_enter, len(part), points, part, self._samples, *samples)

@@ -75,6 +75,7 @@ _ELSEWHERE = {
     ".mha": "save it as .nii.gz, in 3D Slicer for instance",
     ".hdr": "save it as .nii or .nii.gz, which hold header and voxels in one file",
     ".3mf": "save it as .stl in the slicer, or with trimesh and lxml: trimesh.load_mesh('a.3mf').export('a.stl')",
+    **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar"), "unpack it, and name the scene file inside"),
     ".zae": "unzip it, open the .dae in Blender, then File > Export > glTF 2.0 (.glb)",
     **dict.fromkeys((".splat", ".ksplat", ".lcc"), "open it in SuperSplat (superspl.at/editor), export it as .ply"),
     **dict.fromkeys((".las", ".laz", ".e57", ".pcd", ".pts"), "save it as .ply, in CloudCompare for instance"),
@@ -312,7 +313,7 @@ def _reader_of(path: Path, suffix: str) -> Plugin[Reader]:
     if named is not None and named.distribution:
         return named
     found = named if beginning is None else READERS.find(beginning)
-    if found is None:
+    if found is None or (named is None and suffix in _ELSEWHERE):  # Collada is XML, too
         raise _unknown_kind(path)
     if named not in (None, found):
         raise SceneError(f"is no {suffix} file", where=path.name, rule=f"it begins like a {beginning} file")
