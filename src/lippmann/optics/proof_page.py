@@ -124,7 +124,7 @@ def _draw_directions(axes: Axes, display: Display, angles: Real) -> None:
         own = np.abs(directions.places) <= half
         axes.plot(directions.places[own] / pitch, np.degrees(np.arctan(directions.slopes[own])), color="tab:red")
     axes.set(title="where light comes from", xlabel="place under the lens (pitches)", ylabel="direction (degrees)")
-    axes.set(xlim=(-1, 1))
+    axes.set(xlim=(-1, 1), xticks=(-1, -0.5, 0, 0.5, 1))
 
 
 def _draw_crosstalk(axes: Axes, display: Display, angles: Real, edge: float) -> None:
