@@ -137,10 +137,10 @@ def _radius(photons: Photons, neighbours: float) -> float:
     number = int(min(max(2, round(neighbours)), max(2, len(photons) // 2)))
     if len(photons) < 3:
         return float(np.ptp(photons.position, axis=0).max()) or 1.0
-    places = photons.position.astype(np.float64)
-    lengths = np.square(places).sum(axis=1)
+    # Axis by axis: a product of matrices would round by how many threads share it.
+    axes = np.ascontiguousarray(photons.position.T)
     distances = []
-    for point in places[:: max(1, len(places) // TUNING.probe_side)]:  # a median needs no more of them
-        square = np.partition(lengths - 2 * places @ point, number - 1)[number - 1] + np.square(point).sum()
-        distances.append(math.sqrt(max(square, 0.0)))
+    for point in photons.position[:: max(1, len(photons) // TUNING.probe_side)]:  # a median needs no more of them
+        squares = sum(np.square(axis - place) for axis, place in zip(axes, point, strict=True))
+        distances.append(math.sqrt(np.partition(squares, number - 1)[number - 1]))
     return float(np.median(distances)) or max(distances) or 1.0
