@@ -14,8 +14,16 @@ from lippmann.options.scene import SceneOptions
 from lippmann.rendering.preview import Preview
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import place
-from lippmann.sequences.frames import FrameRange, find_stand, render_frames, render_sequence, sequence_to_files
+from lippmann.sequences.frames import (
+    FrameRange,
+    find_stand,
+    render_frames,
+    render_quilt_sequence,
+    render_sequence,
+    sequence_to_files,
+)
 from lippmann.sequences.motion import open_motion
+from lippmann.sequences.turntable import open_turntable
 
 BODY = "CAMERA ZOOM 1 ASPECTRATIO 1 ANTIALIASING 0 RAYDEPTH 2 CENTER 0 0 -5 VIEWDIR 0 0 1 UPDIR 0 1 0 END_CAMERA"
 BALL = "SPHERE CENTER 0 0 0 RAD 1 TEXTURE AMBIENT 0.2 DIFFUSE 0.8 SPECULAR 0 OPACITY 1 COLOR 1 1 1 TEXFUNC 0"
@@ -128,6 +136,33 @@ def test_nothing_is_compiled_for_later_frames(engine, moving_ball, room, kind, m
     for _ in range(3):
         kernels.append(set())
         next(images)
+    assert kernels[2]
+    assert kernels[2] <= kernels[0] | kernels[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["display", "quilt"])
+def test_windows_of_any_size_share_kernels(engine, display, form, monkeypatch):
+    """What is traced of a frame is the part in which the scene can be seen, wider or narrower as it turns."""
+    import drjit as dr
+
+    from lippmann.rendering.film import sample_batches, wavefront
+
+    for module in (sample_batches, wavefront):
+        monkeypatch.setattr(module, "compile_seconds", lambda started: 0.0)
+    motion = open_turntable(api.load_scene("teapot"), 48)
+    options = {"integrator": "path", "spp": 2, "device": "cpu"}
+    if form == "display":
+        frames = render_sequence(motion, display.resized(256, 256), [0, 4, 8], **options)
+    else:
+        frames = render_quilt_sequence(motion, display, [0, 4, 8], views=(3, 1), size=(384, 256), **options)
+    kernels, rays = [], []
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        for _ in range(3):
+            dr.kernel_history_clear()
+            rays.append(next(frames)[1].provenance.rays["primary"])
+            kernels.append({kernel["hash"] for kernel in dr.kernel_history() if "hash" in kernel})
+    assert len(set(rays)) > 1
     assert kernels[2]
     assert kernels[2] <= kernels[0] | kernels[1]
 

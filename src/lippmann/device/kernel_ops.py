@@ -43,9 +43,15 @@ def upload(values: NDArray[Any]) -> Array:
 
 
 def to_numpy(value: Array, lanes: int) -> NDArray[np.float32]:
-    """``(lanes,)`` or ``(lanes, channels)`` of an evaluated array; an array of width 1 is broadcast."""
-    array = np.asarray(value, dtype=np.float32).T
-    return np.ascontiguousarray(np.broadcast_to(array, (lanes, *array.shape[1:])))
+    """``(lanes,)`` or ``(lanes, channels)``; an array of width 1 is broadcast.
+
+    Channel by channel: all at once would take a kernel that holds the number of lanes, and is compiled for each.
+    """
+    dr.eval(value)
+    if dr.depth_v(value) == 1:
+        return np.array(np.broadcast_to(np.asarray(value), lanes), dtype=np.float32)
+    channels = [np.broadcast_to(np.asarray(channel), lanes) for channel in value]
+    return np.stack(channels, axis=-1, dtype=np.float32)
 
 
 def divide(number: UInt32, by: UInt32 | int) -> tuple[UInt32, UInt32]:

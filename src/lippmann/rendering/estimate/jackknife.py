@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
-from lippmann.device.kernel_ops import encode
+from lippmann.device.kernel_ops import encode, upload
 from lippmann.device.types import Bool, Color3f, Float
 from lippmann.rendering.estimate.tuning import TUNING
 
@@ -57,7 +57,8 @@ def error_of_batches(sums: Floats, taken: Sequence[int], transfer: Transfer) -> 
     step = 1 << 18  # pixels worked on at a time
     for first in range(0, pixels, step):
         part = slice(first, min(first + step, pixels))
-        values = [mi.Color3f(np.ascontiguousarray(batch[part].T)) for batch in sums]
+        # Not from a picture turned over, whose size the kernel would hold.
+        values = [dr.gather(mi.Color3f, upload(batch[part]), dr.arange(mi.UInt32, part.stop - first)) for batch in sums]
         of_part = _Batches(values, counts, transfer)
         jackknife, alone = of_part.jackknife()
         result = jackknife + of_part.evenness()

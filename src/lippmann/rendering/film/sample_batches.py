@@ -172,7 +172,8 @@ class FullInBatches(BatchedPicture):
         pixel, channel = divide(rest, channels)
         pixel = dr.opaque(mi.UInt32, run.first) + pixel * dr.opaque(mi.UInt32, run.step)
         strips = in_strips(self._sums.shape[1], window.width) if run.in_strips else 0
-        row, column = pixel_at(pixel, window.width, dr.opaque(mi.UInt32, strips))
+        width = dr.opaque(mi.UInt32, window.width)
+        row, column = pixel_at(pixel, width, dr.opaque(mi.UInt32, strips))
         row += dr.opaque(mi.UInt32, window.top)
         column += dr.opaque(mi.UInt32, window.left)
         pixel = pixel_number(self._source, column, row)

@@ -165,7 +165,8 @@ def samples_of_tile(
     lanes = tile.rows * plan.width * plan.channels * run.count
     per_channel, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
     pixel, channel = divide(per_channel, plan.channels)
-    row, column = pixel_at(pixel, plan.width, dr.opaque(mi.UInt32, in_strips(tile.rows * plan.width, plan.width)))
+    strips = in_strips(tile.rows * plan.width, plan.width)
+    row, column = pixel_at(pixel, dr.opaque(mi.UInt32, plan.width), dr.opaque(mi.UInt32, strips))
     row += dr.opaque(mi.UInt32, tile.first_row + corner[0])
     column += dr.opaque(mi.UInt32, corner[1])
     sample += dr.opaque(mi.UInt32, run.first)

@@ -22,7 +22,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.kernel_ops import divide, upload
+from lippmann.device.kernel_ops import divide, to_numpy, upload
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Array, UInt32
 from lippmann.display import Display
@@ -205,5 +205,6 @@ def light_of_pixels(mean_light: Callable[[UInt32], Array], shape: tuple[int, ...
     light = np.empty((shape[0] * shape[1], shape[2]), dtype=np.float32)
     for first in range(0, len(light), PREFERRED_LANES):
         part = light[first : first + PREFERRED_LANES]
-        part[:] = np.array(mean_light(dr.arange(mi.UInt32, len(part)) + dr.opaque(mi.UInt32, first))).T
+        mean = mean_light(dr.arange(mi.UInt32, len(part)) + dr.opaque(mi.UInt32, first))
+        part[:] = to_numpy(mean, len(part))
     return light.reshape(shape)

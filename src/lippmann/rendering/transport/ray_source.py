@@ -52,7 +52,7 @@ def pixel_number(source: RaySource, column: UInt32, row: UInt32) -> UInt32:
 
     So a pixel has the same samples whichever part of the picture is rendered.
     """
-    if isinstance(source, WindowRays | SubpixelRays | SinglePixelRays):
+    if isinstance(source, WindowRays | SubpixelRays | SinglePixelRays | QuiltRays):
         return source.number(column, row)
     return row * source.width + column
 
@@ -134,7 +134,7 @@ class WindowRays(OnePicture):
         self.window = window
         self.width, self.height, self.channels = window.width, window.height, source.channels
         self._source = source
-        # Opaque to the compiler, so that windows of one size share a kernel.
+        # Opaque to the compiler, so that all windows share a kernel.
         self._left, self._top = (dr.opaque(mi.UInt32, first) for first in (window.left, window.top))
 
     def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
@@ -286,6 +286,13 @@ class QuiltRays:
         self.width = columns * self.window.width
         self.height = rows * self.window.height
         self.world_from_display = np.asarray(world_from_display, dtype=np.float64)
+        # Opaque to the compiler, so that windows of all sizes share a kernel.
+        self._width, self._height = (dr.opaque(mi.UInt32, side) for side in (self.window.width, self.window.height))
+        self._left, self._top = (dr.opaque(mi.Float64, first) for first in (self.window.left, self.window.top))
+
+    def number(self, column: UInt32, row: UInt32) -> UInt32:
+        """Index of pixels in the traced picture, row by row."""
+        return row * (self.columns * self._width) + column
 
     @property
     def views(self) -> int:
@@ -302,14 +309,14 @@ class QuiltRays:
 
     def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
         del channel
-        width, height = self.window.width, self.window.height
+        width, height = self._width, self._height
         right, above = column // width, self.rows - 1 - row // height
         view = mi.Float64(above * self.columns + right)
         panel_width, panel_height = self.display.size_mm
         u = mi.Float64(column - right * width) + mi.Float64(jitter.x)
         v = mi.Float64(row - row // height * height) + mi.Float64(jitter.y)
-        x = ((self.window.left + u) / self.view_size[0] - 0.5) * panel_width
-        y = (0.5 - (self.window.top + v) / self.view_size[1]) * panel_height
+        x = ((self._left + u) / self.view_size[0] - 0.5) * panel_width
+        y = (0.5 - (self._top + v) / self.view_size[1]) * panel_height
         convergence = 1 / self.display.viewing_distance
         side = ((2 * view + 1) / self.views - 1) * cone_tangent(self.display)
         slope_x, slope_y = x * convergence - side, y * convergence
