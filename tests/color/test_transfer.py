@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lippmann.color.transfer import coding_slope, decode_srgb, dequantize, encode_srgb, quantize
+from lippmann.color.transfer import coding_chord, coding_slope, decode_srgb, dequantize, encode, encode_srgb, quantize
 
 
 @pytest.mark.parametrize("transfer", ["srgb", "linear"])
@@ -56,3 +56,18 @@ def test_the_slope_is_that_of_the_curve():
     expected = 1.055 / 2.4 * linear[4:7] ** (1 / 2.4 - 1)
     assert slope[4:7] == pytest.approx(expected, rel=1e-3)
     assert coding_slope(linear, "linear").tolist() == [0, 1, 1, 1, 1, 1, 1, 0]
+
+
+@pytest.mark.parametrize("color", [[0.5, 0.4, 0.3], [0.05, 0.04, 0.03], [0.9, 0.8, 0.7], [3.0, 2.0, 1.5]])
+def test_the_slope_with_a_tone_map_is_that_along_the_color(color):
+    color, step = np.array([color]), 1e-4
+    change = encode((1 + step) * color, "pbr-neutral") - encode((1 - step) * color, "pbr-neutral")
+    assert coding_slope(color, "pbr-neutral") == pytest.approx(change / (2 * step * color), rel=0.05)
+    low = np.array([0.2]) * color
+    chord = (encode(color, "pbr-neutral") - encode(low, "pbr-neutral")) / (color - low)
+    assert coding_chord(low, color, "pbr-neutral") == pytest.approx(chord, rel=1e-3)
+
+
+def test_the_white_of_a_bright_color_is_no_change_by_its_dark_channel():
+    assert coding_slope(np.array([[50.0, 1e-4, 0.0]]), "pbr-neutral").max() < 1.5
+    assert coding_slope(np.zeros((1, 3)), "pbr-neutral").tolist() == [[0, 0, 0]]

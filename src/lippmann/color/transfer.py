@@ -21,6 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 #: the papers' programs did: the value itself is the display code).
 Transfer = Literal["srgb", "linear"]
 
+#: How linear light becomes the codes between which errors are measured: by a curve, or by the tone map and sRGB.
+Coding = Literal[Transfer, "pbr-neutral"]
+
 FloatArray = NDArray[np.float32]
 
 #: The sRGB curve: a line of this slope up to the threshold, then a power of this exponent, scaled and offset.
@@ -37,9 +40,11 @@ def encode_srgb(linear: NDArray[np.floating]) -> NDArray[np.floating]:
     return np.where(value <= SRGB_THRESHOLD, SRGB_SLOPE * value, curve)
 
 
-def encode(linear: NDArray[np.floating], transfer: Transfer) -> NDArray[np.floating]:
-    """Coded values in [0, 1] of linear values by ``transfer``; same shape and precision."""
-    return encode_srgb(linear) if transfer == "srgb" else np.clip(linear, 0, 1)
+def encode(linear: NDArray[np.floating], coding: Coding) -> NDArray[np.floating]:
+    """Coded values in [0, 1] of linear values, RGB ``(..., 3)`` for a tone map; same shape and precision."""
+    if coding == "linear":
+        return np.asarray(np.clip(linear, 0, 1))
+    return encode_srgb(pbr_neutral(linear) if coding == "pbr-neutral" else linear)
 
 
 def decode_srgb(coded: ArrayLike) -> NDArray[np.float64]:
@@ -50,15 +55,32 @@ def decode_srgb(coded: ArrayLike) -> NDArray[np.float64]:
     return np.where(value <= 0.04045, value / SRGB_SLOPE, curve)
 
 
-def coding_slope(linear: NDArray[np.floating], transfer: Transfer = "srgb") -> NDArray[np.float32]:
-    """Slope of the coding curve: by how much a code in [0, 1] changes with its linear value; 0 outside [0, 1]."""
+def coding_slope(linear: NDArray[np.floating], coding: Coding = "srgb") -> NDArray[np.float32]:
+    """Slope of the coding: by how much a code in [0, 1] changes with its linear value; 0 outside [0, 1].
+
+    A tone map mixes colours. Its slope is that along the pixel's own colour, ``(..., 3)``: most noise is of brightness.
+    """
+    if coding == "pbr-neutral":
+        return coding_chord((1 - _SLOPE_STEP) * linear, linear, coding)
     inside = (linear >= 0) & (linear <= 1)
-    if transfer == "linear":
+    if coding == "linear":
         return inside.astype(np.float32)
     x = np.clip(linear, SRGB_THRESHOLD, 1)
     power = (1 + SRGB_OFFSET) / SRGB_EXPONENT * x ** (1 / SRGB_EXPONENT - 1)
     slope = np.where(linear <= SRGB_THRESHOLD, SRGB_SLOPE, power)
     return np.where(inside, slope, 0).astype(np.float32)
+
+
+def coding_chord(low: NDArray[np.floating], high: NDArray[np.floating], coding: Coding) -> NDArray[np.float32]:
+    """Slope of the coding between two values, ``low`` at most ``high``; that at ``high`` where they are the same."""
+    if coding == "pbr-neutral":
+        mapped_low, mapped = pbr_neutral(low), pbr_neutral(high)
+        # A channel moves its own value by 1 at most: what a bright colour's white adds to dark ones is not theirs.
+        along = np.clip((mapped - mapped_low) / np.maximum(high - low, np.float32(_LEAST_STEP)), 0, 1)
+        return np.asarray(along * coding_chord(mapped_low, mapped, "srgb"), np.float32)
+    step = high - low
+    chord = (encode(high, coding) - encode(low, coding)) / np.where(step > _LEAST_STEP, step, 1)
+    return np.where(step > _LEAST_STEP, chord, coding_slope(high, coding)).astype(np.float32)
 
 
 def quantize(linear: FloatArray, bits: int, transfer: Transfer) -> NDArray[np.uint8] | NDArray[np.uint16]:
@@ -88,23 +110,26 @@ def linear_levels(dtype: np.dtype[np.uint8] | np.dtype[np.uint16], transfer: Tra
 
 
 #: Reflectance of a surface of index 1.5 head on.
-_FRESNEL = 0.04
+FRESNEL = 0.04
 #: Where compression begins, after that is taken off, and how fast bright colours turn white.
-_COMPRESSED_FROM = 0.8 - _FRESNEL
-_DESATURATION = 0.15
+COMPRESSED_FROM = 0.8 - FRESNEL
+DESATURATION = 0.15
+#: Share of a value by which it is changed for the slope of the tone map; the least change that says anything.
+_SLOPE_STEP = np.float32(0.01)
+_LEAST_STEP = 1e-6
 
 
-def pbr_neutral(linear: NDArray[np.float32]) -> NDArray[np.float32]:
+def pbr_neutral(linear: NDArray[np.floating]) -> NDArray[np.floating]:
     """Linear RGB ``(..., 3)`` in [0, 1] of linear RGB; negative values count as 0."""
-    color = np.maximum(linear, np.float32(0.0))
+    color: NDArray[np.floating] = np.maximum(linear, np.float32(0.0))
     # Channel by channel: NumPy is slow over an axis of three.
     least = np.minimum(np.minimum(color[..., 0], color[..., 1]), color[..., 2])
-    color -= np.where(least < 2.0 * _FRESNEL, least - least**2 / (4.0 * _FRESNEL), _FRESNEL)[..., None]
+    color -= np.where(least < 2.0 * FRESNEL, least - least**2 / (4.0 * FRESNEL), FRESNEL)[..., None]
     peak = np.maximum(np.maximum(color[..., 0], color[..., 1]), color[..., 2])
-    is_bright = peak >= _COMPRESSED_FROM
+    is_bright = peak >= COMPRESSED_FROM
     peak, bright = peak[is_bright, None], color[is_bright]
-    room = 1.0 - _COMPRESSED_FROM
-    compressed = 1.0 - room**2 / (peak + room - _COMPRESSED_FROM)
-    white = 1.0 - 1.0 / (_DESATURATION * (peak - compressed) + 1.0)
+    room = 1.0 - COMPRESSED_FROM
+    compressed = 1.0 - room**2 / (peak + room - COMPRESSED_FROM)
+    white = 1.0 - 1.0 / (DESATURATION * (peak - compressed) + 1.0)
     color[is_bright] = bright * (compressed / peak) * (1.0 - white) + compressed * white
     return color

@@ -15,7 +15,16 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import SRGB_EXPONENT, SRGB_OFFSET, SRGB_SLOPE, SRGB_THRESHOLD, Transfer
+from lippmann.color.transfer import (
+    COMPRESSED_FROM,
+    DESATURATION,
+    FRESNEL,
+    SRGB_EXPONENT,
+    SRGB_OFFSET,
+    SRGB_SLOPE,
+    SRGB_THRESHOLD,
+    Coding,
+)
 from lippmann.device.types import Array, Bool, Color3f, FloatOrColor, UInt32
 
 #: A multiple of the lanes of any processor's vectors.
@@ -146,10 +155,23 @@ class DeviceOps:
 DEVICE = DeviceOps()
 
 
-def encode(linear: FloatOrColor, transfer: Transfer) -> FloatOrColor:
-    """Coded values in [0, 1] of linear values, which are clipped to [0, 1]."""
-    value = dr.clip(linear, 0, 1)
-    return value if transfer == "linear" else linear_to_srgb(value)
+def encode(linear: Color3f, coding: Coding) -> Color3f:
+    """Coded values in [0, 1] of linear values, see :func:`lippmann.color.transfer.encode`."""
+    value = dr.clip(pbr_neutral(linear) if coding == "pbr-neutral" else linear, 0, 1)
+    return value if coding == "linear" else linear_to_srgb(value)
+
+
+def pbr_neutral(linear: Color3f) -> Color3f:
+    """See :func:`lippmann.color.transfer.pbr_neutral`."""
+    color = dr.maximum(linear, 0)
+    least = dr.min(color)
+    color -= dr.select(least < 2 * FRESNEL, least - dr.square(least) / (4 * FRESNEL), FRESNEL)
+    peak = dr.max(color)
+    room = 1 - COMPRESSED_FROM
+    compressed = 1 - room**2 / (dr.maximum(peak, COMPRESSED_FROM) + room - COMPRESSED_FROM)
+    white = 1 - 1 / (DESATURATION * (peak - compressed) + 1)
+    bright = color * (compressed / peak) * (1 - white) + compressed * white
+    return dr.select(peak >= COMPRESSED_FROM, bright, color)
 
 
 def linear_to_srgb(linear: FloatOrColor) -> FloatOrColor:

@@ -267,7 +267,7 @@ class _Probe:
             self._pixels,
             seed=request.seed,
             box_filter=request.box_filter,
-            transfer=request.transfer,
+            coding=request.coding,
             memory=session.memory,
         )
         pixels = self._pixels.width * self._pixels.height * self._pixels.channels

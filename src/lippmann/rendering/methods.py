@@ -178,7 +178,7 @@ def _fixed_samples(job: Job) -> Traced:
         job.request.samples,
         seed=job.request.seed,
         box_filter=job.request.box_filter,
-        transfer=job.request.transfer,
+        coding=job.request.coding,
         memory=job.session.memory,
         progress=job.progress,
     )
@@ -246,7 +246,7 @@ def _batches(job: Job) -> FullInBatches:
         source,
         seed=job.request.seed,
         box_filter=job.request.box_filter,
-        transfer=job.request.transfer,
+        coding=job.request.coding,
         memory=job.session.memory,
         for_denoiser=job.request.denoise != "none",
     )
@@ -262,7 +262,7 @@ def _denoised_part(job: Job) -> Traced:
 
 
 def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Denoised:
-    return Denoised(batches, denoiser, job.request.transfer, job.session.engine.threads, denoiser.coverage)
+    return Denoised(batches, denoiser, job.request.coding, job.session.engine.threads, denoiser.coverage)
 
 
 def _estimator(job: Job) -> PictureEstimator:

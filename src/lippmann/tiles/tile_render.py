@@ -135,7 +135,7 @@ def trace_tile(prepared: Prepared, index: int) -> TracedTile:
         prepared.source,
         seed=request.seed,
         box_filter=request.box_filter,
-        transfer=job.transfer,
+        coding=job.request.coding,
         memory=job.tile_memory,
         window=window,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lippmann.color.transfer import encode_srgb
+from lippmann.color.transfer import encode, encode_srgb
 from lippmann.rendering.denoise.dual_buffer import Denoised
 from lippmann.rendering.denoise.tuning import TUNING
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
@@ -291,6 +291,15 @@ def test_light_spread_beyond_white_is_not_lost_where_codes_are_cut_off(transfer,
     # White beyond white is as white.
     renderer._halves = [half + np.float32(2) for half in renderer._halves]
     assert float(np.abs(Denoised(renderer, lambda p, *_: p + 1, transfer).squared_error().values).max()) < 1e-12
+
+
+def test_light_spread_beyond_white_counts_by_what_the_tone_map_makes_of_it(as_denoised):
+    random = np.random.default_rng(4)
+    renderer = Noise()
+    renderer._halves = [np.float32(0.35) + random.normal(0, 0.02, SHAPE).astype(np.float32) for _ in range(2)]
+    told = Denoised(renderer, lambda p, *_: np.full_like(p, 1.2), "pbr-neutral").squared_error()
+    codes = encode(np.array([[1.2] * 3, [0.35] * 3]), "pbr-neutral")
+    assert float(told.values.mean()) == pytest.approx(np.square(codes[0] - codes[1]).mean(), rel=0.2)
 
 
 def test_where_codes_are_steep_the_whole_step_counts(as_denoised):

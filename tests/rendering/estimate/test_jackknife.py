@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lippmann.color.transfer import encode_srgb
+from lippmann.color.transfer import encode, encode_srgb
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -79,12 +79,13 @@ def picture(batches, taken=None):
 
 
 def true_error(batches, truth, taken=None, transfer="srgb"):
-    code = encode_srgb if transfer == "srgb" else lambda x: np.clip(x, 0, 1)
-    return np.square(code(picture(batches, taken)) - code(np.full(1, truth))).mean()
+    grey = np.repeat(np.append(picture(batches, taken), truth)[:, None], 3, axis=1)
+    codes = encode(grey, transfer)
+    return np.square(codes[:-1] - codes[-1]).mean()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("transfer", ["srgb", "linear"])
+@pytest.mark.parametrize("transfer", ["srgb", "linear", "pbr-neutral"])
 @pytest.mark.parametrize("number", [2, 4, 8])
 def test_plain_noise_is_measured_without_bias(number, transfer):
     random = np.random.default_rng(number)

@@ -27,8 +27,7 @@ class AdaptiveTuning:
     time_share:
         Share of the time left that a round is planned to take: rates vary from round to round.
     clean, clean_worst:
-        Estimated PSNR in dB of the picture and of its worst micro-image that a default picture is to have. The estimate
-        is of light before tone mapping, which brings out the noise of highlights by up to 1.5 dB
+        Estimated PSNR in dB of the picture and of its worst micro-image that a default picture is to have
         (``docs/research/equal-time.md``).
     """
 

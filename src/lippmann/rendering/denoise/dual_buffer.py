@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import Transfer, coding_slope, encode
+from lippmann.color.transfer import Coding, coding_chord, coding_slope
 from lippmann.rendering.denoise.noisy_blend import mean_around, weigh_samples
 from lippmann.rendering.denoise.outlines import exchange_coverage
 from lippmann.rendering.denoise.tuning import TUNING
@@ -57,7 +57,7 @@ class Denoised:
         The samples, in two independent streams.
     denoise:
         Denoises an ``(H, W, 3)`` linear picture.
-    transfer:
+    coding:
         How values become codes; errors are measured between codes.
     threads:
         CPU threads.
@@ -69,14 +69,14 @@ class Denoised:
         self,
         renderer: BatchedPicture,
         denoise: Denoise,
-        transfer: Transfer,
+        coding: Coding,
         threads: int = 1,
         coverage: Callable[[], tuple[Coverage, Coverage] | None] | None = None,
     ) -> None:
         self._renderer = renderer
         self._denoise = denoise
         self._coverage = coverage
-        self._transfer: Transfer = transfer
+        self._coding: Coding = coding
         self._threads = threads
         #: The noisy and the blended half-buffers, in display pixels.
         self._halves: tuple[tuple[Floats, Floats], tuple[Floats, Floats]] | None = None
@@ -132,7 +132,7 @@ class Denoised:
                 for k in (0, 1)
             )
             noisy = self._renderer.displayed(traced[0]), self._renderer.displayed(traced[1])
-            own = weigh_samples(noisy, (first, second), self._transfer, threads=self._threads)
+            own = weigh_samples(noisy, (first, second), self._coding, threads=self._threads)
             self._halves = noisy, (first + own * (noisy[0] - first), second + own * (noisy[1] - second))
         return self._halves
 
@@ -155,15 +155,22 @@ class Denoised:
 
     def _slope(self, noisy: tuple[Floats, Floats]) -> Floats:
         """Factor from linear errors to errors of the code, per pixel: the curve's slope, or a finite difference."""
-        picture, transfer = self._mean(), self._transfer
-        slope = coding_slope(picture, transfer)
+        picture, coding = self._mean(), self._coding
+        slope = coding_slope(picture, coding)
         displayed = np.float32(0.5) * (noisy[0] + noisy[1])
         scatter = np.abs(noisy[0] - noisy[1]).mean(axis=2)
         nearby = mean_around(scatter, 1, Bands(self._threads))[..., None]
-        truth = np.where(picture > 1, np.minimum(displayed, 1), displayed + np.float32(TUNING.far_above) * nearby)
-        far = picture - truth > 1e-4  # smaller steps are as good as a slope, and hold rounding
-        low, high = truth[far], picture[far]
-        slope[far] = (encode(high, transfer) - encode(low, transfer)) / (high - low)
+        truth = displayed + np.float32(TUNING.far_above) * nearby
+        if coding == "pbr-neutral":
+            # A tone map mixes colours, so they keep their proportions; and it clips nothing.
+            far = (truth < np.float32(0.9) * picture).any(axis=2)
+            high = picture[far]
+            low = high * np.clip(truth[far] / np.maximum(high, np.float32(1e-6)), 0, 1).min(axis=1, keepdims=True)
+        else:
+            truth = np.where(picture > 1, np.minimum(displayed, 1), truth)
+            far = picture - truth > 1e-4  # smaller steps are as good as a slope, and hold rounding
+            low, high = truth[far], picture[far]
+        slope[far] = coding_chord(low, high, coding)
         return slope
 
 

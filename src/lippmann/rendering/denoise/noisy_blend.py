@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import Transfer, coding_slope
+from lippmann.color.transfer import Coding, coding_slope
 from lippmann.rendering.denoise.tuning import TUNING
 from lippmann.runtime.row_threads import Bands
 
@@ -29,14 +29,14 @@ Floats = NDArray[np.float32]
 Halves = tuple[Floats, Floats]
 
 
-def weigh_samples(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int) -> Floats:
+def weigh_samples(noisy: Halves, clean: Halves, coding: Coding, *, threads: int) -> Floats:
     """Weight of the noisy value of each pixel against the denoised one, ``(H, W, 1)`` in [0, 1].
 
     Parameters
     ----------
     noisy, clean:
         Two independent half-buffers, and each of them denoised; ``(H, W, 3)`` linear.
-    transfer:
+    coding:
         How values become codes; errors are measured between codes.
     threads:
         CPU threads; the result does not depend on them.
@@ -47,7 +47,7 @@ def weigh_samples(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: 
     def measure_rows(start: int, end: int) -> None:
         band = slice(start, end)
         a, b, clean_a, clean_b = (half[band] for half in (*noisy, *clean))
-        noise[band], error[band] = _noise_and_error(a, b, clean_a, clean_b, transfer)
+        noise[band], error[band] = _noise_and_error(a, b, clean_a, clean_b, coding)
 
     bands.lines(measure_rows, len(noise))
     share = np.ones_like(noise)
@@ -58,14 +58,12 @@ def weigh_samples(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: 
     return np.asarray(np.sqrt(share)[..., None])
 
 
-def _noise_and_error(
-    a: Floats, b: Floats, clean_a: Floats, clean_b: Floats, transfer: Transfer
-) -> tuple[Floats, Floats]:
+def _noise_and_error(a: Floats, b: Floats, clean_a: Floats, clean_b: Floats, coding: Coding) -> tuple[Floats, Floats]:
     """Unbiased estimates of the squared errors, in codes, of a noisy and of a denoised half, ``(H, W)``.
 
     Codes are clipped at white only for their slope, as an error beyond white reaches the pixels around.
     """
-    weight = np.square(coding_slope(np.clip(np.float32(0.5) * (clean_a + clean_b), 0, 1), transfer)) / 6
+    weight = np.square(coding_slope(np.clip(np.float32(0.5) * (clean_a + clean_b), 0, 1), coding)) / 6
     scatter = np.square(a - b)
     error = np.square(clean_a - b) + np.square(clean_b - a) - scatter
     return np.einsum("hwc,hwc->hw", weight, scatter), np.einsum("hwc,hwc->hw", weight, error)

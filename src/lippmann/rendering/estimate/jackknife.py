@@ -24,7 +24,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import Transfer
+from lippmann.color.transfer import Coding
 from lippmann.device.kernel_ops import encode, upload
 from lippmann.device.types import Bool, Color3f, Float
 from lippmann.rendering.estimate.tuning import TUNING
@@ -32,7 +32,7 @@ from lippmann.rendering.estimate.tuning import TUNING
 Floats = NDArray[np.float32]
 
 
-def error_of_batches(sums: Floats, taken: Sequence[int], transfer: Transfer) -> tuple[Floats, Floats]:
+def error_of_batches(sums: Floats, taken: Sequence[int], coding: Coding) -> tuple[Floats, Floats]:
     """Expected squared error of the codes of the mean of all samples, averaged over the three channels.
 
     Parameters
@@ -42,7 +42,7 @@ def error_of_batches(sums: Floats, taken: Sequence[int], transfer: Transfer) -> 
         samples, the second half from another.
     taken:
         How many samples each batch has of every pixel; each stream has at least one.
-    transfer:
+    coding:
         How values become codes.
 
     Returns
@@ -59,7 +59,7 @@ def error_of_batches(sums: Floats, taken: Sequence[int], transfer: Transfer) -> 
         part = slice(first, min(first + step, pixels))
         # Not from a picture turned over, whose size the kernel would hold.
         values = [dr.gather(mi.Color3f, upload(batch[part]), dr.arange(mi.UInt32, part.stop - first)) for batch in sums]
-        of_part = _Batches(values, counts, transfer)
+        of_part = _Batches(values, counts, coding)
         jackknife, alone = of_part.jackknife()
         result = jackknife + of_part.evenness()
         dr.eval(result, alone)
@@ -73,7 +73,7 @@ class _Batches:
 
     sums: list[Color3f]
     counts: list[Float]
-    transfer: Transfer
+    coding: Coding
 
     def __post_init__(self) -> None:
         self.total = sum(self.sums[1:], self.sums[0])
@@ -82,7 +82,7 @@ class _Batches:
     def jackknife(self) -> tuple[Float, Float]:
         """Squared error by leaving out one batch at a time, and what of it is outliers."""
         without = [
-            encode((self.total - value) / dr.maximum(self.count - count, 1), self.transfer)
+            encode((self.total - value) / dr.maximum(self.count - count, 1), self.coding)
             for value, count in zip(self.sums, self.counts, strict=True)
         ]
         # Batches that hold nothing change nothing: they are no witnesses.
@@ -121,8 +121,8 @@ class _Batches:
         number = sum((self.counts[k] for k in members), mi.Float(0))
         rest = self.count - number
         known = (number > 0) & (rest > 0)
-        a = encode(some / dr.maximum(number, 1), self.transfer)
-        b = encode((self.total - some) / dr.maximum(rest, 1), self.transfer)
+        a = encode(some / dr.maximum(number, 1), self.coding)
+        b = encode((self.total - some) / dr.maximum(rest, 1), self.coding)
         size = dr.sum(dr.square(a - b)) / 3 * number * rest / dr.square(self.count)
         return dr.select(known, size, 0), known
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import Transfer, coding_slope
+from lippmann.color.transfer import Coding, coding_slope
 from lippmann.errors import UsageError
 from lippmann.rendering.estimate.jackknife import error_of_batches
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
@@ -31,7 +31,7 @@ class BatchedPicture:
         Height and width of the traced picture.
     channels:
         1, or 3 where each pixel has samples of its sub-pixels.
-    transfer:
+    coding:
         How values become codes; errors are measured between codes.
     keeps_specular, keeps_coverage:
         Whether specular light and coverage are kept, too.
@@ -45,14 +45,14 @@ class BatchedPicture:
         batches: int,
         shape: tuple[int, int],
         channels: int,
-        transfer: Transfer,
+        coding: Coding,
         *,
         keeps_specular: bool,
         keeps_coverage: bool,
         blur_after: Callable[[int], Floats] | None,
     ) -> None:
         pixels = shape[0] * shape[1]
-        self._shape, self._transfer = shape, transfer
+        self._shape, self._coding = shape, coding
         self._sums = np.zeros((batches, pixels, 3), dtype=np.float32)
         self._specular = np.zeros((STREAMS, pixels, 3), dtype=np.float32) if keeps_specular else None
         self._excess = np.zeros((1, pixels, 3), dtype=np.float32) if keeps_specular else None
@@ -146,7 +146,7 @@ class BatchedPicture:
         if self.samples < STREAMS:
             raise UsageError("one sample per pixel does not tell its own error", rule="two or more do")
         if self._errors is None:
-            error, outliers = error_of_batches(self.displayed(self._sums), self._taken, self._transfer)
+            error, outliers = error_of_batches(self.displayed(self._sums), self._taken, self._coding)
             shape = self.shape[0], -1
             error = error.reshape(shape)
             blur = self.squared_blur()
@@ -162,7 +162,7 @@ class BatchedPicture:
         """
         if self._blur_after is None:
             return None
-        slope = coding_slope(self.picture(), self._transfer)
+        slope = coding_slope(self.picture(), self._coding)
         blur: Floats = (np.square(slope) * self.displayed(self._blur_after(self.samples))).mean(axis=-1)
         return blur
 

@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import Transfer
+from lippmann.color.transfer import Coding
 from lippmann.device.kernel_ops import divide, upload
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import UInt32
@@ -56,7 +56,7 @@ class FullInBatches(BatchedPicture):
         0 to 2**32 - 1. With the same calls of :meth:`add` the same seed gives the same picture.
     box_filter:
         Samples are spread over the pixel; else all go through its centre.
-    transfer:
+    coding:
         How values become codes; errors are measured between codes.
     memory:
         Bytes that may be used, the picture's own included; less memory means fewer batches.
@@ -84,7 +84,7 @@ class FullInBatches(BatchedPicture):
         *,
         seed: int = 0,
         box_filter: bool = True,
-        transfer: Transfer = "srgb",
+        coding: Coding = "srgb",
         memory: int,
         window: PixelWindow | None = None,
         for_denoiser: bool = False,
@@ -106,7 +106,7 @@ class FullInBatches(BatchedPicture):
             batches,
             self._window.shape,
             source.channels,
-            transfer,
+            coding,
             keeps_specular=keeps_specular,
             keeps_coverage=keeps_coverage,
             blur_after=_blur_after(integrator, source, self._window, seed),
@@ -218,7 +218,7 @@ def trace_in_batches(
     *,
     seed: int = 0,
     box_filter: bool = True,
-    transfer: Transfer = "srgb",
+    coding: Coding = "srgb",
     memory: int,
     progress: ProgressCallback = silent,
 ) -> tuple[Frame, PixelErrors]:
@@ -249,7 +249,7 @@ def trace_in_batches(
             source,
             seed=seed,
             box_filter=box_filter,
-            transfer=transfer,
+            coding=coding,
             memory=left,
             window=PixelWindow(0, first, width, last - first),
         )

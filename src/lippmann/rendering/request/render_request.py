@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import Transfer, pbr_neutral
+from lippmann.color.transfer import Coding, Transfer, pbr_neutral
 from lippmann.options.choices import ASKED, Caustics, Denoiser, Integrator, Method, PixelFilter, ToneMap, default_depth
 from lippmann.options.option import Options, options_of
 from lippmann.options.placement import PlacementOptions
@@ -237,3 +237,8 @@ class RenderRequest(MachineOptions, QualityOptions):
     def transfer(self) -> Transfer:
         """Transfer curve from values to codes: linear for the classic light models, whose values are codes already."""
         return "linear" if self.integrator == "classic" else "srgb"
+
+    @property
+    def coding(self) -> Coding:
+        """How light becomes codes, tone mapping included: errors are those of the picture that is written."""
+        return "pbr-neutral" if self.tone_map == "pbr-neutral" else self.transfer
