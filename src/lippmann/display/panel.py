@@ -67,6 +67,11 @@ class Panel:
             object.__setattr__(self, "subpixel_offsets", _mean_offsets(cells))
 
     @property
+    def cells(self) -> SubpixelCells:
+        """Rows of offsets as of ``subpixel_cells``; of pixels that are all alike a single one, their own."""
+        return self.subpixel_cells or ((self.subpixel_offsets,),)
+
+    @property
     def size_mm(self) -> tuple[float, float]:
         """Width and height of the pixel area in millimetres."""
         return self.width * self.pixel_pitch, self.height * self.pixel_pitch

@@ -151,12 +151,19 @@ class _UprightRows:
 
     def solve(self, meant: Floats, channel: int, first: int) -> Floats:
         """Pixels ``(rows, width)`` of the meant light ``(parts, rows, width)``."""
-        from lippmann.optics.correction_kernel import solve
+        from lippmann.optics.correction_kernel import fista_momenta, solve
 
         shares, band = self._systems[channel]
         solved = np.empty(meant.shape[1:], dtype=np.float32)
         Bands(usable_cores()).lines(
-            solve, len(solved), meant, shares.first, shares.shares.astype(np.float32), band, _STEPS, solved
+            solve,
+            len(solved),
+            meant,
+            shares.first,
+            shares.shares.astype(np.float32),
+            band,
+            fista_momenta(_STEPS),
+            solved,
         )
         return solved
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,16 @@ Floats = NDArray[np.float32]
 
 #: Rows that are solved at a time, side by side in the processor's registers.
 _LANES = 32
+
+
+def fista_momenta(steps: int) -> Floats:
+    """The share of the last change that is added after each of so many steps of FISTA (Beck and Teboulle 2009)."""
+    found, t = np.empty(steps, dtype=np.float32), 1.0
+    for number in range(steps):
+        following = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * t * t))
+        found[number] = (t - 1.0) / following
+        t = following
+    return found
 
 
 @uncounted
@@ -34,19 +46,20 @@ def solve(
     first: NDArray[np.int64],
     shares: Floats,
     band: Floats,
-    steps: int,
+    momenta: Floats,
     solved: Floats,
 ) -> None:
     """Solve rows ``first_row`` to before ``last_row``.
 
     ``meant`` is ``(parts, rows, width)``, ``solved`` ``(rows, width)``; ``first`` and ``shares`` are those of the parts
-    of a pixel one after the other, and ``band`` is that of :func:`add_normal_band`.
+    of a pixel one after the other, ``band`` is that of :func:`add_normal_band`, and ``momenta`` are those of
+    :func:`fista_momenta`.
     """
     width = meant.shape[2]
     limits = np.zeros((width, 2), dtype=np.int64)
     state = np.empty((4, width, _LANES), dtype=np.float32)
     slope = np.empty(_LANES, dtype=np.float32)
-    _solve(first_row, last_row, meant, first, shares, band, steps, solved, limits, state, slope)
+    _solve(first_row, last_row, meant, first, shares, band, momenta, solved, limits, state, slope)
 
 
 @uncounted
@@ -57,7 +70,7 @@ def _solve(
     first: NDArray[np.int64],
     shares: Floats,
     band: Floats,
-    steps: int,
+    momenta: Floats,
     solved: Floats,
     limits: NDArray[np.int64],
     state: Floats,
@@ -93,12 +106,9 @@ def _solve(
                             state[0, at, lane] += weight * meant[part, top + lane, c]
             for lane in range(_LANES):
                 state[2, c, lane] = state[1, c, lane]
-        t = 1.0
-        for number in range(steps):
+        for number in range(len(momenta)):
             now, ahead = 2 + number % 2, 3 - number % 2
-            following = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * t * t))
-            speed = np.float32((t - 1.0) / following)
-            t = following
+            speed = momenta[number]
             for c in range(width):
                 for lane in range(_LANES):
                     slope[lane] = -state[0, c, lane]

@@ -58,13 +58,18 @@ class EyeLight:
             weights = _convolved(weights, shape, axis=axis)
         return replace(self, weights=weights)
 
+    def at(self, slope_x: Real, slope_y: Real) -> tuple[Real, Real]:
+        """Places of directions among the rows and among the columns of slopes; beyond them, at their ends."""
+        down, right = (
+            np.clip((slope - slopes[0]) / (slopes[1] - slopes[0]), 0.0, len(slopes) - 1.0)
+            for slope, slopes in ((slope_y, self.slopes_y), (slope_x, self.slopes_x))
+        )
+        return down, right
+
     def look_up(self, slope_x: Real, slope_y: Real) -> tuple[NDArray[np.int32], Real]:
         """Number of the nearest direction's weights, row by row, and ``(..., 2)`` middle of the light, interpolated."""
         columns, rows = len(self.slopes_x), len(self.slopes_y)
-        at_x, at_y = (
-            np.clip((slope - slopes[0]) / (slopes[1] - slopes[0]), 0.0, len(slopes) - 1.0)
-            for slope, slopes in ((slope_x, self.slopes_x), (slope_y, self.slopes_y))
-        )
+        at_y, at_x = self.at(slope_x, slope_y)
         number = (np.rint(at_y) * columns + np.rint(at_x)).astype(np.int32)
         left, low = np.minimum(at_x.astype(np.intp), columns - 2), np.minimum(at_y.astype(np.intp), rows - 2)
         part_x, part_y = (at_x - left)[..., None], (at_y - low)[..., None]
@@ -72,6 +77,16 @@ class EyeLight:
             self.places[low + up, left] * (1.0 - part_x) + self.places[low + up, left + 1] * part_x for up in (0, 1)
         )
         return number, lower * (1.0 - part_y) + upper * part_y
+
+
+def panel_frame(display: Display) -> Real:
+    """Width and height of the panel in pixels, pixel pitch in mm, sine and cosine of the slant of its cylinders.
+
+    What the kernels that gather light know of a display.
+    """
+    panel, is_cylinder = display.panel, display.lens_array.layout == "lenticular"
+    slant = math.radians(display.lens_array.slant if is_cylinder else 0.0)
+    return np.array([panel.width, panel.height, panel.pixel_pitch, math.sin(slant), math.cos(slant)])
 
 
 def eye_light(

@@ -35,6 +35,15 @@ def weight_at(weights: Real, down: float, right: float) -> float:
     return total
 
 
+@inlined
+def columns_about(panel: Real, row: int, across: float, reach: float) -> tuple[float, int, int]:
+    """Of a row of pixels: its middle in mm along, and the first column and the one past the last about a place."""
+    width, height, pixel, sine, cosine = panel[0], panel[1], panel[2], panel[3], panel[4]
+    y = (0.5 * height - row - 0.5) * pixel
+    middle = (across + y * sine) / cosine / pixel + 0.5 * width - 0.5
+    return y, max(0, math.floor(middle - reach)), min(int(width), math.ceil(middle + reach) + 1)
+
+
 @uncounted
 def gather_light(
     first: int,
@@ -87,11 +96,8 @@ def gather_light(
                 share = 1.0
                 if is_line:
                     share = (min(end, row + 1.0) - max(begin, float(row))) / (end - begin)
-                y = (0.5 * height - row - 0.5) * pixel
-                middle = (across + y * sine) / cosine / pixel + 0.5 * width - 0.5
-                for column in range(
-                    max(0, math.floor(middle - reach_x)), min(int(width), math.ceil(middle + reach_x) + 1)
-                ):
+                y, left, right_end = columns_about(panel, row, across, reach_x)
+                for column in range(left, right_end):
                     cell = cells[row % cells.shape[0], column % cells.shape[1]]
                     x = (column + 0.5 - 0.5 * width) * pixel
                     for channel in range(3):

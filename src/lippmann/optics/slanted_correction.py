@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display.display import Display
-from lippmann.optics.eye_light import EyeLight, eye_light
+from lippmann.optics.eye_light import EyeLight, eye_light, panel_frame
 from lippmann.optics.lens import Real
 from lippmann.runtime.engine_lock import cached_property
 from lippmann.runtime.machine import usable_cores
@@ -82,7 +82,7 @@ class SlantedRows:
 
     def solve(self, meant: Floats, channel: int, first: int) -> Floats:
         """Pixels ``(rows, width)`` of the meant light ``(parts, rows, width)`` of the rows from ``first`` on."""
-        from lippmann.optics.correction_kernel import add_stencil, descend
+        from lippmann.optics.correction_kernel import add_stencil, descend, fista_momenta
 
         # An eye sees no window of rows beside the panel: the outermost go on.
         meant = np.pad(meant, ((0, 0), (self.margin, self.margin), (0, 0)), mode="edge")
@@ -93,10 +93,8 @@ class SlantedRows:
         solved: Floats = np.asarray(np.mean(meant, axis=0, dtype=np.float32))
         bands.lines(add_stencil, count, meant, numbers, of_meant.offsets, of_meant.weights, goal)
         step = np.float32(1.0) / normal.weights.sum(axis=0).max()
-        now, ahead, t = solved[None].copy(), np.empty_like(solved[None]), 1.0
-        for _ in range(_STEPS):
-            following = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * t * t))
-            speed, t = np.float32((t - 1.0) / following), following
+        now, ahead = solved[None].copy(), np.empty_like(solved[None])
+        for speed in fista_momenta(_STEPS):
             bands.lines(
                 descend, count, now, numbers, normal.offsets, normal.weights, goal, step, speed, solved, ahead[0]
             )
@@ -110,7 +108,7 @@ class SlantedRows:
         """
         from lippmann.optics.eye_light_kernel import gather_light
 
-        display, panel, n = self.display, self.display.panel, self.window
+        display, n = self.display, self.window
         count = np.arange(0, len(pixels) - n + 1, _JUDGED)
         lens = np.arange(display.lens_grid.columns, dtype=np.float64)
         axis, place = (each[:, ::_JUDGED] for each in self._directions(lens))
@@ -121,13 +119,22 @@ class SlantedRows:
         numbers = np.broadcast_to(number.ravel(), shape)
         places = np.broadcast_to(middle.reshape(-1, 2), (*shape, 2))
         lines = np.broadcast_to((count[:, None] + np.array([0.0, n]))[:, None], (*shape, 2)) + float(first)
-        slant = math.radians(display.lens_array.slant)
-        frame = np.array([panel.width, panel.height, panel.pixel_pitch, math.sin(slant), math.cos(slant)])
         tables = light.weights.reshape(-1, *light.weights.shape[2:])
         cells = np.array(((self.offsets,),), dtype=np.float64)
         seen = np.zeros((*shape, 3), dtype=np.float32)
         Bands(usable_cores()).lines(
-            gather_light, len(count), pixels, first, frame, cells, tables, light.step, numbers, places, lines, seen
+            gather_light,
+            len(count),
+            pixels,
+            first,
+            panel_frame(display),
+            cells,
+            tables,
+            light.step,
+            numbers,
+            places,
+            lines,
+            seen,
         )
         squares = []
         for channel in range(3):

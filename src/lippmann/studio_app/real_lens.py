@@ -6,7 +6,6 @@ the height of one pixel about the place that the eye sees, in a coarse picture, 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import NUMPY, Display
 from lippmann.display.seen_pixels import EyeMap, Floats, PixelSet, Vector
-from lippmann.optics.eye_light import EyeLight
+from lippmann.optics.eye_light import EyeLight, panel_frame
 from lippmann.optics.lens import Real
 from lippmann.runtime.machine import usable_cores
 from lippmann.runtime.row_threads import Bands
@@ -112,7 +111,7 @@ class RealEyeMap(EyeMap):
         """The pixels whose light an eye at ``eye`` (mm in the display's frame, z > 0) gets, with their weights."""
         from lippmann.studio_app.real_lens_kernel import weigh
 
-        display, panel, lattice = self.display, self.display.panel, self.display.lattice
+        display, lattice = self.display, self.display.lattice
         light, finer = _light_of(display)
         light = light.through_pupil(PUPIL / eye[2] * display.gap)
         at, places = self._at(light, finer, eye)
@@ -122,12 +121,10 @@ class RealEyeMap(EyeMap):
             places[:, 1] = display.pixel_coordinates(*seen)[1]
         else:
             places += np.stack([self._center_x, self._center_y], axis=-1)
-        slant = math.radians(lattice.slant if self._is_line else 0.0)
-        shape = np.array([panel.width, panel.height, panel.pixel_pitch, math.sin(slant), math.cos(slant)])
-        cells = np.array(panel.subpixel_cells or ((panel.subpixel_offsets,),), dtype=np.float64)
+        frame, cells = panel_frame(display), np.array(display.panel.cells, dtype=np.float64)
         bands, count = Bands(usable_cores()), len(at)
         starts, pixels, weights = np.zeros(count + 1, np.int64), np.empty(0, np.int64), np.empty((0, 3), np.float32)
-        asked = at, places, light.weights, light.step, shape, cells, self._is_line, not cells.any(), _LEAST
+        asked = at, places, light.weights, light.step, frame, cells, self._is_line, not cells.any(), _LEAST
         bands.pixels(weigh, count, *asked, starts, pixels, weights)
         np.cumsum(starts, out=starts)
         pixels, weights = np.empty(starts[-1], np.int64), np.empty((starts[-1], 3), np.float32)
@@ -139,12 +136,7 @@ class RealEyeMap(EyeMap):
         from scipy.ndimage import map_coordinates
 
         across, along = slopes_to_eye(self.display, eye, self._center_x, self._center_y)
-        at = np.empty((len(across), 2))
-        for axis, slopes, slope in (
-            (1, light.slopes_x, across),
-            (0, light.slopes_y, np.abs(along) if self._is_line else along),
-        ):
-            at[:, axis] = np.clip((slope - slopes[0]) / (slopes[1] - slopes[0]), 0.0, len(slopes) - 1.0)
+        at = np.stack(light.at(across, np.abs(along) if self._is_line else along), axis=-1)
         places = np.stack([map_coordinates(finer[..., k], FINER * at.T, order=1) for k in (0, 1)], axis=-1)
         return at, places
 

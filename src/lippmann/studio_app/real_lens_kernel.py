@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.image.stored_values import FloatArray
-from lippmann.optics.eye_light_kernel import weight_at
+from lippmann.optics.eye_light_kernel import columns_about, weight_at
 from lippmann.runtime.numba_jit import inlined, uncounted
 
 Real = NDArray[np.float64]
@@ -78,9 +78,8 @@ def weigh(
         entry = 0 if counts else starts[n]
         for row in range(max(0, math.floor(begin)), min(int(height), math.ceil(end))):
             share = min(end, row + 1.0) - max(begin, float(row)) if is_line else 1.0
-            y = (0.5 * height - row - 0.5) * pixel
-            middle = (across + y * sine) / cosine / pixel + 0.5 * width - 0.5
-            for column in range(max(0, math.floor(middle - reach_x)), min(int(width), math.ceil(middle + reach_x) + 1)):
+            y, left, right_end = columns_about(panel, row, across, reach_x)
+            for column in range(left, right_end):
                 cell = cells[row % cells.shape[0], column % cells.shape[1]]
                 x = (column + 0.5 - 0.5 * width) * pixel
                 red, green, blue = 0.0, 0.0, 0.0

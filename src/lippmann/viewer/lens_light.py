@@ -40,8 +40,6 @@ def lens_light(display: Display) -> dict[str, object] | None:
     light = light_everywhere(display)
     rows, columns, height, width = light.weights.shape
     largest = float(light.weights.max())
-    panel = display.panel
-    cells = panel.subpixel_cells or ((panel.subpixel_offsets,),)
     return {
         "slope": float(light.slopes_x[-1]),
         "columns": columns,
@@ -53,7 +51,7 @@ def lens_light(display: Display) -> dict[str, object] | None:
         "places": _base64(finer_places(light).astype("<f4")),
         "largest": largest,
         "weights": _base64(np.rint(light.weights * (65535.0 / largest)).astype("<u2")),
-        "cells": [[[list(pair) for pair in cell] for cell in row] for row in cells],
+        "cells": [[[list(pair) for pair in cell] for cell in row] for row in display.panel.cells],
         "pupil": PUPIL,
     }
 

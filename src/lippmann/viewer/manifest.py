@@ -59,7 +59,7 @@ def optics(display: Display, *, subpixels: bool) -> dict[str, object]:
     ``viewing_distance`` are None.
     """
     panel, lattice, places = display.panel, display.lattice, view_grid(display)
-    cells = (panel.subpixel_cells or ((panel.subpixel_offsets,),)) if subpixels else ((_NO_OFFSETS,),)
+    cells = panel.cells if subpixels else ((_NO_OFFSETS,),)
     return {
         "panel": {
             "width": panel.width,

@@ -14,7 +14,7 @@ from lippmann.display import NUMPY, Display
 from lippmann.errors import UsageError
 from lippmann.image.picture import Picture
 from lippmann.image.stored_values import FloatArray
-from lippmann.optics.eye_light import EyeLight, eye_light
+from lippmann.optics.eye_light import EyeLight, eye_light, panel_frame
 from lippmann.runtime.machine import usable_cores
 from lippmann.runtime.row_threads import Bands
 from lippmann.viewing.replay import Eye, Real, checked_eye, checked_size, default_eye, default_size
@@ -111,11 +111,9 @@ def _gathered(image: Picture, light: EyeLight, eye: Eye, size: tuple[int, int], 
     top, bottom = (min(max(0, each), panel.height) for each in (math.floor(first), math.ceil(last)))
     out = np.zeros((*x.shape, 3), dtype=np.float32)
     if top < bottom:
-        slant = math.radians(display.lens_array.slant if is_line else 0.0)
-        shape = np.array([panel.width, panel.height, panel.pixel_pitch, math.sin(slant), math.cos(slant)])
         tables = light.weights.reshape(-1, *light.weights.shape[2:])
-        cells = np.array(panel.subpixel_cells or ((panel.subpixel_offsets,),), dtype=np.float64)
+        cells = np.array(panel.cells, dtype=np.float64)
         values = np.ascontiguousarray(image.rows(top, bottom), dtype=np.float32)
-        gathering = values, top, shape, cells, tables, light.step, number, place, lines, out
+        gathering = values, top, panel_frame(display), cells, tables, light.step, number, place, lines, out
         Bands(usable_cores()).lines(gather_light, len(v), *gathering)
     return out

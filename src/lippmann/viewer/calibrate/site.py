@@ -93,7 +93,7 @@ class CalibrationSite:
                 "width": panel.width,
                 "height": panel.height,
                 "pixel_pitch": panel.pixel_pitch,
-                "cells": panel.subpixel_cells or [[panel.subpixel_offsets]],
+                "cells": panel.cells,
             },
             "orders": orders,
             "order": order,
