@@ -63,8 +63,8 @@ def test_a_turn_builds_once_and_shows_what_frames_built_alone_show(engine, displ
 
 
 def test_a_light_source_that_goes_along_is_placed_anew(engine, display, builds):
-    lamp = Light("point", (80.0, 80.0, 80.0), np.array([[1, 0, 0, 6], [0, 1, 0, 4], [0, 0, 1, 6], [0, 0, 0, 1.0]]))
-    motion = open_turntable(teapot(lights=[lamp]), 4)
+    light = Light("point", (80.0, 80.0, 80.0), np.array([[1, 0, 0, 6], [0, 1, 0, 4], [0, 0, 1, 6], [0, 0, 0, 1.0]]))
+    motion = open_turntable(teapot(lights=[light]), 4)
     list(render_sequence(motion, display, [0, 1], **QUICK))
     assert len(builds) == 2
 

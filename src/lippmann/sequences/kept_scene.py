@@ -31,8 +31,9 @@ class KeptScene:
             built = build(scene, engine, memory=memory)
         elif _differs_by_far_light(self._last[0], scene):
             built = self._last[1]
-            if scene.environment is not None:
-                turn_environment(built.mitsuba.environment(), scene.environment.world_from_environment)
+            environment = scene.environment
+            if environment is not None:
+                turn_environment(built.mitsuba.environment(), environment.world_from_environment)
         else:
             finishes = self._last[1].finishes if _has_same_materials(self._last[0], scene) else None
             self._last = None  # two scenes may not fit the memory

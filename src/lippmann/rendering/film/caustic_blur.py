@@ -23,7 +23,7 @@ from lippmann.rendering.film.wavefront import select_colors
 from lippmann.rendering.transport.caustic_photons import CausticPhotons, radius_of_pass
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
-from lippmann.rendering.transport.ray_source import RaySource, pixel_number
+from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.rendering.transport.tuning import TUNING
 from lippmann.rendering.transport.visible_caustics import VisibleBlur
 
@@ -110,7 +110,7 @@ def _products(blur: VisibleBlur, source: RaySource, window: PixelWindow, pixels:
     row, column = divide(pixel, dr.opaque(mi.UInt32, window.width))
     row += dr.opaque(mi.UInt32, window.top)
     column += dr.opaque(mi.UInt32, window.left)
-    number = pixel_number(source, column, row) * channels + channel
+    number = source.number(column, row) * channels + channel
     own_seed = dr.opaque(mi.UInt32, named_seed("blur of caustics", seed))
     stream = SampleStream.of_pixels(number, dr.zeros(mi.UInt32, lanes), own_seed, half)
     ray = source.rays(column, row, channel, stream.next_2d(PIXEL_DIMENSION))

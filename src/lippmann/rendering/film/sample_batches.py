@@ -40,7 +40,7 @@ from lippmann.rendering.film.wavefront import (
 from lippmann.rendering.film.wavefront_plan import Run, cut_batches
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
-from lippmann.rendering.transport.ray_source import PixelRays, RaySource, SubpixelRays, pixel_number
+from lippmann.rendering.transport.ray_source import PixelRays, RaySource, SubpixelRays
 
 Floats = NDArray[np.float32]
 
@@ -172,11 +172,10 @@ class FullInBatches(BatchedPicture):
         pixel, channel = divide(rest, channels)
         pixel = dr.opaque(mi.UInt32, run.first) + pixel * dr.opaque(mi.UInt32, run.step)
         strips = in_strips(self._sums.shape[1], window.width) if run.in_strips else 0
-        width = dr.opaque(mi.UInt32, window.width)
-        row, column = pixel_at(pixel, width, dr.opaque(mi.UInt32, strips))
+        row, column = pixel_at(pixel, window.width, dr.opaque(mi.UInt32, strips))
         row += dr.opaque(mi.UInt32, window.top)
         column += dr.opaque(mi.UInt32, window.left)
-        pixel = pixel_number(self._source, column, row)
+        pixel = self._source.number(column, row)
         sample += dr.gather(mi.UInt32, _table(run.starts), place)
         stream_of = dr.gather(mi.UInt32, _table([batch // per_stream for batch in run.batches]), place)
         stream = SampleStream.of_pixels(pixel * channels + channel, sample, dr.opaque(mi.UInt32, self._seed), stream_of)

@@ -25,7 +25,7 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
 from lippmann.rendering.transport.integrator import Integrator, PixelSample
 from lippmann.rendering.transport.path import PathIntegrator
-from lippmann.rendering.transport.ray_source import PixelRays, RaySource, pixel_number
+from lippmann.rendering.transport.ray_source import PixelRays, RaySource
 from lippmann.rendering.transport.specular_chains import sample_pixel
 
 T = TypeVar("T", bound=np.generic)
@@ -166,12 +166,12 @@ def samples_of_tile(
     per_channel, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
     pixel, channel = divide(per_channel, plan.channels)
     strips = in_strips(tile.rows * plan.width, plan.width)
-    row, column = pixel_at(pixel, dr.opaque(mi.UInt32, plan.width), dr.opaque(mi.UInt32, strips))
+    row, column = pixel_at(pixel, plan.width, dr.opaque(mi.UInt32, strips))
     row += dr.opaque(mi.UInt32, tile.first_row + corner[0])
     column += dr.opaque(mi.UInt32, corner[1])
     sample += dr.opaque(mi.UInt32, run.first)
     # The stream of a sub-pixel is its own; a picture has fewer than 2^32 sub-pixels.
-    number = pixel_number(source, column, row) * plan.channels + channel
+    number = source.number(column, row) * plan.channels + channel
     stream = SampleStream.of_pixels(number, sample, dr.opaque(mi.UInt32, seed))
     return PixelRays(source, column, row, channel, box_filter), stream
 
@@ -256,7 +256,7 @@ def in_strips(pixels: int, width: int) -> int:
     return pixels // strip * strip
 
 
-def pixel_at(place: UInt32, width: UInt32 | int, strips: UInt32) -> tuple[UInt32, UInt32]:
+def pixel_at(place: UInt32, width: int, strips: UInt32) -> tuple[UInt32, UInt32]:
     """Row and column of a place.
 
     Parameters
@@ -264,13 +264,14 @@ def pixel_at(place: UInt32, width: UInt32 | int, strips: UInt32) -> tuple[UInt32
     place:
         0 to the number of pixels - 1.
     width:
-        Columns of the picture.
+        Columns of the picture; opaque to the compiler, so that windows of all widths share a kernel.
     strips:
         Pixels in whole strips, :func:`in_strips`; 0 for a picture all in rows.
     """
-    strip, inside = divide(place, width * STRIP_ROWS)
+    columns = dr.opaque(mi.UInt32, width)
+    strip, inside = divide(place, columns * STRIP_ROWS)
     strip_column, strip_row = divide(inside, STRIP_ROWS)
-    row, column = divide(place, width)
+    row, column = divide(place, columns)
     stands = place < strips
     return dr.select(stands, strip * STRIP_ROWS + strip_row, row), dr.select(stands, strip_column, column)
 

@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.kernel_ops import upload
+from lippmann.device.kernel_ops import to_numpy, upload
 from lippmann.device.pbr.even_points import PointOf, evenly, no_point
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, EmitterPtr, Float, MitsubaScene, Point3f, SurfaceInteraction3f, Vector3f
@@ -167,18 +167,15 @@ class EmitterRays:
         dr.eval(si.p, normal, shading, glow, geometric, density, sampled, cosine, lit)
         kept = np.array(lit).reshape(-1)
 
-        def rows(values: Vector3f) -> Floats:
-            return np.ascontiguousarray(np.array(values, dtype=np.float32).T[kept])
-
-        def numbers(values: Float) -> Floats:
-            return np.asarray(np.array(values, dtype=np.float32).reshape(-1)[kept])
+        def rows(values: Float | Vector3f) -> Floats:
+            return np.asarray(to_numpy(values, len(kept))[kept])
 
         return LitPoints(
             rows(si.p),
             rows(normal),
             rows(shading),
             rows(glow),
-            numbers(density * geometric),
-            numbers(sampled),
-            numbers(dr.select(has_size, cosine * dr.inv_pi, 0)),
+            rows(density * geometric),
+            rows(sampled),
+            rows(dr.select(has_size, cosine * dr.inv_pi, 0)),
         ), kept

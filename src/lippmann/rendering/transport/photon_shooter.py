@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.kernel_ops import divide, upload
+from lippmann.device.kernel_ops import divide, to_numpy, upload
 from lippmann.device.sobol import SampleStream
 from lippmann.device.syntax import syntax
 from lippmann.device.types import (
@@ -218,5 +218,5 @@ class _Landed:
         row = upload(rows.astype(np.uint32))
         vectors = [dr.gather(mi.Point3f, values, row) for values in self._values]
         dr.eval(vectors)
-        position, normal, toward, power = (np.ascontiguousarray(np.array(vector).T) for vector in vectors)
+        position, normal, toward, power = (to_numpy(vector, len(rows)) for vector in vectors)
         return Photons(position, normal, toward, power, events[rows]), lanes

@@ -46,15 +46,12 @@ class RaySource(Protocol):
         """
         ...
 
+    def number(self, column: UInt32, row: UInt32) -> UInt32:
+        """Pixel index that seeds the random numbers: row by row over the whole picture, also for a window of it.
 
-def pixel_number(source: RaySource, column: UInt32, row: UInt32) -> UInt32:
-    """Pixel index that seeds the random numbers: row by row over the whole picture, also for a window of it.
-
-    So a pixel has the same samples whichever part of the picture is rendered.
-    """
-    if isinstance(source, WindowRays | SubpixelRays | SinglePixelRays | QuiltRays):
-        return source.number(column, row)
-    return row * source.width + column
+        So a pixel has the same samples whichever part of the picture is rendered.
+        """
+        return row * self.width + column
 
 
 class PixelRays:
@@ -229,7 +226,7 @@ class SubpixelRays(OnePicture):
     def number(self, column: UInt32, row: UInt32) -> UInt32:
         """Index of sub-pixels in the whole picture, R, G and B of each pixel in turn."""
         pixel, color = self._subpixel(column)
-        return pixel_number(self._source, pixel, row) * 3 + color
+        return self._source.number(pixel, row) * 3 + color
 
     def own_colors(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Pixels of the display, ``(..., H, W, 3)``, from ``(..., H, 3 W, 3)``: each sub-pixel keeps its own colour."""
