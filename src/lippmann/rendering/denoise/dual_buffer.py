@@ -198,8 +198,9 @@ def clean_light(noisy: Floats, specular: Floats | None, denoise: Denoise, sample
     past = (
         np.float32(0) if specular is None else np.where(specular > limit, np.maximum(noisy - limit, specular), specular)
     )
-    rest = noisy if specular is None else noisy - past
-    clean = denoise(np.minimum(rest, limit), samples, turned) + past
+    # Subtracted twice: beside the network each copy of the picture counts.
+    clean = denoise(np.minimum(noisy - past, limit), samples, turned) + past
+    rest = noisy - past
     if (rest > limit).any():
         clean += np.where(clean - past >= np.float32(0.75) * limit, np.maximum(rest - limit, 0), np.float32(0))
     return clean

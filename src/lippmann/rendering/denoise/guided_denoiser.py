@@ -227,13 +227,15 @@ def denoise_surfaces(
     The network gets the rectangle of the ``surfaces``, those of ``normal``. Pixels that are not near a surface are left
     as they are, so that no border of that rectangle shows.
     """
+    if surfaces is None:
+        return np.array(color, dtype=np.float32)
+    place = surfaces.place
+    images = color[place], albedo[place], normal[place]
+    # Guides follow mirrors and glass deterministically, so they are noisy along edges alone.
+    cleaned = denoise(*images, clean_guides=True, effort=effort, turned=turned, threads=threads)
+    # Copied after the network, whose memory is the largest.
     result = np.array(color, dtype=np.float32)
-    if surfaces is not None:
-        place = surfaces.place
-        images = color[place], albedo[place], normal[place]
-        # Guides follow mirrors and glass deterministically, so they are noisy along edges alone.
-        cleaned = denoise(*images, clean_guides=True, effort=effort, turned=turned, threads=threads)
-        np.copyto(result[place], cleaned, where=surfaces.near)
+    np.copyto(result[place], cleaned, where=surfaces.near)
     return result
 
 

@@ -94,13 +94,14 @@ def denoise(
         work.set_int("maxMemoryMB", NETWORK_MOST >> 20)
         work.set_quality(getattr(pyoidn, _QUALITY[effort]))
 
-    shown = {name: _turned(image) for name, image in images.items()} if turned else images
+    height, width = images["color"].shape[:2]
+    if turned:
+        images = {name: _turned(images.pop(name)) for name in list(images)}  # each frees the memory of the one before
     # One device serves one filter at a time, and its threads do not survive a fork.
     with exclusive():
-        result = _filtered(pyoidn, shown, set_up, threads or machine.usable_cores())
+        result = _filtered(pyoidn, images, set_up, threads or machine.usable_cores())
     if not turned:
         return result
-    height, width = images["color"].shape[:2]
     return np.ascontiguousarray(result[-height:, -width:][::-1, ::-1])
 
 
