@@ -47,7 +47,7 @@ def sky():
 
 def teapot(**more):
     scene = lippmann.load_scene("teapot")
-    return replace(scene, description=replace(scene.physical, **more), classic=None)
+    return replace(scene, description=replace(scene.physical, **more), classic_form=None)
 
 
 @pytest.mark.parametrize("lit", ["studio", "sky"])

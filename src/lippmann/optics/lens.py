@@ -18,14 +18,6 @@ from lippmann.errors import DisplayError
 Real = NDArray[np.float64]
 
 
-def lens_notes(display: Display) -> tuple[str, ...]:
-    """What a picture for a display of real lenses says of them, a line or none."""
-    if display.lens is None:
-        return ()
-    pinhole = display.lens.thickness / display.lens.index
-    return (f"{display.lens.in_words()}: gap {display.gap:.4g} mm, not thickness / index ({pinhole:.4g} mm)",)
-
-
 @dataclass(frozen=True)
 class Lens:
     """One lens and its neighbours, in a frame of its own: its axis is z, its panel lies at z = 0, millimetres.

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from lippmann.display import Display
 from lippmann.display.comfort import comfort_in_words
 from lippmann.display.view_cone import cone_in_words, depth_gain_of_fused_cone, view_cone
-from lippmann.optics.lens import lens_notes
 from lippmann.optics.proof import Proof, prove
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
-from lippmann.rendering.picture import traced_window
+from lippmann.rendering.picture import lens_notes, traced_window
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.request.render_request import RenderRequest, format_value

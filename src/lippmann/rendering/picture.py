@@ -12,7 +12,6 @@ from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.display.view_cone import panel_window
 from lippmann.image import IntegralImage
-from lippmann.optics.lens import lens_notes
 from lippmann.options.choices import REUSING
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.request.plan import resolve
@@ -98,6 +97,14 @@ def render_picture(
     # Files hold whole numbers of 32 bits.
     maps = {name: v.astype(np.uint32) if v.dtype.kind in "iu" else v for name, v in frame.maps.items()}
     return IntegralImage(request.tone_mapped(frame.pixels), display, placement.world_from_display, provenance, maps)
+
+
+def lens_notes(display: Display) -> tuple[str, ...]:
+    """A line on the gap behind the real lenses of a display; none where it has only a pitch."""
+    if display.lens is None:
+        return ()
+    pinhole = display.lens.thickness / display.lens.index
+    return (f"{display.lens.in_words()}: gap {display.gap:.4g} mm, not thickness / index ({pinhole:.4g} mm)",)
 
 
 def choose_exposure(scene: Scene, display: Display, request: RenderRequest, build: Build | None = None) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -54,8 +54,9 @@ class Scene:
     """A scene ready to be placed and built.
 
     ``description`` is what was read, with the environment and background that the caller asked for in it. A scene made
-    for the classic light models has ``classic`` instead, with ``views`` for its cameras; its ``physical`` form is then
-    derived when it is first needed. A scene with both has a form of its own for either kind of light.
+    for the classic light models has a ``classic_form`` instead, with ``views`` for its cameras; its ``physical`` form
+    is then derived when it is first needed. A scene with both has a form of its own for either kind of light;
+    ``classic_form`` may be a function that makes it, which is called when :attr:`classic` is first needed.
     ``home_camera`` names the camera that the scene was made to be shown by (bundled scenes, files of Whitted tracers),
     None for all others; ``home_may_move`` says that it need not be kept to exactly where a display shows more or less.
     ``studio`` says whether the built-in studio may light a scene that has no lights. ``light`` changes the direction
@@ -79,7 +80,7 @@ class Scene:
     home_camera: str | None = None
     home_may_move: bool = field(default=False, repr=False)
     studio: bool = True
-    classic: ClassicScene | None = field(default=None, repr=False)
+    classic_form: ClassicScene | Callable[[], ClassicScene] | None = field(default=None, repr=False)
     views: tuple[Camera, ...] = field(default=(), repr=False)
     light: LightOptions = field(default_factory=LightOptions, repr=False)
     has_chosen_background: bool = field(default=False, repr=False)
@@ -87,8 +88,13 @@ class Scene:
     settings: tuple[str, ...] = field(default=(), repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if self.description is None and self.classic is None:
+        if self.description is None and self.classic_form is None:
             raise SceneError("a scene without any content", where=self.name)
+
+    @cached_property
+    def classic(self) -> ClassicScene | None:
+        """The scene in the terms of the classic light models; None where it has no such form."""
+        return self.classic_form() if callable(self.classic_form) else self.classic_form
 
     @cached_property
     def physical(self) -> SceneDescription | MitsubaSource:

@@ -71,7 +71,7 @@ def with_lights_moved(scene: Scene, matrix: Matrix) -> Scene:
     if scene.description is not None:
         return scene.with_light_moved(matrix)
     assert scene.classic is not None
-    return replace(scene, classic=_classic_lights_moved(scene.classic, matrix))
+    return replace(scene, classic_form=_classic_lights_moved(scene.classic, matrix))
 
 
 def outline(scene: Scene, axis: Vector, center: Vector | Bounds) -> Bounds:

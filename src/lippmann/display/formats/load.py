@@ -46,7 +46,7 @@ from lippmann.display.display import INFINITE, Display, check_tables
 from lippmann.display.formats.bridge import NAME as BRIDGE
 from lippmann.display.formats.bridge import display_of_bridge
 from lippmann.display.formats.lens_tables import aperture_of_table, monitor_display, with_profile
-from lippmann.display.formats.looking_glass import display_of_calibration, is_calibration
+from lippmann.display.formats.looking_glass import display_of_calibration
 from lippmann.display.formats.monitor_toml import TABLE as MONITOR
 from lippmann.display.formats.monitor_toml import monitor_of_texts
 from lippmann.display.formats.recorded_depth import default_aperture
@@ -306,7 +306,7 @@ def _from_preset(name: str, presets: Mapping[str, str]) -> Display:
 def _read_file(path: Path) -> Display:
     """The display of a TOML file, or of a Looking Glass's calibration."""
     text, where = _read(path), os.fspath(path)
-    if is_calibration(text):
+    if text.lstrip("\ufeff \t\r\n").startswith("{"):  # JSON
         return display_of_calibration(text, where=where)
     return _from_toml(text, where=where, stem=path.stem)
 

@@ -55,11 +55,6 @@ _PATTERNS: dict[int, list[list[int]]] = {
 }
 
 
-def is_calibration(text: str) -> bool:
-    """Whether a display's file is JSON, as calibrations are, rather than TOML."""
-    return text.lstrip("\ufeff \t\r\n").startswith("{")
-
-
 def display_of_calibration(text: str, *, where: str) -> Display:
     """The display of a calibration's JSON text.
 

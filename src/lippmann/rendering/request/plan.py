@@ -316,9 +316,9 @@ def _subpixels(facts: _Facts, method: Method, display: Display | None) -> Choice
 
 
 def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None) -> Choice[int | None]:
-    request, classic = facts.request, facts.scene.classic
+    request = facts.request
+    classic = facts.scene.classic if facts.integrator == "classic" else None
     of_file = 1 + (classic.camera.antialiasing if classic is not None and facts.form == "preview" else 0)
-    is_classic = facts.integrator == "classic" and classic is not None
     fewest = BUDGET.fewest_of_many if subpixels and (values or 0) > BUDGET.many else BUDGET.fewest
     of_budget = 1 << max(round(math.log2(BUDGET.values / (values or BUDGET.values))), 0)
     pooled = f"about a million for the picture, but {fewest} to {BUDGET.most} of each pixel"
@@ -329,7 +329,7 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
         (facts.is_one_ray, 1, "one ray through each pixel's middle shows it"),
         (facts.is_final(method), FINAL.most, "a final picture, at most"),
         (is_final, FINAL.samples, "a final picture, where no quality can be worked for"),
-        (is_classic, of_file, "as the scene's file says"),
+        (classic is not None, of_file, "as the scene's file says"),
         (method != "pooled" or values is None, DEFAULT_SPP, "the usual number where light is not pooled"),
         (True, min(max(of_budget, fewest), BUDGET.most), pooled),
     )

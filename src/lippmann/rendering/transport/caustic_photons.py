@@ -30,12 +30,11 @@ from lippmann.rendering.transport.tuning import TUNING
 OF_POWER = 6
 #: Photons within the radius of a look-up, as a rule, over the root of the emissions.
 NEIGHBOURS_OF_ROOT = 0.12
-_NONE = Photons.dark(0)
 
 
 def no_photons() -> PhotonMap:
     """An empty photon map: caustics are left out."""
-    return PhotonMap((_NONE, _NONE), 1.0)
+    return PhotonMap((Photons.dark(0), Photons.dark(0)), 1.0)
 
 
 def emissions(samples: int) -> int:

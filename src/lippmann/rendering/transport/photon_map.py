@@ -27,7 +27,7 @@ Floats = NDArray[np.float32]
 #: Lower bounds of the area of a plane in a cell: slope of the plane, and area in faces of the cell.
 _LEAST_SLOPE, _LEAST_AREA = 0.01, 0.05
 #: Odd factors of the coordinates of a cell in its hash.
-_FACTORS = tuple(pow(SEED_STEP, power, 1 << 32) for power in range(1, 4))
+_FACTORS = SEED_STEP, pow(SEED_STEP, 2, 1 << 32), pow(SEED_STEP, 3, 1 << 32)
 #: Bitmap of wide cells with photons in reach: bits per bucket, fewest bits in all, and width of a wide cell in radii.
 #: One look-up in fifty then finds no photon.
 _NEAR_BITS, _FEWEST_BITS, _NEAR_WIDTH = 16, 1 << 10, 4

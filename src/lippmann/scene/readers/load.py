@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,6 +53,7 @@ _LIBRARIES = {
 #: Radiance whose square single precision holds.
 _BRIGHTEST = 1e18
 
+#: Ray depth with which the paper renders its scenes.
 _PAPER_DEPTH = 2
 
 #: Files of other programs, and how a glTF file is made of them.
@@ -153,8 +155,8 @@ def read_scene(
     scene = replace(scene, light=light or scene.light, settings=(*scene.settings, *settings_of(asked)))
     scene = scene if color is None else replace(scene, has_chosen_background=True)
     studio = scene.studio and str(asked.environment) != NO_ENVIRONMENT
-    if scene.classic is not None and color is not None:
-        scene = replace(scene, classic=replace(scene.classic, background=Background(color=color)))
+    if color is not None and scene.classic is not None:
+        scene = replace(scene, classic_form=replace(scene.classic, background=Background(color=color)))
     if scene.is_classic and sky is None and not asked.single_scattering:
         return replace(scene, studio=studio)
     # The classic light models know neither surroundings nor microfacets: who asks for them gets the physical form.
@@ -220,16 +222,16 @@ def _unknown_kind(path: Path) -> SceneError:
 
 
 def _from_name(source: str | Path, allow_outside: bool, asked: SceneOptions) -> Scene:
+    from lippmann.scene import bundled
+
     path = Path(source)
+    if source in bundled.names():
+        _check_options(source, "", asked)
+        return _from_library(path.name)
     suffix = ".sog" if holds_sog(path) else kind_of_name(path)
     _check_options(source, suffix, asked)
-    if isinstance(source, str) and not suffix and path.name == source:
-        from lippmann.scene import bundled
-
-        if source in bundled.names():
-            return _from_library(source)
-        if not path.exists():
-            raise SceneError.unknown("bundled scene or file", source, bundled.names())
+    if isinstance(source, str) and not suffix and path.name == source and not path.exists():
+        raise SceneError.unknown("bundled scene or file", source, bundled.names())
     plugin = _reader_of(path, suffix)
     reader = plugin.value
     keywords = _keywords(reader, path, asked, allow_outside)
@@ -405,18 +407,26 @@ def _from_library(name: str) -> Scene:
     from lippmann.scene import bundled
 
     content = bundled.make(name)
-    classic = content if isinstance(content, ClassicScene) else bundled.make_classic(name)
-    # The paper renders its scenes with this ray depth.
-    classic = replace(classic, camera=replace(classic.camera, ray_depth=_PAPER_DEPTH))
     if isinstance(content, ClassicScene):
-        return replace(_classic(classic, bundled.stage_of(name).camera()), home_may_move=True)
+        return replace(_classic(_with_paper_depth(content), bundled.stage_of(name).camera()), home_may_move=True)
     description = check_description(content, name)
     home = description.cameras[0].name if description.cameras else None
-    return Scene(name, description, home_camera=home, home_may_move=True, classic=classic)
+    return Scene(name, description, home_camera=home, home_may_move=True, classic_form=partial(_classic_form, name))
+
+
+def _classic_form(name: str) -> ClassicScene:
+    """The form of a bundled scene for the classic light models."""
+    from lippmann.scene import bundled
+
+    return _with_paper_depth(bundled.make_classic(name))
+
+
+def _with_paper_depth(scene: ClassicScene) -> ClassicScene:
+    return replace(scene, camera=replace(scene.camera, ray_depth=_PAPER_DEPTH))
 
 
 def _classic(scene: ClassicScene, camera: Camera) -> Scene:
-    return Scene(scene.name, home_camera=camera.name, classic=scene, views=(camera,))
+    return Scene(scene.name, home_camera=camera.name, classic_form=scene, views=(camera,))
 
 
 def _from_object(source: object) -> Scene:
