@@ -315,6 +315,9 @@ class _Cut:
     def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
         return self._source.rays(column + self._left, row * self._step + self._top, channel, jitter)
 
+    def number(self, column: Any, row: Any) -> Any:
+        return row * self.width + column
+
 
 def _traced(stage: Stage, source: Any, samples: int) -> Picture:
     from lippmann.rendering.film.wavefront import trace_frame

@@ -9,8 +9,12 @@ import mitsuba as mi
 import numpy as np
 
 from lippmann.rendering.film.wavefront import trace_frame
-from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.transport.ray_source import DisplayRays
+
+try:
+    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
+except ImportError:  # of the earlier checkouts that defaults.py judges
+    from lippmann.rendering.film.wavefront_plan import make_plan as cut_wavefronts
 
 
 class PixelRays:
@@ -29,6 +33,10 @@ class PixelRays:
         place = mi.UInt32(column)
         at = (dr.gather(mi.UInt32, table, place) for table in (self._columns, self._rows))
         return self._source.rays(*at, channel, jitter)
+
+    def number(self, column, row):
+        del row
+        return mi.UInt32(column)
 
 
 def trace_pixels(session, source, integrator, columns, rows, spp, seed=991):

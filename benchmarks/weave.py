@@ -135,12 +135,12 @@ def _level_rays(direct: Any, world_from_display: NDArray[np.float64]) -> Any:
 
     from lippmann.device.kernel_ops import DEVICE as OPS
     from lippmann.display.view_cone import cone_tangent
-    from lippmann.rendering.transport.ray_source import world_ray
+    from lippmann.rendering.transport.ray_source import OnePicture, world_ray
 
     display = direct.display
     lattice, scale, tangent = display.lattice, display.magnification, cone_tangent(display)
 
-    class LevelRays:
+    class LevelRays(OnePicture):
         width, height, channels = direct.width, direct.height, 3
 
         def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
