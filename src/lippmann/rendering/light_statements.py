@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.rendering.estimate.psnr import Estimate
-from lippmann.rendering.estimate.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.request.tuning import TUNING
 from lippmann.scene.values.description import Color
 
 if TYPE_CHECKING:
@@ -55,9 +55,9 @@ def light_notes(
             "no estimate of the error: paths hardly find what mirrors, glass or gloss throw onto other surfaces from "
             "emitters as small as here; photons bring it (caustics)"
         )
-    if estimate is not None and samples < TUNING.few_samples and is_among_mirrors(choices):
+    if estimate is not None and samples < TUNING.usual and is_among_mirrors(choices):
         notes.append(
-            f"fewer than {TUNING.few_samples} samples may all have missed bright light among mirrors: intervals "
+            f"fewer than {TUNING.usual} samples may all have missed bright light among mirrors: intervals "
             "of the PSNR reach down farther"
         )
     if request.clamp_indirect is not None:
@@ -102,5 +102,5 @@ def warn_of_emptiness(share: float) -> tuple[str, ...]:
     """The warning, or nothing."""
     if share >= LEAST_SHARE:
         return ()
-    shown = "nothing" if share == 0 else f"{share:.1%} of it shows anything"
-    return (f"the picture is nearly empty ({shown}): place the scene by camera, turn, scale or shift",)
+    content = "nothing" if share == 0 else f"{share:.1%} of it shows anything"
+    return (f"the picture is nearly empty ({content}): place the scene by camera, turn, scale or shift",)

@@ -21,7 +21,6 @@ from lippmann.rendering.denoise.outlines import exchange_coverage
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
 from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts
-from lippmann.rendering.estimate.tuning import TUNING as ESTIMATE
 from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
 from lippmann.rendering.film.wavefront import Frame, trace_frame
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
@@ -29,6 +28,7 @@ from lippmann.rendering.light_statements import is_among_mirrors
 from lippmann.rendering.reprojection.point_image import STATUS_LAYER, TRACED
 from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.request.tuning import TUNING as REQUEST
 from lippmann.rendering.session import Session
 from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays, OnePicture, QuiltRays, SubpixelRays, WindowRays
@@ -192,8 +192,8 @@ def _in_rounds(job: Job) -> Traced:
     denoiser = None if job.request.denoise == "none" else guided_denoiser(job)
     picture = batches if denoiser is None else _denoised(job, batches, denoiser)
     goal = _timed_goal(job)
-    assessment = 0.0 if denoiser is None or goal.max_time is None else denoiser.probe(ESTIMATE.outliers_told_from)
-    first = ESTIMATE.few_samples if denoiser is None else ESTIMATE.outliers_told_from
+    assessment = 0.0 if denoiser is None or goal.max_time is None else denoiser.probe(REQUEST.fewest)
+    first = REQUEST.usual if denoiser is None else REQUEST.fewest
     outcome = reach(
         goal,
         batches,

@@ -447,7 +447,7 @@ def make_surface(built: BuiltScene, request: RenderRequest, frame_from_world: Ma
 
 
 def _stage_seconds(watch: Stopwatch, frame: Frame) -> dict[str, float]:
-    """Seconds by stage, in the order of the work; ``write`` is added by who writes."""
+    """Seconds by stage, in the order of the work; ``write`` is added by the writer of the file."""
     return {
         "load": watch.seconds.get("load", 0.0),
         "build": watch.seconds.get("build", 0.0),

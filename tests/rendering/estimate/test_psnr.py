@@ -14,7 +14,7 @@ from lippmann.image.micro_images import lens_indices
 from lippmann.metrics.mse_psnr import micro_image_means, psnr
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
-from lippmann.rendering.estimate.psnr import CEILING, Estimate
+from lippmann.rendering.estimate.psnr import FLOOR, Estimate
 from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.request.render_request import RenderRequest
 
@@ -103,8 +103,8 @@ def test_what_may_not_be_there_widens_the_interval_of_the_whole_to_the_better_si
 def test_no_error_at_all_is_the_ceiling():
     shown = display()
     found = PictureEstimator(shown).estimate(PixelErrors(np.zeros((64, 64), np.float32)), 64)
-    assert found.psnr == pytest.approx(CEILING)
-    assert found.worst > CEILING - 6
+    assert found.psnr == pytest.approx(-10 * math.log10(FLOOR))
+    assert found.worst > -10 * math.log10(FLOOR) - 6
 
 
 def test_an_estimate_survives_its_plain_form():

@@ -8,9 +8,9 @@ import pytest
 from lippmann.display import load_display
 from lippmann.options.choices import ASKED
 from lippmann.rendering.denoise.guided_denoiser import effort_of
-from lippmann.rendering.denoise.tuning import TUNING
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import Choice, RenderRequest
+from lippmann.rendering.request.tuning import TUNING
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 
@@ -77,7 +77,7 @@ def test_what_has_no_noise_is_not_denoised():
 
 
 def test_effort_follows_the_samples_unless_it_is_named():
-    assert [effort_of("oidn", samples) for samples in (TUNING.high_from - 1, TUNING.high_from)] == ["fast", "high"]
+    assert [effort_of("oidn", samples) for samples in (TUNING.usual - 1, TUNING.usual)] == ["fast", "high"]
     assert [effort_of(name, 1000) for name in ("oidn-fast", "oidn-high")] == ["fast", "high"]
     assert effort_of("oidn-high", 1) == "high"
 

@@ -37,6 +37,7 @@ from lippmann.rendering.denoise.tuning import TUNING
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
 from lippmann.rendering.estimate.tuning import TUNING as ESTIMATE
 from lippmann.rendering.film.wavefront import Coverage
+from lippmann.rendering.request.tuning import TUNING as REQUEST
 from lippmann.runtime.row_threads import Bands
 
 if TYPE_CHECKING:
@@ -93,13 +94,13 @@ class Denoised:
         apart: Floats = (np.float32(0.25) * np.square(slope * (clean[0] - clean[1]))).mean(axis=2)
         left = [slope * (half - smooth) for half, smooth in zip(noisy, clean, strict=True)]
         common = (left[0] * left[1]).mean(axis=2)
-        limit = TUNING.hidden * max(1.0, ESTIMATE.few_samples / self._renderer.samples)
+        limit = TUNING.hidden * max(1.0, REQUEST.usual / self._renderer.samples)
         hidden = np.maximum(np.abs(left[0]), np.abs(left[1])).max(axis=2) > limit
         common[hidden] = np.float32(ESTIMATE.outlier_ratio) * apart[hidden]
         samples = self._renderer.squared_error()
         if samples.blur is not None:
             common += samples.blur
-        if self._renderer.samples < ESTIMATE.outliers_told_from:
+        if self._renderer.samples < REQUEST.fewest:
             # Too few batches to find outliers: part of the error is assumed to rest on them.
             samples = replace(samples, outliers=np.float32(TUNING.untold_outliers) * np.maximum(samples.values, 0))
         return PixelErrors(common + apart, None, samples, apart, samples.blur)

@@ -22,6 +22,7 @@ from lippmann.rendering.denoise.oidn import NETWORK_STEP, Effort, denoise
 from lippmann.rendering.denoise.tuning import TUNING
 from lippmann.rendering.film.feature_buffers import Guides, plan_guides, trace_guides
 from lippmann.rendering.film.wavefront import Coverage
+from lippmann.rendering.request.tuning import TUNING as REQUEST
 from lippmann.rendering.sharing.cross_lens import share_light
 from lippmann.rendering.sharing.cross_view import share_views
 from lippmann.rendering.sharing.tuning import TUNING as SHARING
@@ -186,7 +187,7 @@ def effort_of(kind: Denoiser, samples: int) -> Effort:
     """The effort that ``kind`` names; where it names none, that for the number of samples per pixel."""
     if kind in ("oidn-fast", "oidn-high"):
         return "fast" if kind == "oidn-fast" else "high"
-    return "high" if samples >= TUNING.high_from else "fast"
+    return "high" if samples >= REQUEST.usual else "fast"
 
 
 @dataclass(frozen=True, eq=False)

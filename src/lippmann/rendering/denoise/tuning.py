@@ -11,9 +11,6 @@ class DenoiseTuning:
 
     Attributes
     ----------
-    high_from:
-        Samples per pixel from which on a picture is worth the high effort: a run then takes the time of 12 rays per
-        pixel more than a fast one, for 0.7 dB on the average (docs/background/denoising.md).
     runs:
         Times of a run of the network that a picture of two halves takes, guides and shared light included.
     guide_samples:
@@ -27,14 +24,13 @@ class DenoiseTuning:
         A pixel that is brighter than its samples by so many times the halves' mean difference nearby is so by no
         accident: then the step of its code counts.
     hidden:
-        Codes by which samples are off that hide what is wrong in their pixel. With fewer than ``few_samples`` a single
+        Codes by which samples are off that hide what is wrong in their pixel. With fewer than the usual number a single
         one is farther off, and more likely all there is of its light: less is left out then (``estimate_coverage.py``).
     untold_outliers:
         Share of the samples' error that is taken to rest on outliers where too few batches tell them
         (docs/research/first-statements.md).
     """
 
-    high_from: int = 16
     runs: float = 3.0
     guide_samples: int = 8
     far_beyond_white: float = 8.0

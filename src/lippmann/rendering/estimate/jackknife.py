@@ -1,17 +1,15 @@
-"""The squared error of a picture made of batches, pixel by pixel, from the batches alone.
+"""Squared error of each pixel of a picture, by a jackknife over its batches of samples.
 
-Errors are those between codes, as :mod:`lippmann.metrics.mse_psnr` measures them, but noise lies in linear light, and
-codes bend and clip it: a pixel that one path of a thousand makes a hundred times too bright shows white. So three
-things are summed:
+Errors are those between codes, as :mod:`lippmann.metrics.mse_psnr` measures them. Noise is in linear light, and the
+transfer curve bends and clips it. Two terms are added:
 
-- The jackknife: how far the *code* of the mean moves when any one batch is left out. The mean without a batch is nearly
-  as good as the mean itself, so curve and clipping act on it as they do on the picture.
-- Less than that is true where samples are spread evenly: batches of one stream make up for each other. The difference
-  between the means of the two streams shows that, the differences between halves mixed of both do not; the former less
-  the latter is added.
+- The jackknife (Quenouille 1956, Tukey 1958): the variance of the *code* of the mean when any one batch is left out.
+  The mean without a batch is nearly as good as the mean itself, so curve and clipping act on both alike.
+- A correction for stratified samples, whose batches within one stream are negatively correlated: the squared difference
+  between the means of the two streams, less that between halves that mix both streams.
 
-Where single samples decide (a batch with a bright hit that no other has), the pixels that were *not* hit are wrong,
-too, and nothing in them says so. That part of the error is told apart as *outliers*, to be met with doubt.
+Where single samples decide (a firefly in one batch), the pixels that were *not* hit are wrong, too, and their own
+samples do not reveal it. This part of the error is returned apart as *outliers*.
 """
 
 from __future__ import annotations
@@ -28,12 +26,13 @@ from lippmann.color.transfer import Coding
 from lippmann.device.kernel_ops import encode, upload
 from lippmann.device.types import Bool, Color3f, Float
 from lippmann.rendering.estimate.tuning import TUNING
+from lippmann.rendering.request.tuning import TUNING as REQUEST
 
 Floats = NDArray[np.float32]
 
 
 def error_of_batches(sums: Floats, taken: Sequence[int], coding: Coding) -> tuple[Floats, Floats]:
-    """Expected squared error of the codes of the mean of all samples, averaged over the three channels.
+    """Estimated squared error of the code of each pixel's mean, averaged over the three channels.
 
     Parameters
     ----------
@@ -47,8 +46,8 @@ def error_of_batches(sums: Floats, taken: Sequence[int], coding: Coding) -> tupl
 
     Returns
     -------
-    ``(pixels,)`` errors, unbiased (and noisy: single ones may be negative) unless bright hits are rare, and the part of
-    them that outliers make up, at least 0.
+    ``(pixels,)`` errors, and the part of each that rests on outliers, at least 0. Errors are unbiased unless bright
+    hits are rare; single ones are noisy and may be negative.
     """
     pixels = sums.shape[1]
     # Opaque to the compiler, so that every round runs the same kernel.
@@ -80,12 +79,12 @@ class _Batches:
         self.count = sum(self.counts[1:], self.counts[0])
 
     def jackknife(self) -> tuple[Float, Float]:
-        """Squared error by leaving out one batch at a time, and what of it is outliers."""
+        """Jackknife estimate of the squared error, and the part of it that rests on outliers."""
         without = [
             encode((self.total - value) / dr.maximum(self.count - count, 1), self.coding)
             for value, count in zip(self.sums, self.counts, strict=True)
         ]
-        # Batches that hold nothing change nothing: they are no witnesses.
+        # Empty batches do not count.
         present = [dr.select(count > 0, mi.Float(1), mi.Float(0)) for count in self.counts]
         weight = sum(present[1:], present[0])
         mean = sum((code * p for code, p in zip(without, present, strict=True)), mi.Color3f(0)) / weight
@@ -98,21 +97,21 @@ class _Batches:
             largest = dr.maximum(largest, size)
         decides = largest > TUNING.outlier_share * (weight - 1) / weight * spread
         decides &= largest > TUNING.outlier_step**2 / 3
-        decides &= weight >= TUNING.outliers_told_from
+        decides &= weight >= REQUEST.fewest
         return error, dr.select(decides, error, 0)
 
     def evenness(self) -> Float:
-        """What the streams differ by less what halves mixed of both differ by."""
+        """Squared difference between the two streams, less the mean of that between halves that mix both."""
         streams, _ = self._difference(range(len(self.sums) // 2))
         mixed, number = mi.Float(0), mi.Float(0)
         for split in _mixed_halves(len(self.sums)):
             difference, known = self._difference(split)
             mixed += difference
             number += dr.select(known, mi.Float(1), mi.Float(0))
-        witnesses = sum((dr.select(count > 0, mi.Float(1), mi.Float(0)) for count in self.counts), mi.Float(0))
-        # In linear light the jackknife is the mean over all of the (batches - 1) ways to halve that do not overlap, the
-        # streams being one of them: with this weight, jackknife and evenness add up to what the streams say.
-        weight = (witnesses - 2) / dr.maximum(witnesses - 1, 1)
+        filled = sum((dr.select(count > 0, mi.Float(1), mi.Float(0)) for count in self.counts), mi.Float(0))
+        # In linear light the jackknife is the mean over (batches - 1) orthogonal ways to halve the batches, one of them
+        # by streams. With this weight, jackknife and evenness add up to the squared difference of the streams.
+        weight = (filled - 2) / dr.maximum(filled - 1, 1)
         return dr.select(number > 0, weight * (streams - mixed / dr.maximum(number, 1)), 0)
 
     def _difference(self, members: Sequence[int]) -> tuple[Float, Bool]:
@@ -128,7 +127,7 @@ class _Batches:
 
 
 def _mixed_halves(batches: int) -> list[tuple[int, ...]]:
-    """Halves that hold as much of one stream as of the other, uncorrelated with each other: Walsh's patterns."""
+    """Halves of the batches with equal parts of both streams, orthogonal to each other (Walsh functions)."""
     if batches == 2:
         return []
     streams = [k >= batches // 2 for k in range(batches)]
@@ -137,5 +136,5 @@ def _mixed_halves(batches: int) -> list[tuple[int, ...]]:
         half = tuple(k for k in range(batches) if bin(pattern & k).count("1") % 2 == 0)
         if len({streams[k] for k in half}) == 2:
             halves.append(half)
-    # Three of them know nearly as much as all.
+    # More of them hardly reduce the variance.
     return halves[:3]

@@ -1,7 +1,6 @@
-"""Estimates of the squared error of every pixel, and their sums over the parts of a picture.
+"""Estimated squared error of every pixel, and its sums over the parts of a picture.
 
-What is said of a picture (:mod:`lippmann.rendering.estimate.psnr`) follows from such sums alone. They add up over
-tiles.
+The PSNR of a picture (:mod:`lippmann.rendering.estimate.psnr`) follows from these sums alone, which add up over tiles.
 """
 
 from __future__ import annotations
@@ -14,8 +13,8 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
-#: The largest share of an error that is left out as blur of caustics that may be less than stated, see
-#: :mod:`lippmann.rendering.film.caustic_blur`.
+#: Largest share of an error that is ascribed to the blur of caustics, which is known as an upper bound only
+#: (:mod:`lippmann.rendering.film.caustic_blur`).
 MOST_LESS = 0.9
 
 
@@ -28,16 +27,14 @@ class PixelErrors:
     values:
         ``(H, W)`` float32, unbiased; single ones may be negative.
     outliers:
-        ``(H, W)`` float32 of at least 0: the part of ``values`` that rests on outliers; None if there is no
-        such thing. Of a denoised picture it is a part of ``apart``.
+        ``(H, W)`` float32 >= 0: the part of ``values`` that rests on outliers; None without outliers.
     samples:
         Of a denoised picture: the errors of the samples that it was made of.
     apart:
-        Of a denoised picture, ``(H, W)`` float32 of at least 0: the part of ``values`` that is no estimate, which is
-        what its halves differ by.
+        Of a denoised picture, ``(H, W)`` float32 >= 0: the variance, from the difference of its halves.
     blur:
-        ``(H, W)`` float32: the part of ``values`` that is blur of caustics, as an upper bound; None if there is no such
-        thing. Single ones may be negative.
+        ``(H, W)`` float32: the squared blur of caustics, as an upper bound; None without photons. Single values may be
+        negative.
     """
 
     values: Floats
@@ -47,7 +44,7 @@ class PixelErrors:
     blur: Floats | None = None
 
     def part(self, inside: slice | tuple[slice, slice]) -> PixelErrors:
-        """Those of some pixels."""
+        """The errors of some pixels."""
         outliers, apart, blur = (
             None if values is None else values[inside] for values in (self.outliers, self.apart, self.blur)
         )
@@ -57,8 +54,11 @@ class PixelErrors:
 
 @dataclass(frozen=True, eq=False)
 class ErrorSums:
-    """Sums over the pixels of each part, ``(parts,)`` each: their number, their estimates, the squares of what is
-    uncertain of those, what rests on outliers, what halves differ by, and blur."""
+    """Sums over the pixels of each part, ``(parts,)`` each.
+
+    ``pixels``: their number; ``values``, ``outliers``, ``apart``, ``blur``: sums of the fields of
+    :class:`PixelErrors`; ``squares``: sum of the squares of ``values``, less ``apart``, which has no uncertainty.
+    """
 
     pixels: Real
     values: Real
@@ -69,11 +69,11 @@ class ErrorSums:
 
     @classmethod
     def none(cls, parts: int, pixels: NDArray[np.generic] | int = 0) -> ErrorSums:
-        """Sums of so many parts to which nothing was added yet, with ``pixels`` in each."""
+        """Sums of 0 for so many parts, with ``pixels`` in each."""
         return cls(np.full(parts, pixels, dtype=np.float64), *np.zeros((len(fields(cls)) - 1, parts)))
 
     def add(self, owner: NDArray[np.integer], errors: PixelErrors) -> None:
-        """Add the estimates of some pixels, any shape, to the parts that ``owner`` names; not to their number."""
+        """Add the errors of some pixels to the parts that ``owner`` names; ``pixels`` stays as it is."""
         owner = owner.ravel()
         uncertain = values = errors.values.astype(np.float64).ravel()
         self.values[:] += self._sum(owner, values)
@@ -88,16 +88,16 @@ class ErrorSums:
         self.squares[:] += self._sum(owner, np.square(uncertain))
 
     def add_sums(self, parts: NDArray[np.generic], sums: ErrorSums) -> None:
-        """Add sums of the parts with these numbers, each at most once; their numbers of pixels, too."""
+        """Add the sums of other pixels, with their number; ``parts`` are the indices of their parts, each once."""
         for field in fields(self):
             getattr(self, field.name)[parts] += getattr(sums, field.name)
 
     def share_less(self, mean: float) -> float:
-        """By what share of a ``mean`` over all pixels that may be less at the most."""
+        """Largest share by which blur may overstate the ``mean`` error of all pixels."""
         return float(_share_less(self.blur.sum() / self.pixels.sum(), mean))
 
     def shares_less(self) -> Real:
-        """``(parts,)``: the same of each part's own sum."""
+        """``(parts,)``: the same share for each part."""
         return np.asarray(_share_less(self.blur, np.maximum(self.values, self.blur + 1e-30)))
 
     def _sum(self, owner: NDArray[np.integer], values: Real) -> Real:

@@ -1,17 +1,16 @@
-"""How good a picture is by its own account: PSNR with a 95 % interval, of the whole and of its worst micro-image.
+"""PSNR of a picture with a 95 % interval, of the whole and of its worst micro-image, estimated without a reference.
 
-It starts from estimates of each pixel's squared error that come out of the rendering itself; no reference is needed.
-PSNR is that of :mod:`lippmann.metrics`: the codes' mean squared error over all channels, in dB.
+The input is the squared error of each pixel, estimated from the samples themselves. PSNR is that of
+:mod:`lippmann.metrics`: from the mean squared error of the codes over all channels, in dB.
 
-Three things stand between the estimates and a statement about a micro-image:
+Three effects are accounted for:
 
-- The estimates are noisy, and so is the error itself: a picture's error is one draw of what the rendering could have
-  done. Both add to the interval.
-- The worst of many is not the one with the worst estimate. Each micro-image's estimate is drawn towards what its
-  neighbours say, as far as its own noise asks for (empirical Bayes), then pictures that fit are drawn
-  at random, and the worst of each is looked at.
-- Light that few paths find is missing from most pixels before it shows in any. Errors that rest on outliers widen the
-  interval to the worse side.
+- The estimates are noisy, and the error of one picture is a random variable itself. Both variances add.
+- The worst micro-image is not the one with the worst estimate. Each estimate is shrunk towards its neighbours', the
+  more the noisier it is (empirical Bayes). The error of the worst is then the maximum over random draws from these
+  posteriors.
+- Light that few paths find is missing from most pixels before it appears in any. So the share of the error that rests
+  on outliers widens the interval towards larger errors.
 """
 
 from __future__ import annotations
@@ -31,23 +30,23 @@ from lippmann.display.pixel_window import PixelWindow
 from lippmann.image.micro_images import lens_indices
 from lippmann.rendering.estimate.pixel_errors import ErrorSums, parts_with_pixels
 from lippmann.rendering.estimate.tuning import TUNING
+from lippmann.rendering.request.tuning import TUNING as REQUEST
 
 Real = NDArray[np.float64]
 
 #: The layer of a picture with the estimated squared error of each pixel's code.
 ERROR_LAYER = "error"
-#: PSNR in dB beyond which nothing is told apart: a tenth of the step of 16-bit codes.
-CEILING = 116.0
+#: Least squared error that is stated: that of a tenth of the step of 16-bit codes.
+FLOOR = (0.1 / 65535) ** 2
 NORMAL_95 = NormalDist().inv_cdf(0.975)
-_FLOOR = 10 ** (-CEILING / 10)
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A picture's PSNR in dB by its own account, each with the ends of its 95 % interval.
+    """Estimated PSNR of a picture in dB, each value with the ends of its 95 % interval.
 
     ``psnr``: of all pixels; ``worst``: of the worst micro-image, which is probably lens ``worst_lens`` (column, row). A
-    picture without any noise at all has the PSNR ``CEILING``.
+    picture without noise has the squared error ``FLOOR``, 116 dB.
     """
 
     psnr: float
@@ -87,12 +86,12 @@ class Estimate:
         return self.in_words()
 
     def among_mirrors(self, samples: int) -> Estimate:
-        """The same of a picture of ``samples`` in which sharp surfaces may mirror emitters.
+        """The estimate for a picture of ``samples`` per pixel in which mirrors may show small emitters.
 
-        All of few samples may have missed an emitter in a mirror, or a place that shines by way of one, and nothing in
-        them tells: both intervals reach down as much farther as such statements were found to be too good.
+        Few samples may all miss a mirrored emitter or its caustic, and then their variance does not reveal it. So both
+        intervals are extended downwards by the largest overestimate that was measured.
         """
-        if samples >= TUNING.few_samples:
+        if samples >= REQUEST.usual:
             return self
         whole, worst = TUNING.doubt_among_mirrors
         return replace(self, psnr_low=max(0.0, self.psnr_low - whole), worst_low=max(0.0, self.worst_low - worst))
@@ -100,11 +99,11 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """What a picture is judged by, part by part: its micro-images, or the views of a quilt.
+    """The parts of a picture whose errors are estimated one by one: its micro-images, or the views of a quilt.
 
-    ``owner`` ``(H, W)`` holds the flat index of every pixel's part in a grid of ``rows`` x ``columns`` of them, in
-    which neighbours are alike. Every part has ``known`` more pixels (a number for all, or one each), that are not here
-    and hold no error.
+    ``owner`` ``(H, W)`` holds the index of every pixel's part, in row order of a grid of ``rows`` x ``columns`` parts;
+    neighbours in this grid are similar. Every part has ``known`` more pixels (a number for all, or one each) outside
+    the window, without error.
     """
 
     owner: NDArray[np.integer]
@@ -132,27 +131,27 @@ class Parts:
 
 
 def estimate_plain(sums: ErrorSums, grid: tuple[int, int]) -> Estimate:
-    """PSNR of the whole and of the worst of the parts, which lie in a ``grid`` of rows and columns.
+    """PSNR of a picture that is not denoised, and of its worst part; ``grid`` is the parts' rows and columns.
 
-    The square of the difference of two halves of a picture estimates its error. For normal noise of variance s it is
-    distributed as chi^2 with one degree of freedom: its own variance is 2 s^2, that of the true error 2 s^2 as well,
-    and its mean square 3 s^2. So either varies by two thirds of the mean square.
+    The squared difference of two half-buffers estimates the squared error. For normal noise of variance s it is
+    distributed as s chi^2 with one degree of freedom. Its variance is 2 s^2, that of the true squared error 2 s^2 as
+    well, and its second moment 3 s^2. So each variance is two thirds of the second moment.
     """
     index, sums = parts_with_pixels(sums)
     count, squares = sums.pixels, 2 / 3 * sums.squares
     pixels, outliers = float(count.sum()), sums.outliers / count
     deviation = math.sqrt(float(squares.sum())) / pixels
-    # Noise may bring the mean below zero, which tells as much as its deviation does.
-    average = max(float(sums.values.sum()) / pixels, deviation, _FLOOR)
+    # Noise may make the mean negative; the standard deviation is then the best estimate.
+    average = max(float(sums.values.sum()) / pixels, deviation, FLOOR)
     spread = NORMAL_95 * math.hypot(math.sqrt(math.log1p(2 * (deviation / average) ** 2)), TUNING.model_uncertainty)
     doubt = 1 + TUNING.outlier_doubt * min(1.0, float(sums.outliers.sum()) / (average * pixels))
     ends = average * math.exp(spread) * doubt, average * math.exp(-spread) * (1 - sums.share_less(average))
 
     mean = sums.values / count
-    # The mean square of one part is noisy itself, so it leans on that of its neighbours.
+    # The second moment of one part is noisy itself: its neighbours' is a prior.
     (near, squares_near), neighbours = neighbourhood(np.stack([mean, squares / count]), index, grid)
     noise = (squares + TUNING.lean * squares_near) / (count + TUNING.lean) / count
-    # What neighbours say is drawn to the mean of all, and what a part says to that.
+    # Means of neighbours are shrunk towards the mean of all, and each part towards its neighbours.
     around = shrink(near, np.full_like(near, average), noise / np.maximum(neighbours, 1))[0]
     expected, trust = shrink(mean, np.maximum(around, 1e-3 * average), noise)
     doubted = expected + TUNING.outlier_doubt * np.clip(outliers, 0, expected)
@@ -161,14 +160,14 @@ def estimate_plain(sums: ErrorSums, grid: tuple[int, int]) -> Estimate:
     draws = parts.draws()
     less = draws * (1 - sums.shares_less()[parts.candidates, None])
     model = math.exp(TUNING.model_uncertainty)
-    # Parts that are worse pull their neighbours, so the better side goes farther than 0.025.
+    # Shrinkage raises the estimates beside a bad part, so the lower quantile is 0.01, not 0.025.
     worst = *np.quantile(draws.max(axis=0), (0.5, 0.975)) * (1, model), np.quantile(less.max(axis=0), 0.01) / model
     return make_estimate((average, *ends, *worst), int(index[np.argmax(expected)]), grid)
 
 
 def make_estimate(errors: Sequence[float], worst: int, grid: tuple[int, int]) -> Estimate:
-    """From the six squared errors in the order of the fields, and the flat index of the worst part."""
-    decibels = -10 * np.log10(np.maximum(errors, _FLOOR))
+    """An :class:`Estimate` from six squared errors in the order of its fields, and the index of the worst part."""
+    decibels = -10 * np.log10(np.maximum(errors, FLOOR))
     whole, whole_low, whole_high, part, part_low, part_high = (float(each) for each in decibels)
     row, column = divmod(worst, grid[1])
     return Estimate(whole, whole_low, whole_high, part, part_low, part_high, (column, row))
@@ -176,7 +175,11 @@ def make_estimate(errors: Sequence[float], worst: int, grid: tuple[int, int]) ->
 
 @dataclass(frozen=True, eq=False)
 class PartErrors:
-    """Parts with pixels: ``index``, ``expected`` squared error, that ``doubted``, ``variance`` of its logarithm."""
+    """Posterior squared errors of the parts with pixels, ``(parts,)`` each.
+
+    ``index``: their numbers in the grid; ``expected``: the mean; ``doubted``: an upper mean, where outliers may have
+    been missed; ``variance``: of the logarithm.
+    """
 
     index: NDArray[np.intp]
     expected: Real
@@ -185,17 +188,17 @@ class PartErrors:
 
     @cached_property
     def candidates(self) -> NDArray[np.intp]:
-        """The places of those that may be the worst."""
+        """Positions of the parts that may be the worst, the likeliest first."""
         reach = np.log(self.doubted) + 2.5 * np.sqrt(self.variance)
-        return np.argsort(-reach)[:1024]  # of very many only so many can be the worst
+        return np.argsort(-reach)[:1024]  # bounds the memory of the draws
 
     def draws(self) -> Real:
-        """``(candidates, draws)``: true squared errors of the :attr:`candidates`."""
+        """Random draws from the posteriors of the :attr:`candidates`, ``(candidates, draws)`` squared errors."""
         best = self.candidates
         random = np.random.default_rng(1)
         shape = (len(best), TUNING.draws)
         spread = np.sqrt(self.variance[best])[:, None]
-        # The logarithm of a lognormal's mean lies above its median's by half the variance.
+        # The mean of a lognormal distribution is exp(variance / 2) times its median.
         middle = np.log(self.expected)[best][:, None] - 0.5 * np.square(spread)
         doubt = (np.log(self.doubted) - np.log(self.expected))[best][:, None]
         chance = np.square(random.random(TUNING.draws))
@@ -203,17 +206,17 @@ class PartErrors:
 
 
 def shrink(measured: Real, around: Real, noise: Real) -> tuple[Real, Real]:
-    """Expected errors of parts by empirical Bayes, and how far the measurement is trusted, 0 to 1.
+    """Empirical Bayes: expected squared errors of parts, and the weights of their measurements, 0 to 1.
 
-    What is ``measured`` with a variance of ``noise`` is drawn towards what lies ``around``, the more the less parts
-    differ from that beyond their noise: by the median, as a few differ from all. That of squared normal values is 0.455
-    of their variance. Where next to nothing lies ``around``, relative differences tell nothing.
+    Each ``measured`` value, with variance ``noise``, is shrunk towards the prior mean ``around``. The prior variance is
+    relative to ``around``, and estimated as a median over all parts, which a few exceptional parts do not move: the
+    median of squared normal values is 0.455 of their variance. Parts with a very small ``around`` are left out of it.
 
-    Where a part is worse by more than three deviations of its noise, it is no accident but another sight. A part that
-    seems better may have had luck: of few pixels and samples, none may have met what the others met.
+    A part that is worse by more than three standard deviations gets a prior variance of its own: it shows something
+    else than its neighbours. A part that is better does not: its few pixels may have missed what its neighbours met.
     """
-    telling = around > 0.25 * around.mean()
-    beyond = (np.square(measured - around) / 0.455 - noise)[telling] / np.square(around[telling])
+    is_clear = around > 0.25 * around.mean()
+    beyond = (np.square(measured - around) / 0.455 - noise)[is_clear] / np.square(around[is_clear])
     usual = max(0.02, float(np.median(beyond))) * np.square(around)
     other = np.where(measured > around, np.square(measured - around) - 9 * noise, 0.0)
     between = np.maximum(usual, other)
@@ -222,9 +225,9 @@ def shrink(measured: Real, around: Real, noise: Real) -> tuple[Real, Real]:
 
 
 def neighbourhood(values: Real, index: NDArray[np.intp], grid: tuple[int, int]) -> tuple[Real, Real]:
-    """Means of ``(n, lenses)`` values over the up to eight lenses around each, and how many these are.
+    """Means of ``(n, parts)`` values over the up to eight neighbours of each part in the grid, and their number.
 
-    A lens without neighbours is its own.
+    A part without neighbours has its own value.
     """
     known = np.zeros((len(values) + 1, grid[0] * grid[1]))
     known[:-1, index], known[-1, index] = values, 1

@@ -18,15 +18,11 @@ class EstimateTuning:
         A hit is an outlier if it makes up this part of the largest share of what the batches differ by that one can
         have, ``(batches - 1) / batches``, and moves the code by as much as the step: below it the curve is nearly
         straight, and what is missing elsewhere is small as well.
-    outliers_told_from:
-        Of fewer batches any hit may be an outlier, and none is told to be: denoised pictures are first assessed with as
-        many samples per pixel.
     outlier_doubt:
         By how much more than what outliers show the error may be: measured where they are most of it.
-    few_samples, doubt_among_mirrors:
-        Samples per pixel with fewer of which all may miss rare light, such as mirrored emitters: plain pictures are
-        first assessed with as many, for estimates of fewer are up to 7 dB too good. Among mirrors, dB by which the PSNR
-        of a picture and of its worst micro-image may then be lower than stated.
+    doubt_among_mirrors:
+        dB by which the PSNR of a picture and of its worst micro-image may be lower than stated among mirrors, where
+        fewer than the usual number of samples may all miss a mirrored emitter.
     model_uncertainty:
         What curve and clipping leave of bias, as a share of the error.
     often_better, worst_often_better:
@@ -54,9 +50,7 @@ class EstimateTuning:
 
     outlier_share: float = 0.8 * 8 / 7
     outlier_step: float = 0.15
-    outliers_told_from: int = 4
     outlier_doubt: float = 0.8
-    few_samples: int = 16
     doubt_among_mirrors: tuple[float, float] = (5.0, 7.0)
     model_uncertainty: float = 0.08
     often_better: float = 0.8

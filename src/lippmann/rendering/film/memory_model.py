@@ -16,7 +16,7 @@ PREFERRED_LANES, PREFERRED_LANES_OF_GPU = 1 << 20, 1 << 22
 #: Fewer lanes than this leave the threads idle while kernels start.
 SMALLEST_LANES = 1 << 14
 
-#: Batches of samples where the memory allows: their number limits how well rare bright light is told from steady noise.
+#: Batches of samples where the memory allows: with more of them, fireflies stand out better against steady noise.
 MOST_BATCHES = 8
 
 #: Three numbers in single precision: linear RGB.

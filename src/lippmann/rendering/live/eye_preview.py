@@ -15,8 +15,9 @@ from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.picture import placed_options
 from lippmann.rendering.preview import Preview
-from lippmann.rendering.request.plan import BUDGET, resolve
+from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.request.tuning import TUNING
 from lippmann.rendering.session import open_session
 from lippmann.runtime import machine
 from lippmann.runtime.engine_lock import exclusive
@@ -102,7 +103,7 @@ def render_eye_preview(
 def _choose_samples(asked: RenderRequest, resolved: RenderRequest, pixels: int) -> int:
     if asked.spp is not None or resolved.spp == 1 or resolved.integrator not in POOLED_LIGHT:
         return resolved.samples
-    return min(max(1, BUDGET.values // max(1, pixels)), 64)
+    return min(max(1, TUNING.values // max(1, pixels)), 64)
 
 
 def _denoises(asked: RenderRequest, resolved: RenderRequest, scene: Scene) -> bool:

@@ -17,11 +17,11 @@ from lippmann.device.sobol import named_seed
 from lippmann.rendering.denoise.noisy_blend import weigh_samples
 from lippmann.rendering.denoise.oidn import denoise
 from lippmann.rendering.denoise.tuning import TUNING as DENOISE
-from lippmann.rendering.estimate.tuning import TUNING as ESTIMATE
 from lippmann.rendering.film.batched_picture import STREAMS
 from lippmann.rendering.live.develop import develop, develop_picture
 from lippmann.rendering.live.live_tracer import Lanes
 from lippmann.rendering.live.live_view import LiveFrame, PlacedView
+from lippmann.rendering.request.tuning import TUNING as REQUEST
 from lippmann.runtime import machine
 from lippmann.runtime.engine_lock import exclusive
 
@@ -141,7 +141,7 @@ def _denoised(
     """
     albedo, normal = guides
     mean = np.asarray((noisy[0] + noisy[1]) / 2, np.float32)
-    if samples < ESTIMATE.outliers_told_from:
+    if samples < REQUEST.fewest:
         yield denoise(mean, albedo, normal, effort="fast", threads=threads)
         return
     clean = []

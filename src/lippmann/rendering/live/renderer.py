@@ -22,6 +22,7 @@ from lippmann.rendering.live.live_view import LiveFrame, LiveView, PlacedView
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session
+from lippmann.rendering.transport.tuning import TUNING as TRANSPORT
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.matrices import rotation_of
 from lippmann.scene.scene import Scene
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
     from lippmann.rendering.live.scene_kernels import SceneKernels
 
 Floats = NDArray[np.float32]
-
-#: Lanes of a step of a frame: on two cores as long as a whole frame of an eye, so that such frames can interleave.
-STEP_LANES = 1 << 18
 
 
 class LiveRenderer:
@@ -134,7 +132,7 @@ class LiveRenderer:
             stand = self._stand(kernels, display, view, _moving(view.request), seconds)
             exposure = kernels.expose(display, stand.request, stand.placement, measure=False)
             tracer = kernels.tracer(display, stand.request)
-            count, step = len(stand.pixels.column), min(STEP_LANES, kernels.most_lanes)
+            count, step = len(stand.pixels.column), min(TRANSPORT.lanes, kernels.most_lanes)
             values, heights = np.empty((count, 3), np.float32), np.empty(count, np.float32)
         for start in range(0, count, step):
             if start:
@@ -142,8 +140,8 @@ class LiveRenderer:
             with exclusive(), _timed(seconds, "trace"):
                 stand.light_up(exposure)
                 lanes = Lanes(stand.pixels, slice(start, start + step))
-                found = tracer.trace(lanes, stand.placed, seed=stand.request.seed)
-                values[lanes.part], heights[lanes.part] = found.sums[0], found.height
+                traced = tracer.trace(lanes, stand.placed, seed=stand.request.seed)
+                values[lanes.part], heights[lanes.part] = traced.sums[0], traced.height
         self._latest, self._height = stand, heights
         with _timed(seconds, "encode"):
             codes = develop(values, stand.pixels, stand.request)
@@ -208,8 +206,8 @@ class LiveRenderer:
             raise UsageError(f"({u:g}, {v:g})", where="pick", rule="must be a place in the picture, 0 to 1 each")
         heights = self.heights(view)
         height, width = heights.shape
-        found = float(heights[min(int(v * height), height - 1), min(int(u * width), width - 1)])
-        return found if np.isfinite(found) else None
+        height_there = float(heights[min(int(v * height), height - 1), min(int(u * width), width - 1)])
+        return height_there if np.isfinite(height_there) else None
 
     # ---- Stages ----------------------------------------------------------------------------------------------------
 

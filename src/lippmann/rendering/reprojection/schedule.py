@@ -8,6 +8,7 @@ traced in the finer step that first meets it. All lenses of a step are traced at
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,9 +61,9 @@ def odd_and_even(columns: int, rows: int) -> tuple[Lenses, Step]:
 def _refine_axis(places: Lenses) -> tuple[Lenses, list[Step]]:
     """Key lenses among ``places`` along one axis, the last one included, and a step for each smaller stride."""
     count = len(places)
-    done = np.union1d(np.arange(0, count, TUNING.strides[0]), [count - 1])
+    done = np.union1d(np.arange(0, count, TUNING.key_stride), [count - 1])
     keys, steps = places[done], []
-    for stride in TUNING.strides[1:]:
+    for stride in (math.isqrt(TUNING.key_stride), 1):
         new = np.setdiff1d(np.arange(0, count, stride), done)
         after = np.searchsorted(done, new)
         steps.append(Step(places[new], places[np.stack([done[after - 1], done[after]], axis=1)]))

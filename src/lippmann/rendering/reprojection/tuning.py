@@ -13,10 +13,10 @@ class Tuning(NamedTuple):
 
     Attributes
     ----------
-    strides:
-        Distances of the micro-images, in lenses, from the first round (keys) to the last. A stride of 16 instead of 2
-        traces a quarter fewer pixels of 512x512 at the same PSNR; with quarters instead of halves of it there are half
-        as many rounds, for 0 to 2 % more pixels of the picture traced.
+    key_stride:
+        Lenses from one key micro-image to the next; in two more rounds its root, and 1. A stride of 16 instead of 2
+        traces a quarter fewer pixels of 512x512 at the same PSNR; halving it in each round takes twice the rounds for 0
+        to 2 % fewer traced pixels.
     one_surface:
         Neighbouring pixels see one surface if their disparities differ by at most this part of the larger: a surface
         that turns away from the viewer by up to 75 degrees, on a display with a field of 18 degrees and 8 pixels under
@@ -43,7 +43,7 @@ class Tuning(NamedTuple):
         Pixels to either side of such a pixel that are all traced.
     """
 
-    strides: tuple[int, int, int] = (16, 4, 1)
+    key_stride: int = 16
     one_surface: float = 0.2
     one_height: float = 0.06
     one_probed_surface: float = 0.3

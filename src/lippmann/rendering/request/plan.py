@@ -30,63 +30,12 @@ from lippmann.options.choices import (
 from lippmann.options.forms import Form
 from lippmann.options.light import LightOptions
 from lippmann.rendering.request.preconditions import check, check_off_surfaces
-from lippmann.rendering.request.render_request import DEFAULT_SPP, Choice, RenderPlan, RenderRequest
+from lippmann.rendering.request.render_request import Choice, RenderPlan, RenderRequest
+from lippmann.rendering.request.tuning import TUNING
 from lippmann.runtime import machine
 from lippmann.scene.scene import Scene
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class SampleBudget:
-    """Tuned constants of the number of samples where none is asked for.
-
-    Attributes
-    ----------
-    values:
-        Samples of a pooled picture, of all its pixels together: half a second of two cores (``defaults.py``).
-    fewest, most:
-        Least and most samples per pixel (or sub-pixel) of a pooled picture. With fewer than 4 the worst micro-images
-        are noisy; more than 16 have to be asked for (``docs/research/equal-time.md``).
-    fewest_of_many, many:
-        Least samples per sub-pixel of pictures of more than ``many`` sub-pixels.
-    reserve, most_in_reserve:
-        Factor on the samples up to which a picture that is not clean takes more, and the most samples of all pixels
-        together that this may come to: minutes of two cores.
-    """
-
-    values: int = 1 << 20
-    fewest: int = 4
-    most: int = 16
-    fewest_of_many: int = 2
-    many: int = 1 << 24
-    reserve: int = 8
-    most_in_reserve: int = 200_000_000
-
-
-BUDGET = SampleBudget()
-
-
-@dataclass(frozen=True)
-class FinalPicture:
-    """Goals of a picture of the effort ``final``.
-
-    Attributes
-    ----------
-    quality:
-        PSNR in dB, by its own estimate: noise of 2.5 codes of 8 bits, which a print hides (``goals.py``).
-    most:
-        Most samples per pixel, with which it stops short of the quality.
-    samples:
-        Samples per pixel where no estimate says when to stop: tiles, forecasts, plain pictures, reprojection.
-    """
-
-    quality: float = 40.0
-    most: int = 256
-    samples: int = 64
-
-
-FINAL = FinalPicture()
 
 
 def make_plan(
@@ -319,19 +268,19 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
     request = facts.request
     classic = facts.scene.classic if facts.integrator == "classic" else None
     of_file = 1 + (classic.camera.antialiasing if classic is not None and facts.form == "preview" else 0)
-    fewest = BUDGET.fewest_of_many if subpixels and (values or 0) > BUDGET.many else BUDGET.fewest
-    of_budget = 1 << max(round(math.log2(BUDGET.values / (values or BUDGET.values))), 0)
-    pooled = f"about a million for the picture, but {fewest} to {BUDGET.most} of each pixel"
+    fewest = TUNING.fewest // 2 if subpixels and (values or 0) > TUNING.many else TUNING.fewest
+    of_budget = 1 << max(round(math.log2(TUNING.values / (values or TUNING.values))), 0)
+    pooled = f"about a million for the picture, but {fewest} to {TUNING.usual} of each pixel"
     is_final = request.effort == "final"
     usual = _first(
         (request.spp is not None, request.spp, ASKED),
         (request.is_open_ended, None, "as many as the goal takes"),
         (facts.is_one_ray, 1, "one ray through each pixel's middle shows it"),
-        (facts.is_final(method), FINAL.most, "a final picture, at most"),
-        (is_final, FINAL.samples, "a final picture, where no quality can be worked for"),
+        (facts.is_final(method), TUNING.final_most, "a final picture, at most"),
+        (is_final, TUNING.final_samples, "a final picture, where no quality can be worked for"),
         (classic is not None, of_file, "as the scene's file says"),
-        (method != "pooled" or values is None, DEFAULT_SPP, "the usual number where light is not pooled"),
-        (True, min(max(of_budget, fewest), BUDGET.most), pooled),
+        (method != "pooled" or values is None, TUNING.usual, "the usual number where light is not pooled"),
+        (True, min(max(of_budget, fewest), TUNING.usual), pooled),
     )
     is_same = usual.value == 1 and not facts.is_denoised_draft
     of_draft = "a draft" + is_same * f" takes as many samples as the default: {usual.reason}"
@@ -340,7 +289,7 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
 
 def _quality(facts: _Facts, method: Method) -> Choice[float | None]:
     return _first(
-        (facts.is_final(method), FINAL.quality, "a final picture"),
+        (facts.is_final(method), TUNING.final_quality, "a final picture"),
         (facts.request.quality is not None, facts.request.quality, ASKED),
         (True, None, "none was asked for"),
     )
@@ -350,7 +299,7 @@ def _reserve(facts: _Facts, method: Method, samples: int | None, values: int | N
     is_given = facts.request.spp is not None or facts.request.effort != "normal" or samples is None
     is_other = facts.form not in ("picture", "forecast") or method != "pooled" or values is None
     spent = (values or 1) * (samples or 1)
-    factor = min(BUDGET.reserve, BUDGET.most_in_reserve // spent)
+    factor = min(TUNING.reserve, TUNING.most_in_reserve // spent)
     return _first(
         (is_given, None, "the number of samples, or the goal, was asked for"),
         (is_other, None, "a pooled picture in one piece has one"),

@@ -14,6 +14,7 @@ from lippmann.options.choices import ASKED, Caustics, Denoiser, Integrator, Meth
 from lippmann.options.option import Options, options_of
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.quality import MachineOptions, QualityOptions
+from lippmann.rendering.request.tuning import TUNING
 from lippmann.scene.placement import Placement, placement_of
 
 if TYPE_CHECKING:
@@ -64,17 +65,17 @@ class RenderPlan:
     caustics: Choice[Caustics]
     pilot: Mapping[str, Choice[object]] = field(default_factory=dict)
 
-    def with_pilot(self, told: Mapping[str, object]) -> RenderPlan:
+    def with_pilot(self, results: Mapping[str, object]) -> RenderPlan:
         """The plan with the choices of a pilot, whose results have the names of :data:`PILOT_REASONS`."""
-        open_ended: dict[str, object] = {}
+        chosen: dict[str, object] = {}
         if self.exposure.value == "auto":
-            open_ended["exposure"] = told.get("exposure", 0.0)
+            chosen["exposure"] = results.get("exposure", 0.0)
         if self.caustics.value == "auto":
-            open_ended["caustics"] = told.get("caustics", "none")
-        others = {name: told[name] for name in PILOT_REASONS if name in told and name not in ("exposure", "caustics")}
-        found = {**open_ended, **others}
-        reasons = {**PILOT_REASONS, **({"caustics": NO_CAUSTICS} if found.get("caustics") == "none" else {})}
-        return replace(self, pilot={name: Choice(value, reasons[name]) for name, value in found.items()})
+            chosen["caustics"] = results.get("caustics", "none")
+        others = [name for name in PILOT_REASONS if name in results and name not in ("exposure", "caustics")]
+        chosen |= {name: results[name] for name in others}
+        reasons = {**PILOT_REASONS, **({"caustics": NO_CAUSTICS} if chosen.get("caustics") == "none" else {})}
+        return replace(self, pilot={name: Choice(value, reasons[name]) for name, value in chosen.items()})
 
     @property
     def entries(self) -> dict[str, Choice[object]]:
@@ -115,10 +116,6 @@ def format_value(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-#: Samples per pixel where none are asked for and light is not pooled.
-DEFAULT_SPP = 16
 
 
 @dataclass(frozen=True)
@@ -169,8 +166,7 @@ class RenderRequest(MachineOptions, QualityOptions):
     def reason(self) -> str:
         """The method and the reason for it, where it was decided by the plan; else empty."""
         plan = self.plan
-        is_told = plan is None or plan.method.reason == ASKED
-        return "" if is_told or plan is None else f"{plan.method.value}: {plan.method.reason}"
+        return "" if plan is None or plan.method.reason == ASKED else f"{plan.method.value}: {plan.method.reason}"
 
     @property
     def spp_reserve(self) -> int | None:
@@ -217,7 +213,7 @@ class RenderRequest(MachineOptions, QualityOptions):
     @property
     def samples(self) -> int:
         """Samples per pixel of a picture without a goal."""
-        return DEFAULT_SPP if self.spp is None else self.spp
+        return TUNING.usual if self.spp is None else self.spp
 
     @property
     def surfaces(self) -> int:

@@ -134,8 +134,8 @@ class _Picture:
         per_height = 1 / (dr.abs(z) * TUNING.of_height + self._gap)
         per_light = self._stop / (1e-3 + dr.squared_norm(light))  # finite in the dark
         # Lenses to either side that see the point, at most.
-        seen_by = dr.select(is_flat, 0, mi.Int32(dr.minimum(dr.abs(z) / self._gap + 2, 1e6)))
-        reach_i, reach_j = dr.minimum(reach_i, seen_by), dr.minimum(reach_j, seen_by)
+        reach_z = dr.select(is_flat, 0, mi.Int32(dr.minimum(dr.abs(z) / self._gap + 2, 1e6)))
+        reach_i, reach_j = dr.minimum(reach_i, reach_z), dr.minimum(reach_j, reach_z)
 
         total, color = mi.Float(0), self._light_type(0)
         di, dj = -reach_i, -reach_j
@@ -171,8 +171,8 @@ class _Picture:
             center = dr.gather(mi.Point2f, self._centers, other, is_lens)
             u = column + 0.5 + (center.x - own_center.x) * shift
             v = row + 0.5 + (center.y - own_center.y) * shift
-            is_seen = is_lens & (u >= -1) & (u < columns + 1) & (v >= -1) & (v < rows + 1)
-            if dr.hint(is_seen, exclude=[other, u, v, rows, columns, z, per_height, per_light, normal, light]):
+            is_near = is_lens & (u >= -1) & (u < columns + 1) & (v >= -1) & (v < rows + 1)
+            if dr.hint(is_near, exclude=[other, u, v, rows, columns, z, per_height, per_light, normal, light]):
                 x, y = mi.Int32(dr.floor(u)), mi.Int32(dr.floor(v))
                 for step_y, step_x in product((-1, 0, 1), repeat=2):
                     rx, ry = x + step_x, y + step_y

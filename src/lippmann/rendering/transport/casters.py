@@ -110,8 +110,8 @@ def _may_be_sharp(bsdf: mi.BSDF) -> bool:
 
 
 def _box_about(shape: mi.Shape) -> NDArray[np.float64]:
-    found = shape.bbox()
-    low, high = np.array(found.min, dtype=float).ravel(), np.array(found.max, dtype=float).ravel()
+    box = shape.bbox()
+    low, high = np.array(box.min, dtype=float).ravel(), np.array(box.max, dtype=float).ravel()
     margin = TUNING.rounding * float(np.linalg.norm(high - low))
     return np.concatenate([low - margin, high + margin])
 
@@ -151,9 +151,9 @@ class CasterPoints:
 
     def reference(self) -> SurfaceInteraction3f:
         """The points as reference points for emitter sampling."""
-        found = dr.zeros(mi.SurfaceInteraction3f, dr.width(self.p))
-        found.p, found.n = self.p, mi.Normal3f(self._n)
-        return found
+        reference = dr.zeros(mi.SurfaceInteraction3f, dr.width(self.p))
+        reference.p, reference.n = self.p, mi.Normal3f(self._n)
+        return reference
 
     def cosine(self, si: SurfaceInteraction3f, toward: Vector3f) -> Float:
         """Cosine between the sampled surface's normal and ``toward``; 0 for rays that enter a box.

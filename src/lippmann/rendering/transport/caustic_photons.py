@@ -38,7 +38,7 @@ def no_photons() -> PhotonMap:
 
 
 def emissions(samples: int) -> int:
-    """Emissions of each half for ``samples`` samples in all, so that noise and blur of caustics fall alike."""
+    """Photon emissions per half-buffer for ``samples`` samples in all; noise and blur then fall at the same rate."""
     return round(OF_POWER * math.pow(samples, 2 / 3))
 
 

@@ -88,10 +88,8 @@ class EmitterRays:
         self._density[self._two_sided] /= 2
 
     def densities(self, chances: NDArray[np.float64]) -> Floats:
-        """Ray densities, indexed by an emitter's number in Dr.Jit's registry; ``chances`` are those of the
-        :attr:`senders`.
-
-        Negative for two-sided emitters.
+        """Rays per emitter and unit of its density, by the emitter's number in Dr.Jit's registry; negative where it is
+        two-sided. ``chances`` are the probabilities of the :attr:`senders`.
         """
         values = np.zeros(len(self._density))
         values[self.senders] = (np.where(self._two_sided, -1, 1) * self._density)[self.senders] * chances

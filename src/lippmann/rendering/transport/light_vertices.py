@@ -283,11 +283,11 @@ class LightVertexPasses:
         even = np.full(senders, 1 / senders)
         chosen, chances = _dealt(even, TUNING.light_vertices)
         points, met = self._rays.meet(chosen, chances, named_seed("pilot of light vertices", self._seed))
-        seen = are_inside(points.position, region)
-        if not seen.any():
+        inside = are_inside(points.position, region)
+        if not inside.any():
             return None
-        power = points.glow[seen].max(axis=1).astype(np.float64)
-        sums = np.bincount(chosen[met][seen], power, minlength=senders)
+        power = points.glow[inside].max(axis=1).astype(np.float64)
+        sums = np.bincount(chosen[met][inside], power, minlength=senders)
         return np.asarray(TUNING.uniform_share * even + (1 - TUNING.uniform_share) * sums / sums.sum())
 
 

@@ -102,11 +102,11 @@ class Absorption(Technique):
 class _Caustics:
     """State of :class:`PhotonGathering`.
 
-    ``is_seen``: all events were sharp. ``sharp``: sharp events since the last rough one, straight-through surfaces
+    ``all_sharp``: all events were sharp. ``sharp``: sharp events since the last rough one, straight-through surfaces
     excluded. ``by_photons``: share in [0, 1] of the light behind these events that photons bring instead of the path.
     """
 
-    is_seen: Bool
+    all_sharp: Bool
     sharp: UInt32
     by_photons: Spectrum
 
@@ -133,7 +133,7 @@ class PhotonGathering(Technique):
         return _Caustics(mi.Bool(True), mi.UInt32(0), mi.Spectrum(0))
 
     def meet_emitter(self, state: _Caustics, depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
-        is_caustic = ~state.is_seen & (state.sharp > 0) & (state.sharp <= MOST_EVENTS) & si.is_valid()
+        is_caustic = ~state.all_sharp & (state.sharp > 0) & (state.sharp <= MOST_EVENTS) & si.is_valid()
         return dr.select(is_caustic, emission * (1 - state.by_photons), emission)
 
     def arrive(self, state: _Caustics, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
@@ -151,7 +151,7 @@ class PhotonGathering(Technique):
             mi.UInt32(stream.half),
             self._depth - vertex.depth - 1,
             stream.next_1d(vertex.dimension + 4),
-            state.is_seen,
+            state.all_sharp,
             lands,
             stream.key + stream.index,
             TUNING.photons_of_cell,
@@ -164,7 +164,7 @@ class PhotonGathering(Technique):
         return radiance + vertex.throughput * light, shadow
 
     def sample_emitter(self, state: _Caustics, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
-        is_caustic = ~state.is_seen & (state.sharp < MOST_EVENTS)
+        is_caustic = ~state.all_sharp & (state.sharp < MOST_EVENTS)
         is_caustic &= is_sharp(vertex.si, vertex.lobe, vertex.si.to_local(ds.d))
         if self._environment is not None:
             is_caustic &= ds.emitter != mi.EmitterPtr(self._environment)
@@ -176,7 +176,7 @@ class PhotonGathering(Technique):
         share = dr.select(vertex.has_wide_lobes & (vertex.si.wi.z * wo.z > 0), 1, share)
         event = dr.select(scattering.is_event, mi.UInt32(1), mi.UInt32(0))
         return _Caustics(
-            state.is_seen & ~is_rough,
+            state.all_sharp & ~is_rough,
             dr.select(is_rough, mi.UInt32(0), state.sharp + event),
             dr.select(is_rough, share, state.by_photons),
         )
@@ -202,8 +202,8 @@ class WithoutSpecularLight(Technique):
     def sample_emitter(self, state: Bool, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
         if not self._has_without_size:
             return light
-        is_seen = state & ds.delta & is_sharp(vertex.si, vertex.lobe, vertex.si.to_local(ds.d))
-        return dr.select(is_seen, 0, light)
+        is_specular = state & ds.delta & is_sharp(vertex.si, vertex.lobe, vertex.si.to_local(ds.d))
+        return dr.select(is_specular, 0, light)
 
     def scatter(self, state: Bool, vertex: Vertex, scattering: Scattering) -> Bool:
         return state & ~scattering.is_rough

@@ -36,9 +36,6 @@ from lippmann.rendering.transport.sharp_events import (
 )
 from lippmann.rendering.transport.tuning import TUNING
 
-#: Emissions of one kernel.
-_LANES = 1 << 18
-
 
 class PhotonShooter:
     """Shoots photons of one scene."""
@@ -56,8 +53,8 @@ class PhotonShooter:
         pair = np.repeat(np.arange(len(each)), each)
         landed: list[Photons] = []
         pairs: list[NDArray[np.int64]] = []
-        for first in range(0, len(pair), _LANES):
-            part = pair[first : first + _LANES]
+        for first in range(0, len(pair), TUNING.lanes):
+            part = pair[first : first + TUNING.lanes]
             photons, lanes = self._wavefront(part, each, first, seed)
             landed.append(photons)
             pairs.append(part[lanes])

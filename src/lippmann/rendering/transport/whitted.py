@@ -200,7 +200,7 @@ class WhittedIntegrator:
     def _opacity(self, surface: Surface, finish: Finish, d: Vector3f) -> Float:
         if not self._raster3d:
             return finish.opacity
-        by_angle = dr.square(1 + dr.cos(_RASTER3D_PI * (1 - finish.opacity) * dr.dot(surface.n, d))) * 0.25
+        by_angle = dr.square(1 + dr.cos(dr.pi * (1 - finish.opacity) * dr.dot(surface.n, d))) * 0.25
         return by_angle if self._scene.shading.raster3d else dr.select(finish.raster3d, by_angle, finish.opacity)
 
     def _fog(
@@ -217,10 +217,6 @@ class WhittedIntegrator:
         foggy = (on_surface & ~skipped) if fog.planar else (on_surface & ~skipped) | missed
         clear = dr.select(foggy, clearness(fog, distance), 1)
         return clear, mi.Color3f(*fog.color) * (1 - clear)
-
-
-#: Tachyon's value of pi.
-_RASTER3D_PI = 3.1415926
 
 
 def _mirror(v: Vector3f) -> Vector3f:
