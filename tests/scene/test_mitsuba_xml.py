@@ -171,6 +171,38 @@ class TestIncludes:
         with pytest.raises(SceneError, match="includes too many files"):
             read_mitsuba_xml(save('<include filename="0.xml"/>'))
 
+    @pytest.mark.parametrize(
+        ("color", "value"),
+        [
+            ('<srgb name="reflectance" value="0.5, 0.04045, 1"/>', (0.214041, 0.0031308, 1)),
+            ('<srgb name="reflectance" value="#8000ff"/>', (0.215861, 0, 1)),
+            ('<srgb name="reflectance" value="0.5"/>', (0.214041,)),
+            ('<rgb name="reflectance" value="#8000ff"/>', (0.501961, 0, 1)),
+        ],
+    )
+    def test_colours_of_before_version_2_become_linear(self, save, color, value):
+        scene = read_mitsuba_xml(save(f'<bsdf type="diffuse">{color}</bsdf>', version="0.6.0"))
+        (child,) = scene.root.children[0].children
+        assert (child.tag, child.get("name")) == ("rgb", "reflectance")
+        assert [float(word) for word in child.get("value").split()] == pytest.approx(value, abs=1e-6)
+
+    def test_a_colour_that_is_none_is_refused(self, save):
+        with pytest.raises(
+            SceneError, match=r"room\.xml:2: the colour '#80' is not understood; one number, three, or #RR"
+        ):
+            read_mitsuba_xml(save('<bsdf type="diffuse"><srgb name="reflectance" value="#80"/></bsdf>'))
+
+    def test_films_samplers_and_integrators_that_are_no_more_do_not_matter(self, save):
+        film = '<film type="ldrfilm"><integer name="width" value="4"/><boolean name="banner" value="true"/></film>'
+        sampler = '<sampler type="halton" id="s"><integer name="sampleCount" value="64"/></sampler>'
+        camera = f'<sensor type="perspective">{sampler}{film}</sensor>'
+        scene = read_mitsuba_xml(save(f'<integrator type="bdpt"/>{camera}', version="0.6.0"))
+        integrator, sensor = scene.root.children
+        sampler, film = sensor.children
+        assert [each.get("type") for each in (integrator, sampler, film)] == ["path", "independent", "hdrfilm"]
+        assert (sampler.get("id"), sampler.children) == ("s", ())
+        assert [child.get("name") for child in film.children] == ["width"]
+
     def test_versions_do_not_mix(self, save):
         save("", "old.xml", version="0.6.0")
         with pytest.raises(SceneError, match=r"old\.xml: is of version 0\.6\.0, the scene of 3\.0\.0"):
@@ -249,7 +281,7 @@ class TestFolders:
 
 class TestPlugins:
     @pytest.mark.parametrize("kind", ["../../x", "/elsewhere/x", "sphere.so", "nothing", "plugins/sphere", "Sphere"])
-    @pytest.mark.parametrize("tag", ["shape", "bsdf", "spectrum", "integrator", "volume"])
+    @pytest.mark.parametrize("tag", ["shape", "bsdf", "spectrum", "emitter", "volume"])
     def test_unknown_ones_are_refused(self, save, tag, kind):
         with pytest.raises(SceneError, match=rf"room\.xml:2: unknown plugin '{kind}'.*; scene files name plugins"):
             read_mitsuba_xml(save(f'<{tag} type="{kind}"/>'))

@@ -106,6 +106,20 @@ def test_light_that_does_not_count():
     assert not Scene("s", unused).has_lights
 
 
+def test_surfaces_too_small_to_light_a_scene_do_not_count():
+    """Landing lights of an aircraft: without the studio all but these would be black."""
+
+    def aircraft(emission, size):
+        meshes = [triangle(), triangle(((0, 0, 0), (size, 0, 0), (0, size, 0)), material=1)]
+        lamp = Material(emission=(emission,) * 3)
+        return Scene("s", SceneDescription("s", meshes, [Material(), lamp], [Instance(0, HERE), Instance(1, HERE)]))
+
+    # The diagonal of the whole is sqrt(5): 0.001 pi 5 is what has to be emitted.
+    least = np.sqrt(2 * 0.005 * np.pi / 4)
+    assert aircraft(4.0, least * 1.01).has_lights
+    assert not aircraft(4.0, least * 0.99).has_lights
+
+
 def test_the_callers_light_takes_the_place_of_the_files():
     sky = Environment(np.ones((2, 4, 3), np.float32))
     scene = Scene("s", override_light(describe(environment=studio(), background=(1, 0, 0)), sky, (0, 0, 0)))

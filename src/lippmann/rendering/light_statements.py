@@ -71,7 +71,7 @@ def _misses_caustics(choices: Mapping[str, object]) -> bool:
     return choices.get("caustics") == "paths"
 
 
-def visible_share(pixels: NDArray[np.float32] | None, background: Color | None, rays: RayTotals, samples: int) -> float:
+def visible_share(pixels: NDArray[np.float32] | None, background: Color | None, rays: RayTotals) -> float:
     """Share of a picture's pixels that may show something of the scene, at most 1.
 
     Parameters
@@ -81,21 +81,19 @@ def visible_share(pixels: NDArray[np.float32] | None, background: Color | None, 
     background:
         What rays see that meet nothing; None where that differs from ray to ray.
     rays:
-        Rays traced for the picture.
-    samples:
-        Samples of the whole picture, all channels.
+        Rays traced for the picture, or for the part of it that was traced.
 
     Returns
     -------
     float
         The share of pixels unlike the background. Where that is not known, the rays that go on from surfaces over the
-        samples: an upper bound, as every sample that meets a surface sends at least one, black surfaces apart.
+        primary ones: an upper bound, as every sample that meets a surface sends at least one, black surfaces apart.
     """
     if pixels is not None and background is not None:
         step = max(1, len(pixels) // 1024)  # some rows of large pictures tell as much
         unlike = np.abs(pixels[::step] - np.asarray(background, dtype=np.float32)) > 1e-3
         return float(unlike.any(axis=-1).mean())
-    return min(1.0, (rays.shadow + rays.secondary) / samples)
+    return min(1.0, (rays.shadow + rays.secondary) / max(1, rays.primary))
 
 
 def warn_of_emptiness(share: float) -> tuple[str, ...]:

@@ -283,7 +283,7 @@ class Session:
                 *notes,
                 *light_notes(request, estimate, samples, self.choices),
                 *_frame_notes(frame),
-                *self._warn_of_emptiness(frame, work, has_pixels),
+                *self._warn_of_emptiness(frame, has_pixels),
             ),
         )
 
@@ -298,7 +298,7 @@ class Session:
         parts = (scene.light, request.placement, QualityOptions.part_of(request))
         return [*scene.settings, *(line for part in parts if isinstance(part, Options) for line in settings_of(part))]
 
-    def _warn_of_emptiness(self, frame: Frame, work: int, has_pixels: bool) -> tuple[str, ...]:
+    def _warn_of_emptiness(self, frame: Frame, has_pixels: bool) -> tuple[str, ...]:
         if self.request.integrator not in LIGHT:
             return ()
         background = even_background(self.built, self.request)
@@ -307,7 +307,7 @@ class Session:
             background = (0.0, 0.0, 0.0)
         if not has_pixels and background is not None and max(background) == 0.0:
             return ()  # neither colours nor rays would tell emitters from the background: paths end at both
-        return warn_of_emptiness(visible_share(frame.pixels if has_pixels else None, background, frame.rays, work))
+        return warn_of_emptiness(visible_share(frame.pixels if has_pixels else None, background, frame.rays))
 
     @property
     def notes(self) -> tuple[str, ...]:

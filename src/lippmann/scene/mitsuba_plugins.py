@@ -19,6 +19,11 @@ _PLAIN = re.compile(r"\w+", re.ASCII)
 _NO_MATERIAL = "none"
 
 
+def is_plugin(name: str) -> bool:
+    """Whether the installed Mitsuba has a plugin ``name``."""
+    return name in _plugins()
+
+
 def check_plugin(name: str, where: str) -> None:
     """Raise :class:`SceneError` if the installed Mitsuba has no plugin ``name``."""
     known = _plugins()

@@ -20,8 +20,9 @@ from os.path import relpath
 from pathlib import Path
 from xml.parsers import expat
 
+from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
-from lippmann.scene.mitsuba_plugins import check_material, check_plugin
+from lippmann.scene.mitsuba_plugins import check_material, check_plugin, is_plugin
 from lippmann.scene.parsing.files import NamedFiles, read_bytes
 
 #: Included files inside included files, as Mitsuba allows by default.
@@ -38,9 +39,14 @@ _ESCAPED_DOLLAR = "\\$"
 _ENTITIES = str.maketrans(
     {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
 )
+_HEXADECIMAL = re.compile(r"#[0-9a-fA-F]{6}")
 _PARAMETER = re.compile(r"(?<!\\)\$(\w*)", re.ASCII)
 #: Elements without a type that Mitsuba copies from an included scene, beside its objects: other names for them.
 _NAMES = ("alias", "ref")
+#: Elements whose plugins do not count here, and what stands for those that Mitsuba has no more.
+_UNCOUNTED = {"film": "hdrfilm", "integrator": "path", "sampler": "independent"}
+#: What of a film counts: the shape of the camera's picture.
+_FILM_SIZE = ("width", "height")
 
 
 @dataclass(frozen=True)
@@ -179,8 +185,12 @@ class _Reader:
             )
         element = self._substitute(raw, parameters)
         where = element._origin
-        if kind := element.get("type"):
+        if element.tag in _UNCOUNTED and not is_plugin(element.get("type")):
+            raw = element = _stand_in(element)
+        elif kind := element.get("type"):
             check_plugin(kind, where)
+        elif element.tag in ("rgb", "srgb"):
+            element = _linear_color(element)
         children: list[XmlElement] = []
         for child in raw.children:
             if child.tag == "default":
@@ -304,6 +314,41 @@ def parse_xml(data: bytes, where: str) -> XmlElement:
     except (LookupError, ValueError) as error:  # of the encoding that it names
         raise SceneError(f"cannot be decoded ({error})", where=where, rule="XML is UTF-8") from None
     return children[0][0]
+
+
+def _stand_in(element: XmlElement) -> XmlElement:
+    """An integrator, sampler or film of a plugin that Mitsuba has, for one of before version 2 (``ldrfilm``, say)."""
+    sizes = tuple(child for child in element.children if element.tag == "film" and child.get("name") in _FILM_SIZE)
+    others = tuple((name, value) for name, value in element.attributes if name != "type")
+    attributes = (("type", _UNCOUNTED[element.tag]), *others)
+    return XmlElement(element.tag, attributes, sizes, _origin=element._origin)
+
+
+def _linear_color(element: XmlElement) -> XmlElement:
+    """A colour as the linear ``rgb`` that Mitsuba 3 reads: before version 2 there were ``srgb`` and hexadecimal codes.
+
+    Raises
+    ------
+    SceneError
+        It is no number, no three and no ``#RRGGBB``.
+    """
+    text = element.get("value").strip()
+    if element.tag == "rgb" and not text.startswith("#"):
+        return element
+    if _HEXADECIMAL.fullmatch(text):
+        values = [int(text[start : start + 2], 16) / 255 for start in (1, 3, 5)]
+    else:
+        try:
+            values = [float(word) for word in text.replace(",", " ").split()]
+        except ValueError:
+            values = []
+    if len(values) not in (1, 3):
+        rule = "one number, three, or #RRGGBB"
+        raise SceneError(f"the colour '{text[:40]}' is not understood", where=element._origin, rule=rule)
+    if element.tag == "srgb":
+        values = decode_srgb(values).tolist()
+    attributes = {**dict(element.attributes), "value": " ".join(repr(value) for value in values)}
+    return XmlElement("rgb", tuple(attributes.items()), element.children, _origin=element._origin)
 
 
 def _fill_in(value: str, parameters: Mapping[str, str], element: XmlElement) -> str:

@@ -1,8 +1,9 @@
-"""How bright a scene's surfaces are of themselves: :func:`mean_reflectance`."""
+"""How bright a scene's surfaces are of themselves: :func:`mean_reflectance`, :func:`emitted_luminance`."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.scene.values.description import Material, Mesh, SceneDescription, Texture
@@ -28,10 +29,30 @@ def mean_reflectance(scene: SceneDescription) -> float | None:
             continue
         if mesh.material not in colors:
             colors[mesh.material] = _luminance(scene.materials[mesh.material])
-        own = _area(mesh) * float((np.abs(np.linalg.det(places[:, :3, :3])) ** (2.0 / 3.0)).sum())
+        own = _placed_area(mesh, places)
         total += own * colors[mesh.material] * _painted(mesh)
         area += own
     return total / area if area > 0.0 and np.isfinite(total) else None
+
+
+def emitted_luminance(scene: SceneDescription) -> float:
+    """Luminance of a scene's surfaces as emitters, times their areas, in all.
+
+    Over four times the squared radius of a sphere around the scene it is the mean irradiance on that sphere, in units
+    of pi: the luminance of even surroundings that would light the scene as much.
+    """
+    total = 0.0
+    for index, places in scene.placements.items():
+        mesh = scene.meshes[index]
+        material = scene.materials[mesh.material]
+        if len(mesh.faces) and max(material.emission) > 0.0:
+            total += _placed_area(mesh, places) * float(_emission(material) @ _LUMINANCE)
+    return total
+
+
+def _placed_area(mesh: Mesh, places: NDArray[np.float64]) -> float:
+    """The area of all of a mesh's copies, as if they were scaled evenly."""
+    return _area(mesh) * float((np.abs(np.linalg.det(places[:, :3, :3])) ** (2.0 / 3.0)).sum())
 
 
 def _area(mesh: Mesh) -> float:
@@ -47,11 +68,15 @@ def _painted(mesh: Mesh) -> float:
 
 def _luminance(material: Material) -> float:
     base = np.array(material.base_color) * _mean(material.base_color_texture)
-    emitted = np.array(material.emission) * _mean(material.emission_texture)
-    return float((base + emitted) @ _LUMINANCE)
+    return float((base + _emission(material)) @ _LUMINANCE)
 
 
-def _mean(texture: Texture | None) -> np.ndarray:
+def _emission(material: Material) -> NDArray[np.float64]:
+    """Mean linear RGB ``(3,)`` of what a material emits."""
+    return np.array(material.emission) * _mean(material.emission_texture)
+
+
+def _mean(texture: Texture | None) -> NDArray[np.float64]:
     """Mean linear RGB ``(3,)`` of a texture; white without one."""
     if texture is None:
         return np.ones(3)

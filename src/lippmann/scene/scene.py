@@ -16,6 +16,7 @@ from lippmann.scene.extreme_points import extreme_points_of, used_positions
 from lippmann.scene.light_options import change_environment, change_source
 from lippmann.scene.matrices import rotation_of
 from lippmann.scene.mitsuba_source import MitsubaSource
+from lippmann.scene.reflectance import emitted_luminance
 from lippmann.scene.splat_clouds import check_splats, typical_points
 from lippmann.scene.values.description import (
     Camera,
@@ -34,6 +35,9 @@ from lippmann.scene.whitted.world_frame import world_bounds
 Bounds = NDArray[np.float64]
 
 STUDIO_NOTE = "no lights in the scene: lit by the built-in studio"
+
+#: Radiance of even surroundings; surfaces that light a scene less than these would are no light sources.
+_DIMMEST = 1e-3
 
 # Exact bounds look at each vertex of each instance; beyond this many the corners of the mesh's own box stand in,
 # which can only be too large.
@@ -413,10 +417,10 @@ def box_corners(bounds: Bounds) -> Bounds:
 
 
 def has_lights(description: SceneDescription) -> bool:
-    """Whether a description has emitters: an environment, a light, a surface brighter than white, or only unlit ones.
+    """Whether a description has emitters: an environment, a light, surfaces that light it, or only unlit ones.
 
     Surfaces of radiance 1 and below are labels and screens, which do not light a scene, unless the file has them as
-    light sources.
+    light sources. Neither do brighter ones so small, as an aircraft's landing lights, that all the rest is black.
     """
     if (
         description.environment is not None
@@ -428,7 +432,12 @@ def has_lights(description: SceneDescription) -> bool:
     materials = [description.materials[index] for index in indices]
     if not materials:
         return description.splats is not None or description.volume is not None  # which nothing lights
-    return any(max(material.emission) > 1.0 for material in materials) or all(material.unlit for material in materials)
+    if all(material.unlit for material in materials):
+        return True
+    if max(max(material.emission) for material in materials) <= 1.0:
+        return False
+    low, high = bounds_of(description)
+    return emitted_luminance(description) >= _DIMMEST * np.pi * float(((high - low) ** 2).sum())
 
 
 def check_description(description: SceneDescription, where: str) -> SceneDescription:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lippmann.device.pbr.tangents import tangents_in_uv, with_own_corners
 from lippmann.scene.values.description import Image, Instance, Material, Texture
 
 TILT = np.array([0.3, 0.5, 0.8]) / np.linalg.norm([0.3, 0.5, 0.8])
@@ -51,6 +52,13 @@ def test_corners_without_a_direction_take_that_of_the_texture(build, look, parts
     flat = square(parts, [0, 1, 0, 1], uvs=(np.zeros((4, 2), np.float32),))
     built = build(parts.describe([flat], [Material(normal_texture=normal_map())]))
     assert np.isfinite(look.attribute(built, "normal", 0.2, 0.4)).all()
+
+
+def test_a_triangle_that_is_a_point_has_the_direction_of_the_texture(parts):
+    """Models of aircraft and machines have some; their texture coordinates may be those of a triangle."""
+    whole = square(parts, [0, 1, 0, 1])
+    point = with_own_corners(replace(whole, positions=np.zeros((4, 3), np.float32)))
+    assert tangents_in_uv(point, 0).tolist() == [[1, 0, 1]] * len(point.positions)
 
 
 def quarter_turn(x):

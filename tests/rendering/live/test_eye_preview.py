@@ -105,3 +105,12 @@ def test_a_photograph_fills_picture_and_preview_with_its_own_colours(tmp_path):
     found = render_eye_preview(photo, display, EYES[1], RenderRequest(tone_map="auto"), (60, 60))
     assert (found.provenance.spp, "denoise" in found.provenance.options) == (1, False)
     assert found.pixels.max(axis=(0, 1)) == pytest.approx(whole.pixels.max(axis=(0, 1)))
+
+
+def test_a_preview_of_one_eye_counts_the_rays_that_it_traced():
+    """One of each lens's 225 pixels is traced, and the surroundings fill the rest of the picture."""
+    ball = {"type": "sphere", "bsdf": {"type": "diffuse"}}
+    scene = lippmann.load_scene({"type": "scene", "ball": ball, "sky": {"type": "constant"}})
+    display = lippmann.load_display("mla-square")
+    preview = render_eye_preview(scene, display, EYES[0], RenderRequest(spp=1), (512, 512))
+    assert not any("empty" in note for note in preview.provenance.notes)

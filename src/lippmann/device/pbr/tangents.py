@@ -61,6 +61,6 @@ def tangents_in_uv(mesh: Mesh, uv_set: int) -> FloatArray:
             ]
         )
         lost = ~np.isfinite(in_uv).all(axis=1) | ~in_uv[:, :2].any(axis=1)
-        default = 1 / np.linalg.norm(along_u, axis=1)
-    in_uv[lost] = np.column_stack([np.nan_to_num(default, nan=1, posinf=1), 0 * default, np.ones_like(default)])[lost]
+        default = np.nan_to_num(1 / np.linalg.norm(along_u, axis=1), nan=1, posinf=1)
+    in_uv[lost] = np.column_stack([default, np.zeros_like(default), np.ones_like(default)])[lost]
     return in_uv.astype(np.float32)
