@@ -88,6 +88,10 @@ def options(**fields):
     return PlacementOptions(**fields)
 
 
+#: The line on a scene with cameras that is fitted, since nobody named one.
+SEEN = 'fitted, seen along -z: as a camera of the file sees it by camera="{}"'
+
+
 class TestFit:
     def test_a_flat_scene_fills_the_panel_in_the_lens_plane(self):
         placed = place(box(3, 1, 0, center=(7, 8, 9)), display())
@@ -409,11 +413,11 @@ class TestCamera:
         home = place(self.BOUNDS, display(), cameras=cameras, home_camera="eye")
         assert home.mode == "camera"
         assert in_display(home, [(0, 0, 0)]) == pytest.approx(np.zeros((1, 3)), abs=1e-9)
-        assert place(self.BOUNDS, display(), cameras=cameras).mode == "fit"
-        assert (
-            place(self.BOUNDS, display(), cameras=cameras, options=options(place="fit"), home_camera="eye").mode
-            == "fit"
-        )
+        assert home.warnings == ()
+        fitted = place(self.BOUNDS, display(), cameras=cameras)
+        assert (fitted.mode, fitted.warnings) == ("fit", (SEEN.format("other"),))
+        asked = place(self.BOUNDS, display(), cameras=cameras, options=options(place="fit"), home_camera="eye")
+        assert (asked.mode, asked.warnings) == ("fit", ())
         other = place(self.BOUNDS, display(), cameras=cameras, options=options(camera="other"), home_camera="eye")
         assert in_display(other, [(0, 0, 9)]) == pytest.approx(np.zeros((1, 3)), abs=1e-9)
 

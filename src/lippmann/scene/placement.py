@@ -153,6 +153,8 @@ def place(
     warnings: list[str] = []
     exposure = 0.0
     if mode == "fit":
+        if cameras and options == PlacementOptions():
+            warnings.append(f'fitted, seen along -z: as a camera of the file sees it by camera="{cameras[0].name}"')
         options = face_viewer(bounds, options, warnings)
         points = box_corners(bounds) if extreme_points is None else extreme_points()
         display_from_world = _fit(

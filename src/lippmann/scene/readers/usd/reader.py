@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import NamedFiles, read_bytes
+from lippmann.scene.parsing.vertex_colors import GREY
 from lippmann.scene.readers.usd.assets import Assets, check_package
 from lippmann.scene.readers.usd.lights import LightReader, camera_of
 from lippmann.scene.readers.usd.materials import Surface, SurfaceReader
@@ -20,8 +21,6 @@ from lippmann.scene.readers.usd.records import Record
 from lippmann.scene.readers.usd.splats import SplatReader
 from lippmann.scene.values.description import AlphaMode, Instance, Material, Matrix, Mesh, SceneDescription
 
-#: What a mesh without material looks like: the grey that UsdPreviewSurface has, not shiny.
-_GREY = (0.18, 0.18, 0.18)
 _UPRIGHT = {"Z": np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])}
 #: Entries of matrices up to which positions stay within single precision.
 _FARTHEST = 1e30
@@ -149,12 +148,15 @@ class _Content:
         self.materials.append(material)
 
     def _plain(self, mesh: Mesh) -> int:
-        """The material of a mesh that has none: its display colours, else grey."""
+        """The material of a mesh that has none: its display colours, else the light grey of formats without any.
+
+        UsdPreviewSurface's own grey, 0.18, is that of the studio's backdrop: what faces the viewer would not be seen.
+        """
         colored = mesh.colors is not None
         fades = mesh.colors is not None and mesh.colors.shape[1] == 4
         if (colored, fades) not in self._without:
             self._without[colored, fades] = len(self.materials)
-            color = (1.0, 1.0, 1.0) if colored else _GREY
+            color = (1.0, 1.0, 1.0) if colored else GREY.base_color
             mode: AlphaMode = "blend" if fades else "opaque"
             self.materials.append(
                 Material("display colour", base_color=color, roughness=0.6, alpha_mode=mode, double_sided=True)
