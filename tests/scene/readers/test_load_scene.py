@@ -77,10 +77,15 @@ def test_up_of_what_says_it_itself_is_refused():
         ("room.splat", "SuperSplat"),
         ("tower.laz", "CloudCompare"),
         ("virus.mrc", "mrcfile"),
+        ("house.ifc", "IfcConvert in.ifc out.glb"),
+        ("lamp.wrl", "MeshLab"),
+        ("kettle.pbrt", r"its meshes, mostly \.ply files"),
+        ("cage.mol2", r"obabel in\.mol2 -O out\.pdb"),
+        ("ring.3dm", "Rhino"),
     ],
 )
 def test_files_of_other_programs_are_told_how_to_become_gltf(save, name, said):
-    with pytest.raises(SceneError, match="unknown kind of scene file .*" + said):
+    with pytest.raises(SceneError, match="is no scene file: .*" + said):
         load_scene(save(name, b"ISO-10303-21;"))
 
 
@@ -107,20 +112,24 @@ def test_content_counts_where_the_name_says_nothing(save):
     [
         ("a.glb", PLY.encode(), r"a\.glb: is no \.glb file; it begins like a \.ply file"),
         ("a.obj", b"glTF....", r"a\.obj: is no \.obj file; it begins like a \.glb file"),
-        ("a.ply", b"<html>", r"a\.ply: is no \.ply file; it begins like a \.xml file"),
+        ("a.ply", XML.encode(), r"a\.ply: is no \.ply file; it begins like a \.xml file"),
+        ("a.ply", b"\n<!DOCTYPE html><title>404", r"a\.ply: is a web page, no scene; download the file itself"),
+        ("a.vtp", b"<html>", r"a\.vtp: is a web page"),
+        ("a.stl", b"PK\3\4....", r"a\.stl: is a ZIP archive; unpack it, and name the scene file inside"),
+        ("a.usdz", b"PK\3\4....", r"a\.usdz: is no USDZ package"),
         ("a.ply", OBJ.encode(), r"a\.ply: is no PLY file"),
         ("a.stl", OBJ.encode(), r"a\.stl: is no STL file"),
-        ("a.xml", b"<html></html>", r"a\.xml: is XML of a 'html'"),
+        ("a.xml", b"<list></list>", r"a\.xml: is XML of a 'list'"),
         ("a.xml", XML.encode()[:-3], r"a\.xml:1: is no well-formed XML"),
         (
             "a.fbx",
             b"Kaydara FBX",
-            r"a\.fbx: unknown kind of scene file '\.fbx'; open it in Blender, ",
+            r"a\.fbx: is no scene file: \.fbx; open it in Blender, ",
         ),
         (
             "a.dae",
             b"<?xml version='1.0'?><COLLADA/>",
-            r"a\.dae: unknown kind of scene file '\.dae'.*; open it in Blender, ",
+            r"a\.dae: is no scene file: \.dae; open it in Blender, ",
         ),
         ("a.obj", b"", r"a\.obj: the file is empty"),
         ("a.glb", b"", r"a\.glb: the file is empty"),

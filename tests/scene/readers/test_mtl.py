@@ -108,6 +108,12 @@ def test_a_comment_after_a_texture(material, picture):
     assert material("map_Kd wood.png # of the door\n").base_color_texture.image.pixels[0, 0, 0] == 100
 
 
+def test_a_dot_is_no_texture(material):
+    """As Blender writes pictures that were never saved."""
+    plain = material("Kd 0.2 0.4 0.6\nmap_Kd .\nmap_Bump . \n")
+    assert (plain.base_color, plain.base_color_texture, plain.normal_texture) == ((0.2, 0.4, 0.6), None, None)
+
+
 def test_emission_may_exceed_one(material):
     assert material("Ke 5 4 3\n").emission == (5.0, 4.0, 3.0)
 

@@ -56,38 +56,52 @@ _BRIGHTEST = 1e18
 #: Ray depth with which the paper renders its scenes.
 _PAPER_DEPTH = 2
 
-#: Files of other programs, and how a glTF file is made of them.
+_BLENDER = "open it in Blender, then File > Export > glTF 2.0 (.glb)"
+_FREECAD = "open it in FreeCAD, then File > Export > glTF (.glb)"
+_SLICER_3D = "save it as .nii.gz, in 3D Slicer for instance"
+_MAYA = "export it from Maya as FBX, and that from Blender as glTF 2.0 (.glb)"
+_TRIMESH = "convert it, in Python by trimesh: trimesh.load_mesh('a.off').export('a.ply')"
+_OPEN_BABEL = "save it as .pdb or .cif, in Avogadro or by: obabel in{0} -O out.pdb"
+
+#: Files of other programs, and how one that is read is made of them.
 _ELSEWHERE = {
-    ".fbx": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
-    ".dae": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
-    ".3ds": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
-    ".abc": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
+    **dict.fromkeys((".fbx", ".dae", ".3ds", ".abc", ".lwo"), _BLENDER),
     ".max": "in 3ds Max: File > Export > glTF",
     ".c4d": "in Cinema 4D: File > Export > glTF",
     ".skp": "in SketchUp: File > Export > 3D Model > glTF (.glb)",
-    ".ma": "export it from Maya as FBX, and that from Blender as glTF 2.0 (.glb)",
-    ".mb": "export it from Maya as FBX, and that from Blender as glTF 2.0 (.glb)",
-    ".step": "open it in FreeCAD, then File > Export > glTF (.glb)",
-    ".stp": "open it in FreeCAD, then File > Export > glTF (.glb)",
-    ".iges": "open it in FreeCAD, then File > Export > glTF (.glb)",
-    ".igs": "open it in FreeCAD, then File > Export > glTF (.glb)",
+    ".3dm": "in Rhino: File > Export > glTF (.glb)",
+    **dict.fromkeys((".ma", ".mb"), _MAYA),
+    **dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep", ".fcstd", ".dxf"), _FREECAD),
+    ".ifc": "convert it by IfcOpenShell: IfcConvert in.ifc out.glb",
+    ".pbrt": "its meshes, mostly .ply files beside it, are read one by one",
+    **dict.fromkeys((".wrl", ".x3d", ".x3dv", ".vrml"), "open it in MeshLab, and export it as .ply or .obj"),
+    ".off": _TRIMESH,
+    ".vox": "in MagicaVoxel: Export > ply",
+    ".b3dm": "take the .glb out of it by: npx 3d-tiles-tools b3dmToGlb -i in.b3dm -o out.glb",
     ".vtm": "save its blocks as one data set, in PyVista by: pyvista.read('a.vtm').combine().save('a.vtu')",
     ".pvd": "name one of the files that it lists",
-    ".nrrd": "save it as .nii.gz, in 3D Slicer for instance",
-    ".mha": "save it as .nii.gz, in 3D Slicer for instance",
+    **dict.fromkeys((".nrrd", ".nhdr", ".mha", ".mhd"), _SLICER_3D),
     ".hdr": "save it as .nii or .nii.gz, which hold header and voxels in one file",
     ".3mf": "save it as .stl in the slicer, or with trimesh and lxml: trimesh.load_mesh('a.3mf').export('a.stl')",
+    ".amf": "save it as .stl in the slicer",
     **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar"), "unpack it, and name the scene file inside"),
     ".zae": "unzip it, open the .dae in Blender, then File > Export > glTF 2.0 (.glb)",
     **dict.fromkeys((".splat", ".ksplat", ".lcc"), "open it in SuperSplat (superspl.at/editor), export it as .ply"),
-    **dict.fromkeys((".las", ".laz", ".e57", ".pcd", ".pts"), "save it as .ply, in CloudCompare for instance"),
+    **dict.fromkeys((".las", ".laz", ".e57", ".pcd", ".pts", ".ptx"), "save it as .ply, in CloudCompare for instance"),
     **dict.fromkeys((".mrc", ".map", ".ccp4"), "save it as .npy: numpy.save('a.npy', mrcfile.read('a.mrc'))"),
-    ".mhd": "save it as .nii.gz, in 3D Slicer for instance",
-    ".nhdr": "save it as .nii.gz, in 3D Slicer for instance",
     ".xyz": "save molecules as .pdb, by: obabel in.xyz -O out.pdb; clouds of points as .ply, in CloudCompare",
-    ".sdf": "save it as .pdb or .cif, in Avogadro or by: obabel in.sdf -O out.pdb",
-    ".mol": "save it as .pdb or .cif, in Avogadro or by: obabel in.mol -O out.pdb",
+    **{kind: _OPEN_BABEL.format(kind) for kind in (".sdf", ".mol", ".mol2", ".cube", ".gro")},
+    **dict.fromkeys((".bcif", ".mmtf"), "take the entry's .cif file from the data bank"),
+    **dict.fromkeys((".tif", ".tiff", ".bmp", ".avif"), "save photographs with depth as .png or .jpg"),
 }
+
+#: What files that are none of a scene's begin with, in small letters, and what to do about it.
+_NO_SCENES = {
+    b"pk\3\4": ("is a ZIP archive", "unpack it, and name the scene file inside"),
+    **dict.fromkeys((b"<!doctype html", b"<html"), ("is a web page, no scene", "download the file itself")),
+}
+#: Kinds that are ZIP archives themselves.
+_ZIPPED = (".npz", ".sog", ".usdz", ".usd")
 
 _DIRECTIONS: dict[Up, Direction] = {"y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0), "-y": (0.0, -1.0, 0.0)}
 
@@ -216,9 +230,10 @@ def unknown_kind(path: Path) -> SceneError | None:
 
 
 def _unknown_kind(path: Path) -> SceneError:
-    suffix = kind_of_name(path)
-    rule, broken = _ELSEWHERE.get(suffix, ""), READERS.problems
-    return SceneError.unknown("kind of scene file", suffix, READERS.claims(), where=path.name, rule=rule, fix=broken)
+    suffix, broken = kind_of_name(path), READERS.problems
+    if suffix in _ELSEWHERE:
+        return SceneError(f"is no scene file: {suffix}", where=path.name, rule=_ELSEWHERE[suffix], fix=broken)
+    return SceneError.unknown("kind of scene file", suffix, READERS.claims(), where=path.name, fix=broken)
 
 
 def _from_name(source: str | Path, allow_outside: bool, asked: SceneOptions) -> Scene:
@@ -314,12 +329,22 @@ def _reader_of(path: Path, suffix: str) -> Plugin[Reader]:
     named, beginning = READERS.find(suffix), _suffix_by_content(path)
     if named is not None and named.distribution:
         return named
+    if named is not None and path.is_file():
+        _refuse_others(path, suffix)
     found = named if beginning is None else READERS.find(beginning)
     if found is None or (named is None and suffix in _ELSEWHERE):  # Collada is XML, too
         raise _unknown_kind(path)
     if named not in (None, found):
         raise SceneError(f"is no {suffix} file", where=path.name, rule=f"it begins like a {beginning} file")
     return found
+
+
+def _refuse_others(path: Path, suffix: str) -> None:
+    """Raise :class:`SceneError` for an archive or a web page that is called as a scene file."""
+    head = read_bytes(path, 32).lstrip().lower()
+    for start, (what, fix) in _NO_SCENES.items():
+        if head.startswith(start) and not (start.startswith(b"pk") and suffix in _ZIPPED):
+            raise SceneError(what, where=path.name, fix=fix)
 
 
 def _upright(description: SceneDescription, suffix: str, reader: Reader, up: Up | None) -> SceneDescription:

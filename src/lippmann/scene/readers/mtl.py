@@ -58,6 +58,9 @@ _GLASS = {4, 6, 7, 9}
 _MESHLAB = "Converted by Meshlab Group"
 _NUMERIC_OPTIONS = {"-bm", "-boost", "-mm", "-o", "-s", "-t"}
 
+#: What Blender's exporters write for a texture without a file.
+_NO_FILE = "."
+
 
 @dataclass(frozen=True)
 class MapReference:
@@ -159,7 +162,8 @@ def _read_statement(record: MtlRecord, key: str, written: str, body: str, where:
         else:
             record.numbers["d"] = _finite(words[:1], written, where)
     elif key in _MAPS:
-        record.maps[key] = _map(body, written, where)
+        if body.strip() != _NO_FILE:
+            record.maps[key] = _map(body, written, where)
     elif key not in _NO_EFFECT:
         record.ignored.append(written)
 

@@ -55,6 +55,28 @@ def places(scene, name):
     return scene.placements[number][:, :3, 3]
 
 
+#: As a file of before 1996 has them: the entry's code and the line's number in the columns of element and charge.
+OLD = """\
+ATOM      1  N   THR     1      17.047  14.099   3.625  1.00 13.79      1CRN1070
+ATOM      2  CA  THR     1      16.967  12.784   4.338  1.00 10.80      1CRN1071
+HETATM    3 CA    CA     2      26.967  12.784   4.338  1.00 10.80      1CRN1072
+"""
+
+
+@pytest.mark.parametrize("name", ["m.pdb", "m.ent.gz"])
+def test_files_of_before_1996(read, name):
+    scene = read(gzip.compress(OLD.encode()) if name.endswith("gz") else OLD, name)
+    assert scene.notes == ["3 atoms, 1 bonds by their distance"]
+    assert places(scene, "balls of element 20") == pytest.approx(np.array([(26.967, 12.784, 4.338)]))
+
+
+def test_residues_that_share_a_number_are_alternatives_only_where_their_atoms_say_so(read):
+    """Waters of a simulation whose last hydrogen is of another residue; a ligand with the number of both."""
+    waters = WATER[: WATER.index("HETATM    4")].replace("H2  HOH", "H2  WAT")
+    ligand = "HETATM    4  C1  LIG A   1      20.000   0.000   0.000  1.00  0.00           C\n"
+    assert read(waters + ligand).notes == ["4 atoms, 2 bonds by their distance"]
+
+
 def test_atoms_and_bonds_of_water(read):
     scene = read(WATER)
     assert scene.notes == ["4 atoms, 2 bonds by their distance", "1 atoms at alternative places are left out"]

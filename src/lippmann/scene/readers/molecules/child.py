@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
 import itertools
+import re
+from collections.abc import Iterator
 from typing import Any
 
 import gemmi
@@ -21,6 +24,10 @@ _COMPONENT_TAGS = (
     "_chem_comp_atom.pdbx_model_Cartn_x_ideal",
 )
 
+_PDB = (".pdb", ".ent", ".pdb.gz", ".ent.gz")
+#: Columns 73 to 80 of a file's lines before 1996: the entry's code and the number of the line.
+_ENTRY = re.compile(rb"[0-9][0-9A-Z]{3}[ 0-9]{3}[0-9]")
+
 
 def main() -> None:
     """Answer requests by positions, elements and notes."""
@@ -35,6 +42,8 @@ def _read(request: dict[str, Any]) -> dict[str, NDArray[np.generic]]:
 
 def _atoms(path: str, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Atomic numbers ``(n,)`` and positions ``(n, 3)``, angstroms, of the first model and first of alternatives."""
+    if path.lower().endswith(_PDB):
+        return _of_structure(gemmi.read_pdb(path, max_line_length=_columns(path)), notes)
     if not path.lower().endswith((".cif", ".cif.gz")):
         return _of_structure(gemmi.read_structure(path), notes)
     document = gemmi.cif.read(path)
@@ -53,6 +62,16 @@ def _atoms(path: str, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.f
     return _of_structure(gemmi.make_structure_from_chemcomp_block(block), notes)
 
 
+def _columns(path: str) -> int:
+    """How many columns of a PDB file's lines count: 0 for all, 72 where code and number of the entry follow (to 1996).
+
+    Later files have the element and the charge there, as which gemmi would take them.
+    """
+    with gzip.open(path) if path.lower().endswith(".gz") else open(path, "rb") as file:
+        first = next((line for line in file if line.startswith((b"ATOM", b"HETATM"))), b"")
+    return 72 if _ENTRY.fullmatch(first[72:].rstrip()) else 0
+
+
 def _of_structure(structure: gemmi.Structure, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     if not len(structure):
         return _arrays([], [])
@@ -64,7 +83,7 @@ def _of_structure(structure: gemmi.Structure, notes: list[str]) -> tuple[NDArray
             notes.append(f"the file's own atoms are shown: its assembly '{assembly.name}' has {copies} copies of them")
     elements, places = [], []
     for chain in structure[0]:
-        for residue in chain.first_conformer():  # the first of those that share a place of the sequence
+        for residue in _first_residues(chain):
             first = next((atom.altloc for atom in residue if atom.altloc != "\0"), "\0")
             for atom in residue:  # its own first_conformer() keeps alternatives that stand apart
                 if atom.altloc in ("\0", first):
@@ -74,6 +93,20 @@ def _of_structure(structure: gemmi.Structure, notes: list[str]) -> tuple[NDArray
             break
     _note_alternatives(structure[0].count_atom_sites() - len(elements), notes)
     return _arrays(elements, places)
+
+
+def _first_residues(chain: gemmi.Chain) -> Iterator[gemmi.Residue]:
+    """Residues but for the alternatives to one at the same place of the sequence, whose atoms say that they are such.
+
+    Gemmi's own ``first_conformer()`` leaves out whatever shares a number: ligands, and waters of simulations.
+    """
+    shown = None
+    for residue in chain:
+        shares = shown is not None and residue.seqid == shown.seqid
+        if shares and any(atom.altloc != "\0" for atom in residue):
+            continue
+        shown = residue
+        yield residue
 
 
 def _element(atom: gemmi.Atom, residue: str) -> gemmi.Element:
