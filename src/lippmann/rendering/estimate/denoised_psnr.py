@@ -108,7 +108,7 @@ def estimate_denoised(errors: ErrorSums, samples: ErrorSums, grid: tuple[int, in
 
     parts = _parts(errors, samples.squares, index, grid, middle)
     drawn = _draw_worst(parts, likely.quantiles((np.arange(TUNING.draws) + 0.5) / TUNING.draws) / middle)
-    worst = np.quantile(drawn, (0.5, 0.975, 0.025)) * (1, 1, TUNING.worst_often_better)
+    worst = np.quantile(drawn, (0.5, 0.975, 0.025)) * (1, 1, TUNING.often_better**2)
     return make_estimate((middle, worse, better, *worst), int(index[np.argmax(parts.expected)]), grid)
 
 
@@ -130,22 +130,22 @@ def _parts(
     apart = errors.apart / count
     (near,), _ = neighbourhood(apart[None], index, grid)
     least = 1e-3 * float(errors.apart.sum() / count.sum()) + 1e-30
-    power = TUNING.toward_neighbours
+    power = TUNING.neighbour_power
     around = np.maximum(apart, least) ** (1 - power) * np.maximum(near, least) ** power
     around *= mean / float((around * count).sum() / count.sum())
     # The second moment of one part is noisy itself: that of all parts, in proportion, is a prior.
     overall = float(errors.squares.sum()) / float((np.square(around) * count).sum())
-    noise = (errors.squares + TUNING.lean * overall * np.square(around)) / (count + TUNING.lean) / count
+    noise = (errors.squares + TUNING.prior_pixels * overall * np.square(around)) / (count + TUNING.prior_pixels) / count
     measured = errors.values / count
     # A part that is worse than noise explains gets a prior variance of its own: a denoiser may be far off in a few
     # pixels beside an emitter, where the samples themselves are good.
-    explained = TUNING.worse_from * noise + TUNING.explained * of_samples / np.square(count)
+    explained = TUNING.noise_factor * noise + TUNING.outlier_factor * of_samples / np.square(count)
     other = np.where(measured > around, np.square(measured - around) - explained, 0.0)
-    between = np.maximum(TUNING.spread * np.square(around), other)
+    between = np.maximum(TUNING.part_variance * np.square(around), other)
     trust = between / (between + noise)
     expected = np.maximum(around + trust * (measured - around), 0.2 * around)
     # A part of few pixels, in a corner of the panel, has a larger variance.
-    fewer = TUNING.few * np.maximum(1 / count - 1 / np.median(count), 0)
+    fewer = TUNING.prior_pixels * np.maximum(1 / count - 1 / np.median(count), 0)
     return PartErrors(index, expected, expected, np.log1p(trust * noise / np.square(expected)) + np.log1p(fewer))
 
 

@@ -150,7 +150,7 @@ def estimate_plain(sums: ErrorSums, grid: tuple[int, int]) -> Estimate:
     mean = sums.values / count
     # The second moment of one part is noisy itself: its neighbours' is a prior.
     (near, squares_near), neighbours = neighbourhood(np.stack([mean, squares / count]), index, grid)
-    noise = (squares + TUNING.lean * squares_near) / (count + TUNING.lean) / count
+    noise = (squares + TUNING.prior_pixels * squares_near) / (count + TUNING.prior_pixels) / count
     # Means of neighbours are shrunk towards the mean of all, and each part towards its neighbours.
     around = shrink(near, np.full_like(near, average), noise / np.maximum(neighbours, 1))[0]
     expected, trust = shrink(mean, np.maximum(around, 1e-3 * average), noise)

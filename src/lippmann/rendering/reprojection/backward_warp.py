@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from lippmann.display.lens_field import LensField
 from lippmann.rendering.reprojection.epipolar_march import color_at, is_trusted, march, mark_nearest
 from lippmann.rendering.reprojection.point_image import BACKGROUND, QUEUED, REPROJECTED, TRACED, PointImage, RealArray
-from lippmann.rendering.reprojection.rules import Rules, alike, coded_value, nearer
+from lippmann.rendering.reprojection.rules import Rules, alike, coded_value, is_behind, limit_of_probes, nearer, widen
 from lippmann.rendering.reprojection.schedule import Lenses, Step
 from lippmann.rendering.reprojection.tuning import TUNING
 from lippmann.runtime.numba_jit import compiled, uncounted
@@ -107,15 +107,9 @@ def probed_limit(points: PointImage, field: LensField, row: int, column: int, ga
         while c <= column + reach and c < width:
             if field.lens[r, c] == field.lens[row, column] and points.status[r, c] == TRACED:
                 s = np.float64(points.disparity[r, c])
-                if nearest == 0.0:
-                    nearest, farthest = s, s
-                elif nearer(s, nearest):
-                    nearest = s
-                elif nearer(farthest, s):
-                    farthest = s
+                nearest, farthest = widen(nearest, farthest, s)
             c += stride
-    # Probes on one surface allow its farthest point; probes on different ones only the nearest.
-    return farthest if alike(nearest, farthest, TUNING.one_probed_surface) else nearest
+    return limit_of_probes(nearest, farthest)
 
 
 @compiled
@@ -202,7 +196,7 @@ def _gather_pixel(
         mean += share[k] * depth[k]
     mean /= total
     limit = probed_limit(points, field, row, column, gathering)
-    if limit != 0.0 and nearer(limit, mean) and not alike(limit, mean, TUNING.one_probed_surface):
+    if is_behind(mean, limit):
         return False
     if nearer(beside_nearest, mean) and (rules.careful or outlines == asked):
         return False

@@ -26,7 +26,16 @@ from lippmann.rendering.reprojection.point_image import (
     PointImage,
     RealArray,
 )
-from lippmann.rendering.reprojection.rules import Rules, alike, coded_value, color_difference, nearer
+from lippmann.rendering.reprojection.rules import (
+    Rules,
+    alike,
+    coded_value,
+    color_difference,
+    is_behind,
+    limit_of_probes,
+    nearer,
+    widen,
+)
 from lippmann.rendering.reprojection.schedule import Lenses, Step
 from lippmann.rendering.reprojection.tuning import TUNING
 from lippmann.runtime.numba_jit import compiled, inlined, uncounted
@@ -240,14 +249,8 @@ def probed_limits(
                 if column >= rows.first[lens + 1] or points.status[probed, column] != TRACED:
                     continue
                 s = np.float64(points.disparity[probed, column])
-                if nearest == 0.0:
-                    nearest, farthest = s, s
-                elif nearer(s, nearest):
-                    nearest = s
-                elif nearer(farthest, s):
-                    farthest = s
-        # Probes on one surface allow its farthest point; probes on different ones only the nearest.
-        limits[entry, stretch] = farthest if alike(nearest, farthest, TUNING.one_probed_surface) else nearest
+                nearest, farthest = widen(nearest, farthest, s)
+        limits[entry, stretch] = limit_of_probes(nearest, farthest)
 
 
 @inlined
@@ -288,7 +291,7 @@ def settle(
 
         stretch = 0 if place < first_probe else (1 if place < second_probe else 2)
         limit = limits[entry, stretch]
-        if limit != 0.0 and nearer(limit, depth) and not alike(limit, depth, TUNING.one_probed_surface):
+        if is_behind(depth, limit):
             continue
         beside_left, beside_right = nearer(hidden[0, place], depth), nearer(hidden[1, place], depth)
         if (beside_left and beside_right) or (rules.careful and (beside_left or beside_right)):

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lippmann.rendering.reprojection.point_image import RealArray
+from lippmann.rendering.reprojection.tuning import TUNING
 from lippmann.runtime.numba_jit import inlined
 
 
@@ -55,6 +56,33 @@ def nearer(s: float, t: float) -> bool:
 def alike(s: float, t: float, part: float) -> bool:
     """Whether two disparities differ by at most ``part`` of the larger."""
     return abs(s - t) <= part * max(abs(s), abs(t))
+
+
+@inlined
+def widen(nearest: float, farthest: float, s: float) -> tuple[float, float]:
+    """The range of disparities from ``nearest`` to ``farthest``, widened to hold ``s``; (0, 0) is an empty range."""
+    if nearest == 0.0:
+        nearest, farthest = s, s
+    elif nearer(s, nearest):
+        nearest = s
+    elif nearer(farthest, s):
+        farthest = s
+    return nearest, farthest
+
+
+@inlined
+def limit_of_probes(nearest: float, farthest: float) -> float:
+    """Disparity of the farthest point to expect beside probes with these disparities; 0 without probes.
+
+    Probes on one surface allow its farthest point; probes on different ones only the nearest.
+    """
+    return farthest if alike(nearest, farthest, TUNING.one_surface) else nearest
+
+
+@inlined
+def is_behind(s: float, limit: float) -> bool:
+    """Whether disparity ``s`` belongs to a surface behind the ``limit`` of probes; never where that is 0."""
+    return limit != 0.0 and nearer(limit, s) and not alike(limit, s, TUNING.one_surface)
 
 
 @inlined
