@@ -15,7 +15,8 @@ def samples_in_words(spp: int | None, of: str = "per pixel") -> str:
 
 def depths_in_words(back: float, front: float) -> str:
     """The range from ``back`` to ``front``, z in millimetres."""
-    return f"from {-back:.1f} mm behind to {front:.1f} mm in front of the lens plane"
+    behind, before = (round(depth, 1) + 0.0 for depth in (-back, front))  # no -0.0
+    return f"from {behind:.1f} mm behind to {before:.1f} mm in front of the lens plane"
 
 
 def duration_in_words(seconds: float) -> str:

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import Literal, get_args, get_origin
 
+import numpy as np
 import pytest
 
 import lippmann
@@ -178,6 +179,15 @@ def test_an_option_is_checked_and_explained(kind, each, its):
                 kind(**{each.name: value})
             assert caught.value.parameter == each.name
     kind(**{each.name: default_of(each)})
+
+
+def test_numbers_of_numpy_are_taken_as_plain_ones():
+    asked = QualityOptions(spp=np.int64(4), seed=np.uint32(3), quality=np.float32(30))
+    assert [type(value) for value in (asked.spp, asked.seed, asked.quality)] == [int, int, float]
+    assert settings_of(asked) == settings_of(QualityOptions(spp=4, seed=3, quality=30.0))
+    for wrong in (True, np.float32(4), np.int64(0)):
+        with pytest.raises(UsageError, match=r"spp: .* whole number from 1"):
+            QualityOptions(spp=wrong)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import textwrap
 import types
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
 
 from lippmann.errors import UsageError
@@ -143,6 +143,13 @@ def again(kind: type, name: str, **changes: Any) -> Any:
     return field(default=changes.get("default", each.default), metadata={_KEY: its})
 
 
+def _own_number(value: object) -> object:
+    """A number of another library, such as NumPy, as Python's own, which JSON takes; other values as they are."""
+    if isinstance(value, bool):
+        return value
+    return int(value) if isinstance(value, Integral) else float(value) if isinstance(value, Real) else value
+
+
 @dataclass(frozen=True)
 class Options:
     """Base of what is asked for: every option is checked by itself."""
@@ -153,7 +160,9 @@ class Options:
 
     def __post_init__(self) -> None:
         for each, its in options_of(type(self)):
-            its.check(each.name, getattr(self, each.name), each.type)
+            value = _own_number(getattr(self, each.name))
+            its.check(each.name, value, each.type)
+            object.__setattr__(self, each.name, value)
 
     @classmethod
     def of(cls: type[T], values: Mapping[str, object]) -> T:

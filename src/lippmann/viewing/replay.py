@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from operator import index
 from typing import Literal, get_args
 
 import numpy as np
@@ -319,7 +320,10 @@ def checked_eye(eye: Eye) -> Eye:
 
 def checked_size(size: tuple[int, int]) -> tuple[int, int]:
     """``size`` itself; :class:`UsageError` unless it is two whole numbers from 1 to 65535."""
-    width, height = size
-    if not (isinstance(width, int) and isinstance(height, int) and 1 <= width <= 65535 and 1 <= height <= 65535):
+    try:
+        width, height = (index(side) for side in size)
+    except (TypeError, ValueError):
+        width = height = 0
+    if not (1 <= width <= 65535 and 1 <= height <= 65535):
         raise UsageError(f"the size is {size!r}", rule="it must be two whole numbers from 1 to 65535")
     return width, height

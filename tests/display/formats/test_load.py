@@ -190,6 +190,12 @@ def test_broken_files(write, text, said):
     assert str(caught.value).startswith(str(path))
 
 
+@pytest.mark.parametrize(("nothing", "kind"), [(None, "NoneType"), (5, "int"), ({}, "dict")])
+def test_values_that_are_no_display(nothing, kind):
+    with pytest.raises(DisplayError, match=f"^display: a {kind} is no display; it must be a name"):
+        load_display(nothing)
+
+
 def test_unreadable_places(tmp_path):
     with pytest.raises(DisplayError, match="cannot be read: No such file"):
         load_display(tmp_path / "absent.toml")

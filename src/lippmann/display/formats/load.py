@@ -234,7 +234,12 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
     """
     own = displays().own[_OWN]
     presets = own.presets
-    name = os.fspath(name_or_path)
+    try:
+        name = os.fspath(name_or_path)
+    except TypeError:
+        rule = "it must be a name such as 'seed-lenticular', a file or a Display"
+        what = f"a {type(name_or_path).__name__} is no display"
+        raise DisplayError(what, parameter="display", rule=rule) from None
     # Owners of a Looking Glass know their device as "portrait".
     short = _FAMILY + name.removeprefix("lkg-")
     name = short if short in presets else name
