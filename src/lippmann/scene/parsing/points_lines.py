@@ -75,15 +75,16 @@ def as_material(material: Material) -> Material:
     )
 
 
-def thinned(points: Mesh, step: int) -> Mesh:
-    """One in ``step`` of the points of a mesh whose ``faces`` are ``(m, 1)``."""
-    chosen = points.faces[::step, 0]
+def thinned(thin: Mesh, step: int) -> Mesh:
+    """One in ``step`` of the points or lines of a mesh whose ``faces`` are ``(m, 1)`` or ``(m, 2)``."""
+    chosen = thin.faces[::step]
+    used, faces = np.unique(chosen, return_inverse=True)
     return replace(
-        points,
-        positions=points.positions[chosen],
-        faces=np.arange(len(chosen), dtype=np.uint32)[:, None],
-        uvs=tuple(uvs[chosen] for uvs in points.uvs),
-        colors=None if points.colors is None else points.colors[chosen],
+        thin,
+        positions=thin.positions[used],
+        faces=faces.reshape(chosen.shape).astype(np.uint32),
+        uvs=tuple(uvs[used] for uvs in thin.uvs),
+        colors=None if thin.colors is None else thin.colors[used],
     )
 
 

@@ -103,14 +103,21 @@ def test_of_too_many_points_some_are_drawn(writer, read, monkeypatch):
     assert {tuple(color) for color in scene.meshes[0].colors.tolist()} == {(1, 0, 0, 0), (0, 0, 0, 1)}
 
 
-def test_too_many_lines_or_copies_are_refused(writer, read, monkeypatch):
+def test_of_too_many_lines_some_are_drawn(writer, read, monkeypatch):
+    """The Khronos group's test of modes has half a million of them."""
     monkeypatch.setattr("lippmann.scene.readers.gltf.points_lines.MOST", 2)
-    assert "the file shows 3 points or lines; up to 2 are drawn" in _refusal(read, writer.triangle(mode=2))
-    writer.json["meshes"][0]["primitives"][0]["mode"] = 0
-    del writer.json["buffers"]
+    scene = read(writer.triangle(positions=[*SQUARE, SQUARE[0]], mode=3))
+    assert scene.notes[0] == "of 5 lines one in 3 is drawn"
+    rods = [rod.mean(axis=0) for rod in np.split(scene.meshes[0].positions, 2)]
+    np.testing.assert_allclose(rods, [np.mean(SQUARE[:2], axis=0), np.mean(SQUARE[3:5], axis=0)], atol=1e-6)
+
+
+def test_too_many_copies_of_points_are_refused(writer, read, monkeypatch):
+    monkeypatch.setattr("lippmann.scene.readers.gltf.points_lines.MOST", 2)
+    writer.triangle(mode=0)
     places = writer.accessor([[0, 0, 0]] * 3)
     writer.json["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}}
-    assert "the file shows 9 points or lines; up to 2 are drawn" in _refusal(read, writer)
+    assert "the file shows 9 points; up to 2 copies are drawn" in _refusal(read, writer)
 
 
 def test_strips_lose_the_triangles_that_only_turn_corners(writer, read):

@@ -52,8 +52,8 @@ def draw_points_and_lines(
     Raises
     ------
     SceneError
-        The file shows more than :data:`~lippmann.scene.parsing.points_lines.MOST` lines, or copies of points. Of more
-        points than that, some are drawn, with a note.
+        The file shows more than :data:`~lippmann.scene.parsing.points_lines.MOST` copies of meshes of points or of
+        lines. Of more points or lines than that, some are drawn, with a note.
     """
     stacks: dict[int, list[Matrix]] = {}
     for mesh, worlds in placements:
@@ -71,10 +71,11 @@ def draw_points_and_lines(
             continue
         count = sum(len(thin.faces) * copies[mesh] for mesh, thin in chosen.items())
         if count > MOST:
-            if size == _LINES or sum(copies[mesh] for mesh in chosen) > MOST:
-                raise document.error(f"the file shows {count} points or lines", rule=f"up to {MOST} are drawn")
+            kind = "lines" if size == _LINES else "points"
+            if sum(copies[mesh] for mesh in chosen) > MOST:
+                raise document.error(f"the file shows {count} {kind}", rule=f"up to {MOST} copies are drawn")
             step = -(-count // MOST)
-            document.notes.add(f"of {count} points one in {step} is drawn")
+            document.notes.add(f"of {count} {kind} one in {step} is drawn")
             chosen = {mesh: thinned(thin, step) for mesh, thin in chosen.items()}
         width = width_of(thin_width.diagonal, min(count, MOST), lines=size == _LINES)
         document.notes.add(width.note)
