@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -17,3 +18,52 @@ def test_nothing_heavy_is_loaded(code):
     )
     done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def run_python(code):
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+
+
+KEPT = """
+import atexit, os, sys, lippmann.cli
+class Kept:
+    def __del__(self, write=os.write): write(2, b"taken down")
+sys.kept = Kept()
+{}
+lippmann.cli.main(["displays"])
+"""
+
+
+def test_a_command_ends_without_taking_the_interpreter_down_unless_somebody_has_to_hear_of_it():
+    done = run_python(KEPT.format(""))
+    assert (done.returncode, done.stderr) == (0, "")
+    done = run_python(KEPT.format("atexit.register(print, 'heard')"))
+    assert (done.returncode, done.stdout.split()[-1], done.stderr) == (0, "heard", "taken down")
+
+
+@pytest.mark.parametrize(
+    ("command", "code"),
+    [("raise SystemExit(130)", 130), ("raise SystemExit('so')", 1), ("raise SystemExit", 0), ("raise KeyError", 1)],
+)
+def test_the_exit_code_is_the_commands_own(command, code):
+    lines = "import lippmann.cli.commands.system as system\ndef displays():\n    print('all said')\n"
+    end = f"    {command}\nsystem.displays = displays\nimport lippmann.cli\nlippmann.cli.main(['displays', '--debug'])"
+    done = run_python(lines + end)
+    assert (done.returncode, done.stdout) == (code, "all said\n")
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads are counted as Linux lists them")
+def test_a_command_leaves_no_threads_waiting_for_linear_algebra():
+    lines = "import os, lippmann.cli.commands.system as system\ndef displays():\n    import numpy\n"
+    end = "    print(len(os.listdir('/proc/self/task')))\nsystem.displays = displays\n"
+    done = run_python(lines + end + "import lippmann.cli\nlippmann.cli.main(['displays'])")
+    assert (done.stdout, done.stderr) == ("1\n", "")
+
+
+def test_an_option_of_the_command_at_hand_is_known_without_loading_the_others():
+    code = (
+        "import sys\nfrom lippmann.cli.app import app_of\nfrom lippmann.cli.shared.command_options import translated\n"
+        "app_of(['preview'])\nprint(translated('spp=3'), 'lippmann.cli.commands.interlace' in sys.modules)\n"
+        "print(translated('photos=...'), 'lippmann.cli.commands.interlace' in sys.modules)"
+    )
+    assert run_python(code).stdout.splitlines() == ["--spp 3 False", "PHOTOS True"]

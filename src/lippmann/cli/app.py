@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import os
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from typing import Annotated
 
 import typer
@@ -110,7 +110,10 @@ def app_of(words: Sequence[str]) -> typer.Typer:
     first = words[0] if words else "--help"
     if first in ("--help", "--version"):
         return _outline()
-    return make_app(first if first in COMMANDS else "")
+    if first not in COMMANDS:
+        return make_app()
+    commands_are(partial(make_app, first), make_app)
+    return make_app(first)
 
 
 @cache

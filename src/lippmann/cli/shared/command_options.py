@@ -180,7 +180,7 @@ def in_options(error: LippmannError) -> str:
 
 def option_of(parameter: str) -> str:
     """The option of a parameter; its own name where it has none."""
-    return _options().get(parameter, parameter) if parameter else ""
+    return _option(parameter) or parameter
 
 
 def translated(text: str) -> str:
@@ -190,7 +190,7 @@ def translated(text: str) -> str:
 
 def _as_option(match: re.Match[str]) -> str:
     name, quoted, plain = match.groups()
-    option = _options().get(name)
+    option = _option(name)
     if option is None:
         return match[0]
     if plain in ("True", "..."):
@@ -200,20 +200,25 @@ def _as_option(match: re.Match[str]) -> str:
     return f"{option} {plain if quoted is None else quoted}"
 
 
-def commands_are(make_app: Callable[[], typer.Typer]) -> None:
-    """Say which commands there are, once one has to know: their options are the words of what follows."""
-    _makers[:] = [make_app]
+def commands_are(*make_app: Callable[[], typer.Typer]) -> None:
+    """Say which commands there are, those at hand first: their options are the words of what follows."""
+    _makers[:] = make_app
     _options.cache_clear()
 
 
 _makers: list[Callable[[], typer.Typer]] = []
 
 
+def _option(parameter: str) -> str | None:
+    """The option of a parameter, of the command at hand where it has one: to load all commands takes time."""
+    return next((known[parameter] for make in _makers if parameter in (known := _options(make))), None)
+
+
 @cache
-def _options() -> Mapping[str, str]:
-    """Options by the names of their parameters, of all commands; arguments by theirs, in capitals."""
+def _options(make_app: Callable[[], typer.Typer]) -> Mapping[str, str]:
+    """Options by the names of their parameters; arguments by theirs, in capitals."""
     names: dict[str, str] = {}
-    for command in (each for make in _makers for each in _commands(typer.main.get_command(make()))):
+    for command in _commands(typer.main.get_command(make_app())):
         for parameter in command.params:
             if parameter.name is not None:
                 long = [option for option in parameter.opts if option.startswith("--")]
