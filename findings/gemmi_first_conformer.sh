@@ -7,7 +7,7 @@
 #   own name says.
 # What happens: it does so only where the alternatives of an atom stand beside each other (N/A, N/B, CA/A, CA/B). Where
 #   the whole of conformer A comes before the whole of B, as several refinement programs write it, all atoms come back:
-#   here 4 for 2 names. Chain.first_conformer(), over residues, works in both orders.
+#   here 4 for 2 names. Chain.first_conformer(), over residues, takes both orders.
 # Who is hurt: whoever draws or measures one conformer: atoms lie on top of each other, with bonds between them, and
 #   nothing is reported.
 # Seen: "beside each other: ['N', 'CA']; one after the other: ['N', 'CA', 'N', 'CA']"
