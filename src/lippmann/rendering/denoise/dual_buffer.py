@@ -16,9 +16,12 @@ Before denoising, outlines in front of the background are improved by the covera
 (:mod:`lippmann.rendering.denoise.outlines`). Each half uses one half of these rays, so that their error is estimated,
 too.
 
-Errors are converted from linear light to codes by the slope of the transfer curve. This fails for pixels that the
-denoiser made far brighter than the samples, as it does beside emitters: beyond white the curve is clipped, and in the
-dark it is steep. There the finite difference between the codes is used.
+Errors are those between codes. The denoised halves are compared as codes. The samples are too noisy for that: what they
+say of the bias is converted by the slope of the curve. This fails for pixels that the denoiser made far brighter than
+the samples, as it does beside emitters: beyond white the curve is clipped, and in the dark it is steep. There the
+finite difference between the codes is used. The curve bends, so the code of a noisy picture is too low in the mean even
+where its light is right. The jackknife of two halves (Quenouille 1956) estimates this bias: the mean of the halves'
+codes less the code of their mean. It matters where light is rare, as that of small emitters in curved mirrors.
 """
 
 from __future__ import annotations
@@ -30,7 +33,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import Coding, coding_chord, coding_slope
+from lippmann.color.transfer import Coding, coding_chord, coding_slope, encode
 from lippmann.rendering.denoise.noisy_blend import mean_around, weigh_samples
 from lippmann.rendering.denoise.outlines import exchange_coverage
 from lippmann.rendering.denoise.tuning import TUNING
@@ -90,9 +93,11 @@ class Denoised:
     def squared_error(self) -> PixelErrors:
         """Squared error of every pixel's code, estimated from the two halves."""
         noisy, clean = self._clean_halves()
+        first, second = (encode(half, self._coding) for half in clean)
+        apart: Floats = (np.float32(0.25) * np.square(first - second)).mean(axis=2)
+        bend = encode(self._mean(), self._coding) - np.float32(0.5) * (first + second)
         slope = self._slope(noisy)
-        apart: Floats = (np.float32(0.25) * np.square(slope * (clean[0] - clean[1]))).mean(axis=2)
-        left = [slope * (half - smooth) for half, smooth in zip(noisy, clean, strict=True)]
+        left = [slope * (half - smooth) + bend for half, smooth in zip(noisy, clean, strict=True)]
         common = (left[0] * left[1]).mean(axis=2)
         limit = TUNING.hidden * max(1.0, REQUEST.usual / self._renderer.samples)
         hidden = np.maximum(np.abs(left[0]), np.abs(left[1])).max(axis=2) > limit
