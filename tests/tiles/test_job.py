@@ -13,9 +13,10 @@ import pytest
 from lippmann import api
 from lippmann.display import Display, LensArray, Panel, load_display
 from lippmann.errors import MemoryLimitError, UsageError
-from lippmann.journal import TileGrid, encode
+from lippmann.journal import TileGrid, content_hash, encode
 from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.scene import bundled
 from lippmann.tiles.job import FEWEST_TILES, make_job
 
 SETTINGS = RenderRequest(method="full", integrator="direct", spp=2, memory=1 << 30)
@@ -78,7 +79,7 @@ def test_threads_do_not_matter(engine):
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.tiles.tile_render import prepare, render_tile
     from lippmann.tiles.job import make_job
-    from lippmann.journal import TileGrid, encode
+    from lippmann.journal import TileGrid, content_hash, encode
     settings = RenderRequest(integrator="direct", spp=2, threads=int(sys.argv[1]))
     display = load_display("seed-lenticular").resized(64, 64)
     job = make_job(api.load_scene("small-balls"), display, settings, stored="float32", side=64)
@@ -141,6 +142,11 @@ def test_the_sums_of_tiles_give_the_estimate_of_the_whole(engine, layout):
 def test_what_changes_the_picture_changes_the_fingerprint(change, name):
     before, after = job().fingerprint("cpu"), job(**change).fingerprint("cpu")
     assert name in {key for key in before if before[key] != after[key]}
+
+
+def test_every_bundled_scene_has_a_hash_of_its_own():
+    hashes = [content_hash(api.load_scene(name)) for name in bundled.names()]
+    assert len(set(hashes)) == len(hashes) >= 6
 
 
 def test_a_new_version_changes_the_fingerprint(monkeypatch):

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -436,14 +435,19 @@ def _from_library(name: str) -> Scene:
         return replace(_classic(_with_paper_depth(content), bundled.stage_of(name).camera()), home_may_move=True)
     description = check_description(content, name)
     home = description.cameras[0].name if description.cameras else None
-    return Scene(name, description, home_camera=home, home_may_move=True, classic_form=partial(_classic_form, name))
+    return Scene(name, description, home_camera=home, home_may_move=True, classic_form=_ClassicForm(name))
 
 
-def _classic_form(name: str) -> ClassicScene:
-    """The form of a bundled scene for the classic light models."""
-    from lippmann.scene import bundled
+@dataclass(frozen=True)
+class _ClassicForm:
+    """Makes the form of a bundled scene for the classic light models; a plain value, as scenes are hashed."""
 
-    return _with_paper_depth(bundled.make_classic(name))
+    name: str
+
+    def __call__(self) -> ClassicScene:
+        from lippmann.scene import bundled
+
+        return _with_paper_depth(bundled.make_classic(self.name))
 
 
 def _with_paper_depth(scene: ClassicScene) -> ClassicScene:
