@@ -40,7 +40,7 @@ class Sampler:
     Attributes
     ----------
     times:
-        ``(k,)`` seconds, rising.
+        ``(k,)`` seconds, rising; of equal ones the last counts from then on.
     values:
         ``(k, width)``; for cubic splines ``(k, 3, width)``: tangent before, value, tangent after.
     turning:
@@ -116,7 +116,7 @@ class Animation:
     @property
     def duration(self) -> float:
         """Seconds from time 0 to the last key."""
-        return max((float(sampler.times[-1]) for sampler in self.samplers.values()), default=0.0)
+        return max((0.0, *(float(sampler.times[-1]) for sampler in self.samplers.values())))
 
     def at(self, seconds: float) -> dict[Target, Floats]:
         """Values of all targets at a time."""
@@ -131,7 +131,7 @@ def read_animations(document: Document, accessors: Accessors) -> tuple[Animation
     Raises
     ------
     SceneError
-        A channel without a sampler, keys that do not rise, values that do not fit their keys or are not finite, a
+        A channel without a sampler, times of keys or values that do not fit their keys or are not finite, a
         rotation of length 0, a node that has a matrix.
     """
     return tuple(
@@ -173,8 +173,10 @@ def _read_sampler(fields: Fields, path: str, document: Document, accessors: Acce
         raise fields.error("interpolation", f"{', '.join(_INTERPOLATIONS)} belongs here")
     keys = document.required_reference(fields, "input", "accessors")
     times = accessors.floats(keys, storage.KEY_TIMES)[:, 0].astype(np.float64)
-    if not len(times) or not np.isfinite(times).all() or times[0] < 0.0 or (np.diff(times) <= 0.0).any():
-        raise fields.error("input", "its times must be 0 or more and rise from key to key")
+    if not len(times) or not np.isfinite(times).all():
+        raise fields.error("input", "its times must be finite")
+    if (np.diff(times) <= 0.0).any():
+        document.notes.add("keys whose times do not rise are sorted; of equal times the last counts", fields.place)
     output = document.required_reference(fields, "output", "accessors")
     values = accessors.floats(output, _STORAGE[path]).astype(np.float64)
     per_key = 3 if interpolation == "CUBICSPLINE" else 1
@@ -189,4 +191,5 @@ def _read_sampler(fields: Fields, path: str, document: Document, accessors: Acce
     turning = path == "rotation"
     if turning and not (values[:, 1] if per_key == 3 else values).any(axis=1).all():
         raise fields.error("output", "a quaternion of length 0 is no rotation")
-    return Sampler(times, values, interpolation, turning)
+    order = np.argsort(times, kind="stable")
+    return Sampler(times[order], values[order], interpolation, turning)
