@@ -14,7 +14,7 @@ from lippmann.display import load_display
 from lippmann.scene.values.description import Environment, Light
 from lippmann.sequences.frames import render_sequence
 from lippmann.sequences.kept_scene import KeptScene
-from lippmann.sequences.motion import open_motion
+from lippmann.sequences.motion import Motion, open_motion
 from lippmann.sequences.turntable import open_turntable
 
 QUICK = {"integrator": "path", "spp": 2, "device": "cpu"}
@@ -62,11 +62,60 @@ def test_a_turn_builds_once_and_shows_what_frames_built_alone_show(engine, displ
     assert len(builds) == 3
 
 
-def test_a_light_source_that_goes_along_is_placed_anew(engine, display, builds):
-    light = Light("point", (80.0, 80.0, 80.0), np.array([[1, 0, 0, 6], [0, 1, 0, 4], [0, 0, 1, 6], [0, 0, 0, 1.0]]))
-    motion = open_turntable(teapot(lights=[light]), 4)
+PLACE = np.array([[0.6, 0, 0.8, 6], [0, 1, 0, 4], [-0.8, 0, 0.6, 6], [0, 0, 0, 1.0]])
+
+
+def lamp(kind="point", **more):
+    return Light(kind, (80.0, 80.0, 80.0), PLACE, **more)
+
+
+@pytest.mark.parametrize("kind", ["point", "spot", "directional"])
+def test_light_sources_go_along_with_what_is_built(engine, display, builds, kind):
+    motion = open_turntable(teapot(lights=[lamp(kind), lamp("point")], environment=sky(), background=None), 5)
+    *_, (_, together) = render_sequence(motion, display, [0, 1], **QUICK)
+    assert len(builds) == 1
+    ((_, alone),) = render_sequence(motion, display, [1], **QUICK)
+    assert np.array_equal(alone.pixels, together.pixels)
+
+
+def test_a_light_source_that_is_a_shape_is_built_anew(engine, display, builds):
+    motion = open_turntable(teapot(lights=[lamp(radius=1.0)]), 4)
     list(render_sequence(motion, display, [0, 1], **QUICK))
     assert len(builds) == 2
+
+
+class Cut(Motion):
+    """Frames of the scenes that are given."""
+
+    def __init__(self, *scenes):
+        self._scenes = scenes
+
+    count = property(lambda self: len(self._scenes))
+    content = property(lambda self: self._scenes)
+
+    def scene(self, frame):
+        return self._scenes[frame]
+
+    def camera(self, frame, name):
+        return None
+
+    def bounds(self):
+        boxes = np.stack([scene.bounds for scene in self._scenes])
+        return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+
+@pytest.mark.parametrize("change", ["surfaces", "object", "light", "dark"])
+def test_the_frame_after_a_cut_is_the_first_of_a_film_that_begins_there(engine, display, change):
+    scene = teapot(environment=sky(), lights=[lamp()])
+    before = {
+        "surfaces": teapot(environment=sky(), lights=[lamp()], materials=scene.physical.materials[::-1]),
+        "object": teapot(environment=sky(), lights=[lamp()], instances=scene.physical.instances[:-1]),
+        "light": teapot(environment=sky()),
+        "dark": teapot(environment=sky(), lights=[replace(lamp(), color=(0.0, 0.0, 0.0))]),
+    }[change]
+    *_, (_, together) = render_sequence(Cut(before, scene), display, [0, 1], **QUICK)
+    ((_, alone),) = render_sequence(Cut(before, scene), display, [1], **QUICK)
+    assert np.array_equal(alone.pixels, together.pixels)
 
 
 def test_an_animation_keeps_its_materials_and_shows_what_frames_built_alone_show(

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 class KeptScene:
     """Builds scenes as :func:`lippmann.device.pbr.build` does, with what they share with the last one.
 
-    On a turntable, and where a camera flies, shapes stay as they are, and light from far away is turned. An animation
+    On a turntable, and where a camera flies, shapes stay as they are, and light sources are placed anew. An animation
     keeps its materials and textures. The picture is that of a scene built anew, byte for byte.
     """
 
@@ -25,15 +25,16 @@ class KeptScene:
     def build(self, scene: Scene, engine: Engine, *, memory: int | None = None) -> BuiltScene:
         """The scene on the device; parameters and errors as those of :func:`lippmann.device.pbr.build`."""
         from lippmann.device.pbr import build
-        from lippmann.device.pbr.emitters import turn_environment
+        from lippmann.device.pbr.emitters import place_lights, turn_environment
 
         if self._last is None:
             built = build(scene, engine, memory=memory)
-        elif _differs_by_far_light(self._last[0], scene):
+        elif _differs_by_light(self._last[0], scene):
             built = self._last[1]
             environment = scene.environment
             if environment is not None:
                 turn_environment(built.mitsuba.environment(), environment.world_from_environment)
+            place_lights(built.mitsuba, scene.lights)
         else:
             finishes = self._last[1].finishes if _has_same_materials(self._last[0], scene) else None
             self._last = None  # two scenes may not fit the memory
@@ -42,14 +43,11 @@ class KeptScene:
         return built
 
 
-def _differs_by_far_light(one: Scene, other: Scene) -> bool:
-    """Whether two scenes are alike but for the direction of their surroundings.
-
-    Light sources have places, which a scene on the device keeps.
-    """
+def _differs_by_light(one: Scene, other: Scene) -> bool:
+    """Whether two scenes are alike but for the places of their light: none that a shape gives, which is built in."""
     if one is other:
         return True
-    return one.physical is other.physical and one.light == other.light and not one.lights
+    return one.physical is other.physical and one.light == other.light and not any(light.radius for light in one.lights)
 
 
 def _has_same_materials(one: Scene, other: Scene) -> bool:

@@ -8,7 +8,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from lippmann.device.pbr.emitters import environment_to_world
+from lippmann.device.pbr.emitters import active_lights, environment_to_world
 from lippmann.options.light import LightOptions
 from lippmann.scene.light_options import change_source, light_rotation
 from lippmann.scene.scene import Scene
@@ -36,8 +36,9 @@ class EmitterUpdates:
         emitter = built.mitsuba.environment() if self._environment is not None else None
         self._surroundings = None if emitter is None else _Emitter(emitter)
         by_name = {_name(emitter): emitter for emitter in built.mitsuba.emitters()}
-        lit = [light for light in scene.lights if max(light.color) > 0]
-        self._sources = [(light, _Emitter(by_name[f"light_{number}"])) for number, light in enumerate(lit)]
+        self._sources = [
+            (light, _Emitter(by_name[f"light_{number}"])) for number, light in enumerate(active_lights(scene.lights))
+        ]
         self._last = LightOptions()
 
     def can_apply(self, light: LightOptions) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,7 @@ from lippmann.device.types import (
     Emitter,
     Float,
     Interaction3f,
+    MitsubaScene,
     Point2f,
     Properties,
     SurfaceInteraction3f,
@@ -34,6 +36,11 @@ MAX_EXACT_ROWS = 512
 
 #: Mitsuba puts column 0 of an environment, not the middle, at -z: half a turn between.
 _HALF_TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
+
+
+def active_lights(lights: Sequence[Light]) -> list[Light]:
+    """The light sources that give light; the builder calls their emitters ``light_0``, ``light_1``, ..."""
+    return [light for light in lights if max(light.color) > 0]
 
 
 def light_object(light: Light) -> Emitter:
@@ -115,6 +122,18 @@ def turn_environment(emitter: Emitter, world_from_environment: Matrix) -> None:
     parameters = mi.traverse(emitter)
     if "to_world" in parameters:
         parameters["to_world"] = mi.Transform4f(environment_to_world(world_from_environment).tolist())
+        parameters.update()
+
+
+def place_lights(scene: MitsubaScene, lights: Sequence[Light]) -> None:
+    """Place the light sources of a built scene anew, those without a radius: ``lights`` are the same ones elsewhere."""
+    import mitsuba as mi
+
+    emitters = {emitter.id(): emitter for emitter in scene.emitters()}
+    for number, light in enumerate(active_lights(lights)):
+        parameters, elsewhere = mi.traverse(emitters[f"light_{number}"]), mi.traverse(light_object(light))
+        place = "position" if light.kind == "point" else "to_world"
+        parameters[place] = elsewhere[place]
         parameters.update()
 
 

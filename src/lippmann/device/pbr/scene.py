@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lippmann.device.pbr.emitters import environment_object, light_object
+from lippmann.device.pbr.emitters import active_lights, environment_object, light_object
 from lippmann.device.pbr.material_groups import Variant, follows_tangents
 from lippmann.device.pbr.materials import Finish, make_finishes
 from lippmann.device.pbr.media import MEDIA_NOTE, has_media
@@ -156,7 +156,7 @@ def build_description(
 
             volume = make_volume_table(description.volume, available, name=description.name)
     with _time_stage(seconds, "lights"):
-        lights = [light_object(light) for light in description.lights if max(light.color) > 0]
+        lights = [light_object(light) for light in active_lights(description.lights)]
         if description.environment is not None:
             lights.append(environment_object(description.environment))
     with _time_stage(seconds, "acceleration"):
