@@ -22,6 +22,7 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Build
 from lippmann.scene.placement import Placement, options_of_sequence, place, stand
 from lippmann.scene.values.description import Camera, Matrix
+from lippmann.sequences.flicker import with_flicker
 from lippmann.sequences.forms import INTEGRAL, Form, QuiltForm, Shown
 from lippmann.sequences.kept_scene import KeptScene
 from lippmann.sequences.motion import Motion, open_motion
@@ -310,7 +311,10 @@ def render_frames(
         asked = replace(of_frame(request, frame), placement=where(frame))
         image = form.render(motion.scene(frame), display, asked, report, kept.build)
         made = image.provenance
-        yield frame, replace(image, provenance=replace(made, options={**made.options, "frame": frame}))
+        # Noise that stands still has no flicker that the frames' own errors would tell.
+        estimate = made.estimate if request.fixed_noise else with_flicker(made.estimate)
+        options = {**made.options, "frame": frame}
+        yield frame, replace(image, provenance=replace(made, options=options, estimate=estimate))
 
 
 def render_tiled_frames(

@@ -14,6 +14,7 @@ from lippmann.cli.shared.console import Console
 from lippmann.errors import OutputError, UsageError
 from lippmann.options.outputs import SequenceOptions
 from lippmann.options.texts import triple
+from lippmann.sequences.flicker import film_in_words
 
 if TYPE_CHECKING:
     from lippmann.cli.shared.scene_source import SceneSource
@@ -165,6 +166,7 @@ def render_frames(
                 "seconds": seconds,
                 "spp": made.spp,
                 "found": frame.found,
+                "estimate": None if made.estimate is None else dict(made.estimate),
             }
         )
         for note in made.notes:
@@ -205,6 +207,8 @@ def render_frames(
         where = next(iter(alike))
         only = f" ({len(alike)} of {len(done)} frames, the first is {where})" if len(alike) < len(done) else ""
         console.remark(f"{alike[where]}{' and the like' if len(set(alike.values())) > 1 else ''}{only}")
+    if (line := film_in_words([one["estimate"] for one in done])) is not None:
+        console.remark(line)
     film = "" if wanted.video is None else f", {wanted.video}"
     seconds, found = sum(one["seconds"] for one in done), sum(one["found"] for one in done)
     before = f", {found} of them found" if found else ""

@@ -58,7 +58,11 @@ def estimate_in_words(estimate: Mapping[str, object], part: str = "micro-image")
     """What a picture says of its own error, as :attr:`Provenance.estimate` holds it; a quilt's parts are views."""
     from lippmann.rendering.estimate.psnr import Estimate
 
-    return Estimate.from_dict(estimate).in_words(part)
+    words = Estimate.from_dict(estimate).in_words(part)
+    if "flicker" not in estimate:
+        return words
+    middle, low, high = (f"{estimate[name]:.1f}" for name in ("flicker", "flicker_low", "flicker_high"))
+    return f"{words}, flicker {middle} dB ({low} to {high})"
 
 
 def remarks(console: Console, made: Provenance) -> None:

@@ -109,7 +109,7 @@ def estimate_denoised(errors: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     parts = _parts(errors, samples.squares, index, grid, middle)
     drawn = _draw_worst(parts, likely.quantiles((np.arange(TUNING.draws) + 0.5) / TUNING.draws) / middle)
     worst = np.quantile(drawn, (0.5, 0.975, 0.025)) * (1, 1, TUNING.often_better**2)
-    return make_estimate((middle, worse, better, *worst), int(index[np.argmax(parts.expected)]), grid)
+    return make_estimate((middle, worse, better, *worst, by_chance), int(index[np.argmax(parts.expected)]), grid)
 
 
 def _draw_worst(parts: PartErrors, common: Real) -> Real:

@@ -45,8 +45,9 @@ NORMAL_95 = NormalDist().inv_cdf(0.975)
 class Estimate:
     """Estimated PSNR of a picture in dB, each value with the ends of its 95 % interval.
 
-    ``psnr``: of all pixels; ``worst``: of the worst micro-image, which is probably lens ``worst_lens`` (column, row). A
-    picture without noise has the squared error ``FLOOR``, 116 dB.
+    ``psnr``: of all pixels; ``worst``: of the worst micro-image, which is probably lens ``worst_lens`` (column, row);
+    ``by_chance``: ``psnr`` if only that part of the error counted that another seed would change, None where that is
+    not known. A picture without noise has the squared error ``FLOOR``, 116 dB.
     """
 
     psnr: float
@@ -56,11 +57,12 @@ class Estimate:
     worst_low: float
     worst_high: float
     worst_lens: tuple[int, int]
+    by_chance: float | None = None
 
     def to_dict(self) -> dict[str, object]:
-        """All fields as JSON-able values, rounded to hundredths of a dB; :meth:`from_dict` reads them."""
-        plain = asdict(self)
-        return {name: list(v) if name == "worst_lens" else round(v, 2) for name, v in plain.items()}
+        """All known fields as JSON-able values, rounded to hundredths of a dB; :meth:`from_dict` reads them."""
+        known = {name: value for name, value in asdict(self).items() if value is not None}
+        return {name: list(v) if name == "worst_lens" else round(v, 2) for name, v in known.items()}
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, object]) -> Estimate:
@@ -71,9 +73,9 @@ class Estimate:
         KeyError
             If a field is missing.
         """
-        numbers = {field.name: cast("float", plain[field.name]) for field in fields(cls) if field.name != "worst_lens"}
+        numbers = {field.name: cast("float", plain[field.name]) for field in fields(cls)[:6]}
         column, row = cast("Sequence[int]", plain["worst_lens"])
-        return cls(**numbers, worst_lens=(column, row))
+        return cls(**numbers, worst_lens=(column, row), by_chance=cast("float | None", plain.get("by_chance")))
 
     def in_words(self, part: str = "micro-image") -> str:
         """One line for people; ``part`` is what a part of the picture that is judged by itself is called."""
@@ -162,15 +164,15 @@ def estimate_plain(sums: ErrorSums, grid: tuple[int, int]) -> Estimate:
     model = math.exp(TUNING.model_uncertainty)
     # Shrinkage raises the estimates beside a bad part, so the lower quantile is 0.01, not 0.025.
     worst = *np.quantile(draws.max(axis=0), (0.5, 0.975)) * (1, model), np.quantile(less.max(axis=0), 0.01) / model
-    return make_estimate((average, *ends, *worst), int(index[np.argmax(expected)]), grid)
+    return make_estimate((average, *ends, *worst, average), int(index[np.argmax(expected)]), grid)
 
 
 def make_estimate(errors: Sequence[float], worst: int, grid: tuple[int, int]) -> Estimate:
-    """An :class:`Estimate` from six squared errors in the order of its fields, and the index of the worst part."""
+    """An :class:`Estimate` from seven squared errors in the order of its fields, and the index of the worst part."""
     decibels = -10 * np.log10(np.maximum(errors, FLOOR))
-    whole, whole_low, whole_high, part, part_low, part_high = (float(each) for each in decibels)
+    whole, whole_low, whole_high, part, part_low, part_high, by_chance = (float(each) for each in decibels)
     row, column = divmod(worst, grid[1])
-    return Estimate(whole, whole_low, whole_high, part, part_low, part_high, (column, row))
+    return Estimate(whole, whole_low, whole_high, part, part_low, part_high, (column, row), by_chance)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,61 @@
+"""Flicker of a film by its own account: how much the errors of successive frames differ."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import cast
+
+Figures = Mapping[str, object]
+
+
+def with_flicker(estimate: Figures | None) -> Figures | None:
+    """A frame's estimate, as its file holds it, with its flicker.
+
+    Flicker is half the mean squared change of the error from one frame to the next, in dB, as
+    ``docs/reference/quality-figures.md`` defines it for views: for errors independent of each other it is the PSNR.
+
+    Errors by chance are independent, as each frame has a seed of its own. What a denoiser gets wrong in both halves of
+    a picture alike may stay from frame to frame, which does not flicker, or be new in each: half of it counts, and all
+    and none of it are the ends of the interval.
+
+    Parameters
+    ----------
+    estimate:
+        What :meth:`~lippmann.rendering.estimate.psnr.Estimate.to_dict` gives; None where nothing is known.
+
+    Returns
+    -------
+    The same with ``flicker``, ``flicker_low`` and ``flicker_high`` in dB where errors by chance are known.
+    """
+    if estimate is None or "by_chance" not in estimate:
+        return estimate
+    by_chance, psnr, low, high = (
+        cast("float", estimate[name]) for name in ("by_chance", "psnr", "psnr_low", "psnr_high")
+    )
+    middle = mean_psnr((by_chance, psnr))
+    return {**estimate, "flicker": round(middle, 2), "flicker_low": low, "flicker_high": max(by_chance, high)}
+
+
+def mean_psnr(values: Iterable[float]) -> float:
+    """The PSNR in dB of the mean squared error of several of the same size, from their own."""
+    errors = [10 ** (-value / 10) for value in values]
+    return -10 * math.log10(sum(errors) / len(errors))
+
+
+def film_in_words(estimates: Iterable[Figures | None]) -> str | None:
+    """One line on the frames' estimates; None where a frame has none."""
+    frames = [estimate for estimate in estimates if estimate is not None]
+    means = {
+        name: mean_psnr(cast("float", one[name]) for one in frames)
+        for name in ("psnr", "flicker", "flicker_low", "flicker_high")
+        if frames and all(name in one for one in frames)
+    }
+    if "psnr" not in means:
+        return None
+    worst = min(cast("float", one["psnr"]) for one in frames)
+    line = f"estimated PSNR of the frames {means['psnr']:.1f} dB, of the worst {worst:.1f} dB"
+    if "flicker" not in means:
+        return line
+    middle, low, high = (f"{means[name]:.1f}" for name in ("flicker", "flicker_low", "flicker_high"))
+    return f"{line}, of their flicker {middle} dB ({low} to {high})"
