@@ -19,8 +19,8 @@ EXACT = (*QUICK, "--method", "full", "--denoise", "none")
 
 def frames_of(path):
     with av.open(str(path)) as container:
-        rate = float(container.streams.video[0].average_rate)
-        return rate, [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+        rate = container.streams.video[0].average_rate  # a single picture has none
+        return rate and float(rate), [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
 @pytest.mark.long

@@ -8,10 +8,10 @@ with the same expectation. Sky that the primary ray sees stays with the path.
 Delta emitters, which no ray can hit, are sampled at each sharp surface. They count where the half vector makes the
 event sharp.
 
-A pixel that is bright by a single chain is more likely an outlier than truly bright. A single chain may make its pixel
-white; the part of its contribution beyond that is its *excess*. A picture without excess is biased, darker where images
-of emitters were missed, but has a smaller error (docs/research/seen-light.md). The share of one chain in a pixel falls
-with their number, so that the bias vanishes.
+A pixel that is bright by a single chain is more likely an outlier than truly bright. The part of a chain's contribution
+beyond :func:`most_of_chain` is its *excess*. A picture without excess is biased, darker where images of emitters were
+missed, but has a smaller error (docs/research/seen-light.md). The limit grows with the number of chains, so that the
+bias vanishes.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.path_vertex import DIMENSIONS, LastVertex, Scattering, Vertex
 from lippmann.rendering.transport.ray_source import PixelRays
 from lippmann.rendering.transport.sharp_events import follows_sharply, is_sharp
+from lippmann.rendering.transport.tuning import TUNING
 
 
 def sample_pixel(
@@ -60,8 +61,7 @@ def sample_pixel(
     rest, counts, hit = integrator.sample_with_hit(ray, stream, active, without_specular=True)
     chains = mi.Float(light.chains)
     scale = dr.rcp(chains) if light.gain is None else light.gain / chains
-    # A single chain may make its pixel white, and no brighter.
-    most = None if samples is None else samples / scale
+    most = None if samples is None else most_of_chain(samples * chains) / (scale * chains)
     specular, excess, traced = specular_light(integrator, pixel, stream, light.chains, active, most)
     specular *= scale
     counts = RayCounts(counts.secondary + traced.secondary, counts.shadow + traced.shadow)
@@ -72,6 +72,11 @@ def sample_pixel(
 
 def _covered(hit: FirstHit) -> Float:
     return dr.select(dr.isfinite(hit.distance), mi.Float(1), mi.Float(0))
+
+
+def most_of_chain(chains: Float) -> Float:
+    """Largest contribution of one of ``chains`` chains of a pixel that is no excess; linear, white is 1."""
+    return chains**TUNING.most_power
 
 
 @syntax
