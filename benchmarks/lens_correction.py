@@ -23,7 +23,7 @@ from scipy import sparse
 from harness import RESULTS, machine, save
 from lippmann.display import load_display
 from lippmann.optics.correction import TOLERANCE, LensCorrection, parts_beside
-from lippmann.optics.seen import pixel_shares
+from lippmann.optics.pixel_shares import pixel_shares
 from lippmann.rendering.picture import choose_exposure, render_picture
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import engine
@@ -83,7 +83,7 @@ def shares_of(display):
 def seen_error(display, pixels, truth):
     """Mean squared error of what eyes see."""
     errors = [
-        np.mean((shares.seen(pixels[..., channel].astype(np.float64)) - true[..., channel]) ** 2)
+        np.mean((shares.gather(pixels[..., channel].astype(np.float64)) - true[..., channel]) ** 2)
         for shares, true in zip(shares_of(display), truth.values(), strict=True)
         for channel in range(3)
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lippmann.optics.seen import pixel_shares
+from lippmann.optics.pixel_shares import pixel_shares
 
 
 def lenses_seen_by(display, eye, lens):

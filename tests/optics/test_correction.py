@@ -51,7 +51,7 @@ def error_to_eyes(display, pixels, z=-3.0):
     axis = display.lattice.origin_x + lenses * display.lattice.pitch
     errors = []
     for x in (-167.3, -91.1, -33.7, 2.9, 58.3, 121.7, 188.9):
-        seen = lenses_seen_by(display, (x, 0.0, 500.0), lenses).seen(pixels[..., 1])
+        seen = lenses_seen_by(display, (x, 0.0, 500.0), lenses).gather(pixels[..., 1])
         errors.append(np.mean((seen - textured(display, axis + (x - axis) / 500.0 * z)) ** 2))
     return np.mean(errors)
 

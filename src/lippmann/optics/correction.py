@@ -18,7 +18,7 @@ from lippmann.display.display import Display
 from lippmann.display.lens_profile import INDICES, LensProfile
 from lippmann.errors import DisplayError
 from lippmann.optics.lens import Lens
-from lippmann.optics.seen import PixelShares, pixel_shares
+from lippmann.optics.pixel_shares import PixelShares, pixel_shares
 from lippmann.optics.slanted_correction import SlantedRows
 from lippmann.runtime.engine_lock import cached_property
 from lippmann.runtime.machine import usable_cores
@@ -88,7 +88,7 @@ class LensCorrection:
         solved = [self._rows.solve(np.ascontiguousarray(meant[..., c]), c, first) for c in range(3)]
         return np.stack(solved, axis=-1)
 
-    def seen_error(
+    def eye_error(
         self, pixels: Floats, parts: Sequence[Floats], profile: LensProfile | None = None, first: int = 0
     ) -> float:
         """Mean squared error of the light that an eye sees of ``pixels``, over all lenses and directions meant.
@@ -118,7 +118,7 @@ class LensCorrection:
         before = np.mean(_clipped(parts), axis=0)
 
         def gain(profile: LensProfile | None) -> float:
-            worse, better = (self.seen_error(picture, parts, profile, first) for picture in (before, pixels))
+            worse, better = (self.eye_error(picture, parts, profile, first) for picture in (before, pixels))
             return 10.0 * float(np.log10(max(worse, 1e-12) / max(better, 1e-12)))
 
         lens = Lens.of(self.display).profile
@@ -173,7 +173,7 @@ class _UprightRows:
         for channel in range(3):
             is_own = there is self.display
             shares = self._systems[channel][0] if is_own else self._shares(there, channel)
-            seen = shares.seen(pixels[..., channel].astype(np.float64))
+            seen = shares.gather(pixels[..., channel].astype(np.float64))
             goal = np.moveaxis(meant[..., channel], 0, -1).reshape(len(seen), -1)
             squares.append(np.mean((seen - goal) ** 2))
         return float(np.mean(squares))

@@ -36,7 +36,8 @@ class EyeLight:
     slopes_x, slopes_y:
         Evenly spaced slopes across and along a cylinder, or right and up.
     places:
-        ``(rows of slopes, columns of slopes, 2)`` middle of the light in mm from the lens's axis.
+        ``(rows, columns, 2)`` middle of the light in mm from the lens's axis, evenly spaced over the same slopes: one
+        of each pair of slopes, or more.
     weights:
         ``(rows of slopes, columns of slopes, rows, columns)`` weights of a sub-pixel by the distance of its centre from
         that middle, in steps; an odd number of them, one row for a cylinder. All sub-pixels of an even panel together
@@ -66,17 +67,23 @@ class EyeLight:
         )
         return down, right
 
-    def look_up(self, slope_x: Real, slope_y: Real) -> tuple[NDArray[np.int32], Real]:
-        """Number of the nearest direction's weights, row by row, and ``(..., 2)`` middle of the light, interpolated."""
-        columns, rows = len(self.slopes_x), len(self.slopes_y)
-        at_y, at_x = self.at(slope_x, slope_y)
-        number = (np.rint(at_y) * columns + np.rint(at_x)).astype(np.int32)
-        left, low = np.minimum(at_x.astype(np.intp), columns - 2), np.minimum(at_y.astype(np.intp), rows - 2)
-        part_x, part_y = (at_x - left)[..., None], (at_y - low)[..., None]
+    def nearest(self, slope_x: Real, slope_y: Real) -> tuple[NDArray[np.int32], Real]:
+        """Number of the nearest direction's weights, row by row, and ``(..., 2)`` middle of the light in mm."""
+        down, right = self.at(slope_x, slope_y)
+        number = (np.rint(down) * len(self.slopes_x) + np.rint(right)).astype(np.int32)
+        return number, self.interpolate_places(down, right)
+
+    def interpolate_places(self, down: Real, right: Real) -> Real:
+        """Middle of the light ``(..., 2)`` in mm by bilinear interpolation, at places as of :meth:`at`."""
+        rows, columns = (count - 1 for count in self.places.shape[:2])
+        y, x = down * (rows / (len(self.slopes_y) - 1)), right * (columns / (len(self.slopes_x) - 1))
+        low, left = np.minimum(y.astype(np.intp), rows - 1), np.minimum(x.astype(np.intp), columns - 1)
+        part_y, part_x = (y - low)[..., None], (x - left)[..., None]
         lower, upper = (
             self.places[low + up, left] * (1.0 - part_x) + self.places[low + up, left + 1] * part_x for up in (0, 1)
         )
-        return number, lower * (1.0 - part_y) + upper * part_y
+        middle: Real = lower * (1.0 - part_y) + upper * part_y
+        return middle
 
 
 def panel_frame(display: Display) -> Real:

@@ -113,7 +113,7 @@ class SlantedRows:
         lens = np.arange(display.lens_grid.columns, dtype=np.float64)
         axis, place = (each[:, ::_JUDGED] for each in self._directions(lens))
         light = _even_light(self.display, there)
-        number, middle = light.look_up(self._slopes(place), np.zeros_like(place))
+        number, middle = light.nearest(self._slopes(place), np.zeros_like(place))
         middle[..., 0] += axis
         shape = (len(count), place.size)
         numbers = np.broadcast_to(number.ravel(), shape)
@@ -237,7 +237,7 @@ class SlantedRows:
             lens = np.array([(zone + 0.5) / _ZONES * display.lens_grid.columns - 0.5])
             axis, place = self._directions(lens)
             aside = float(axis[0, 0]) * (display.magnification - 1.0)
-            number, middle = light.look_up(self._slopes(place), np.zeros_like(place))
+            number, middle = light.nearest(self._slopes(place), np.zeros_like(place))
             b, j, k = (each.ravel() for each in np.indices((places, 3, place.shape[1])))
             own = middles[b] * pitch - (j - 1) * pitch
             away = own + aside - middle[0, k, 0]

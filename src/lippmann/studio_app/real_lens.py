@@ -6,7 +6,7 @@ the height of one pixel about the place that the eye sees, in a coarse picture, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import ClassVar
 
@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from lippmann.display import NUMPY, Display
 from lippmann.display.seen_pixels import EyeMap, Floats, PixelSet, Vector
 from lippmann.optics.eye_light import EyeLight, panel_frame
-from lippmann.optics.lens import Real
 from lippmann.runtime.machine import usable_cores
 from lippmann.runtime.row_threads import Bands
-from lippmann.viewer.lens_light import FINER, finer_places, light_everywhere
+from lippmann.viewer.lens_light import finer_places, light_everywhere
 from lippmann.viewing.optical_replay import PUPIL, slopes_to_eye
 
 #: Weight below which a pixel is not traced: a quarter of a code in an even white picture.
@@ -112,9 +111,10 @@ class RealEyeMap(EyeMap):
         from lippmann.studio_app.real_lens_kernel import weigh
 
         display, lattice = self.display, self.display.lattice
-        light, finer = _light_of(display)
-        light = light.through_pupil(PUPIL / eye[2] * display.gap)
-        at, places = self._at(light, finer, eye)
+        light = _light_of(display).through_pupil(PUPIL / eye[2] * display.gap)
+        across, along = slopes_to_eye(display, eye, self._center_x, self._center_y)
+        at = np.stack(light.at(across, np.abs(along) if self._is_line else along), axis=-1)
+        places = light.interpolate_places(*at.T)
         if self._is_line:
             places[:, 0] += lattice.across(self._center_x, self._center_y)
             seen = display.panel_point_seen_by(*eye, self._x, self._y, NUMPY)
@@ -130,15 +130,6 @@ class RealEyeMap(EyeMap):
         pixels, weights = np.empty(starts[-1], np.int64), np.empty((starts[-1], 3), np.float32)
         bands.pixels(weigh, count, *asked, starts, pixels, weights)
         return self._set_of(starts, pixels, weights)
-
-    def _at(self, light: EyeLight, finer: Real, eye: Vector) -> tuple[Real, Real]:
-        """Place of each lens among the tables (rows, columns), and the middle of its light in mm (across, along)."""
-        from scipy.ndimage import map_coordinates
-
-        across, along = slopes_to_eye(self.display, eye, self._center_x, self._center_y)
-        at = np.stack(light.at(across, np.abs(along) if self._is_line else along), axis=-1)
-        places = np.stack([map_coordinates(finer[..., k], FINER * at.T, order=1) for k in (0, 1)], axis=-1)
-        return at, places
 
     def _set_of(self, starts: NDArray[np.int64], pixels: NDArray[np.int64], weights: Floats) -> MixedPixels:
         panel, channels = self.display.panel, 3 if self.subpixels else 1
@@ -170,6 +161,6 @@ class RealEyeMap(EyeMap):
 
 
 @lru_cache(2)
-def _light_of(display: Display) -> tuple[EyeLight, Real]:
+def _light_of(display: Display) -> EyeLight:
     light = light_everywhere(display)
-    return light, finer_places(light)
+    return replace(light, places=finer_places(light))

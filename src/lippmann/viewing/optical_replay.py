@@ -95,7 +95,7 @@ def _gathered(image: Picture, light: EyeLight, eye: Eye, size: tuple[int, int], 
     x, y = display.panel_point(*np.meshgrid(u, v))
     center_x, center_y = lattice.center(*lattice.lens_at(x, y, NUMPY), x, y, NUMPY)
     slope_x, slope_y = slopes_to_eye(display, eye, center_x, center_y)
-    number, place = light.look_up(slope_x, slope_y)
+    number, place = light.nearest(slope_x, slope_y)
     lines = np.empty((0, 0, 2))
     if is_line:
         place[..., 0] += lattice.across(center_x, center_y)

@@ -10,7 +10,7 @@ from lippmann.display import load_display
 from lippmann.errors import DisplayError
 from lippmann.optics.lens import Lens
 from lippmann.optics.light_table import light_table
-from lippmann.optics.seen import pixel_shares
+from lippmann.optics.pixel_shares import pixel_shares
 
 SHEET = load_display("print:lpi=60,ppi=720,size=40x10mm,thickness=26mil")
 LENSES = np.arange(8.0, SHEET.lens_grid.columns - 8)
@@ -19,7 +19,7 @@ LENSES = np.arange(8.0, SHEET.lens_grid.columns - 8)
 def test_a_bright_panel_is_seen_bright_from_everywhere():
     rows = np.ones((2, SHEET.panel.width))
     for eye in ((0.0, 0.0, 500.0), (180.0, 0.0, 400.0), (-900.0, 0.0, 300.0)):
-        np.testing.assert_allclose(lenses_seen_by(SHEET, eye, LENSES).seen(rows), 1.0, atol=1e-12)
+        np.testing.assert_allclose(lenses_seen_by(SHEET, eye, LENSES).gather(rows), 1.0, atol=1e-12)
 
 
 def test_shares_are_those_of_the_light_table_in_the_pixels_width():
@@ -37,7 +37,7 @@ def test_shares_are_those_of_the_light_table_in_the_pixels_width():
 
 def test_a_lens_shows_the_pixel_of_its_direction():
     place = np.full(len(LENSES), 2.0) * SHEET.panel.pixel_pitch
-    seen = pixel_shares(SHEET, LENSES, -SHEET.pinhole_place(place) / SHEET.gap).seen(
+    seen = pixel_shares(SHEET, LENSES, -SHEET.pinhole_place(place) / SHEET.gap).gather(
         np.arange(SHEET.panel.width, dtype=float)[None]
     )
     axis = SHEET.lattice.origin_x + LENSES * SHEET.lattice.pitch

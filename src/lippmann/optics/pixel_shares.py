@@ -36,7 +36,7 @@ class PixelShares:
     first: NDArray[np.int64]
     shares: Real
 
-    def seen(self, rows: Real) -> Real:
+    def gather(self, rows: Real) -> Real:
         """Light ``(rows, n)`` of the lenses, of pixels ``(rows, width)``."""
         columns = np.clip(self.first[:, None] + np.arange(self.shares.shape[1]), 0, rows.shape[1] - 1)
         light = np.zeros((len(rows), len(self.first)))
