@@ -90,7 +90,7 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
 
 def brightest_specular_light(integrator: PathIntegrator, source: RaySource) -> float:
     """Largest exposed radiance, mean of its components, of the pilot's specular chains."""
-    stream, column, row, _ = _place_of(dr.arange(mi.UInt32, TRANSPORT.light_vertices), source)
+    stream, column, row, _ = _place_of(dr.arange(mi.UInt32, TUNING.pilot_chains), source)
     pixel, number = PixelRays(source, column, row, mi.UInt32(0)), dr.opaque(mi.UInt32, 1)
     light = integrator.exposed(specular_light(integrator, pixel, stream, number, mi.Bool(True))[0])
     return float(dr.max(dr.mean(light))[0])

@@ -15,7 +15,6 @@ from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
 from lippmann.rendering.preparation.pilot import Pilot, brightest_specular_light, make_light_sampler, trace_pilot
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.request.tuning import TUNING as REQUEST
 from lippmann.rendering.transport.casters import find_casters, has_sharp_surfaces, hides_caustics
 from lippmann.rendering.transport.caustic_photons import CausticPhotons, emissions, no_photons
 from lippmann.rendering.transport.light_vertices import LightVertexPasses
@@ -116,7 +115,7 @@ def trace_light_vertices(
     if pilot.bright_indirect(gain) < TUNING.bright_indirect or pilot.placed > TRANSPORT.most_vertex_emitters:
         return None
     sampler, scene = integrator.light_sampler, integrator.scene
-    passes = LightVertexPasses(scene, sampler, REQUEST.usual, request.seed, pilot.region)
+    passes = LightVertexPasses(scene, sampler, TUNING.pass_samples, request.seed, pilot.region)
     return None if passes.are_none else passes
 
 
@@ -129,7 +128,7 @@ def count_chains(integrator: PathIntegrator, request: RenderRequest, source: Ray
     is_denoised = request.denoise != "none" and request.box_filter and request.method not in REUSING
     if not is_denoised or not has_sharp_surfaces(integrator.scene):
         return 0
-    return TRANSPORT.splitting if brightest_specular_light(integrator, source) > 1 else 0
+    return TUNING.chains if brightest_specular_light(integrator, source) > 1 else 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,8 +171,8 @@ def shoot_photons(
         return Caustics(None)
     pixels = source.width * source.height * source.channels
     # A pass serves no more samples than the picture has.
-    samples = pixels * (REQUEST.usual if request.is_open_ended else min(REQUEST.usual, request.samples))
-    passes = 2 if request.is_open_ended else -(-request.samples // REQUEST.usual)
+    samples = pixels * (TUNING.pass_samples if request.is_open_ended else min(TUNING.pass_samples, request.samples))
+    passes = 2 if request.is_open_ended else -(-request.samples // TUNING.pass_samples)
     # Memory that is short does not reduce the photons: a picture does not depend on it.
     required = memory_model.photons(emissions(samples), passes)
     if required > memory:
@@ -185,7 +184,7 @@ def shoot_photons(
         integrator.features,
         casters,
         samples=samples,
-        pass_samples=REQUEST.usual,
+        pass_samples=TUNING.pass_samples,
         seed=request.seed,
         region=pilot.region,
         kept=max(1, min(passes, int(TUNING.kept_share * memory) // memory_model.photons(emissions(samples), 1))),

@@ -15,7 +15,7 @@ class RequestTuning:
         Samples per pixel of a picture whose light is not pooled, and most of one whose light is pooled: more have to be
         asked for (``docs/research/equal-time.md``). From so many on the high effort of the network is worth its time:
         that of 12 rays per pixel for 0.7 dB on the average (``docs/background/denoising.md``). With fewer, all samples
-        may miss rare light such as mirrored emitters. One pass of photons, or set of light vertices, serves as many.
+        may miss rare light such as mirrored emitters.
     fewest:
         Least samples per pixel (or sub-pixel) of a pooled picture: with fewer the worst micro-images are noisy, and
         outliers cannot be told apart. Half of it for pictures of more than ``many`` sub-pixels.

@@ -35,7 +35,7 @@ def first_emitter_samples(sample: UInt32) -> tuple[UInt32, UInt32]:
     The start is the index of the first emitter sample in the pixel's sequence of points. The paths of a pixel use this
     sequence one after another, without gaps.
     """
-    number = TUNING.splitting
+    number = TUNING.emitter_samples
     early, fewer = sample < number, max(1, number // 2)
     first = dr.select(early, number * sample, number * number + fewer * (sample - number))
     return dr.select(early, mi.UInt32(number), fewer), first

@@ -21,11 +21,9 @@ class TransportTuning:
     lanes:
         Lanes of wavefronts that are launched one after another, of photons and of steps of a live frame: on two cores
         these take as long as a whole frame of an eye, so that such frames can interleave.
-    splitting:
+    emitter_samples:
         Emitter samples at the first surface of a path that is not purely specular, in each of as many first samples of
-        a pixel; half as many in later ones. A power of two keeps all points stratified. Also the specular chains with
-        each path of a denoised picture: with 3, pictures of 16 samples lose up to 0.2 dB, and 1.0 dB of primitives;
-        with 2 up to 0.5 dB, and primitives 1 dB (docs/research/seen-light.md).
+        a pixel; half as many in later ones. A power of two keeps all points stratified.
     most_power:
         A specular chain counts up to white where it is its pixel's only one; of more chains one counts for as much more
         as this power of their number says. With 1, mirrored balls lose 1.5 to 2.5 dB with 128 samples and promises of
@@ -45,8 +43,7 @@ class TransportTuning:
         of a pixel meet others (``kernel_profile.py``).
     light_vertices:
         Light vertices of each half of a picture, before those are left out that scatter nothing, and rays of their
-        pilot; and specular chains of the pilot (0.1 s): one of these hits a spot of a 20 000th of the picture with a
-        probability of 95 %.
+        pilot.
     uniform_share:
         Share of emitter samples, emissions and rays from emitters that goes to all alike, for what a pilot missed.
     most_vertex_emitters:
@@ -57,7 +54,7 @@ class TransportTuning:
     rounding: float = 1e-4
     roulette_depth: int = 5
     lanes: int = 1 << 18
-    splitting: int = 4
+    emitter_samples: int = 4
     most_power: float = 0.75
     least_cosine_angle: float = 0.05
     small_emitter: float = 1e-3
