@@ -29,16 +29,21 @@ import atexit, os, sys, lippmann.cli
 class Kept:
     def __del__(self, write=os.write): write(2, b"taken down")
 sys.kept = Kept()
+sys.argv[1:] = ["displays"]
 {}
-lippmann.cli.main(["displays"])
 """
 
 
 def test_a_command_ends_without_taking_the_interpreter_down_unless_somebody_has_to_hear_of_it():
-    done = run_python(KEPT.format(""))
+    done = run_python(KEPT.format("lippmann.cli.main()"))
     assert (done.returncode, done.stderr) == (0, "")
-    done = run_python(KEPT.format("atexit.register(print, 'heard')"))
+    done = run_python(KEPT.format("atexit.register(print, 'heard'); lippmann.cli.main()"))
     assert (done.returncode, done.stdout.split()[-1], done.stderr) == (0, "heard", "taken down")
+
+
+def test_a_program_that_calls_a_command_goes_on_after_it():
+    done = run_python(KEPT.format("try: lippmann.cli.main(['displays'])\nexcept SystemExit: pass\nsys.exit(3)"))
+    assert (done.returncode, done.stderr) == (3, "taken down")
 
 
 @pytest.mark.parametrize(
@@ -47,7 +52,8 @@ def test_a_command_ends_without_taking_the_interpreter_down_unless_somebody_has_
 )
 def test_the_exit_code_is_the_commands_own(command, code):
     lines = "import lippmann.cli.commands.system as system\ndef displays():\n    print('all said')\n"
-    end = f"    {command}\nsystem.displays = displays\nimport lippmann.cli\nlippmann.cli.main(['displays', '--debug'])"
+    end = f"    {command}\nsystem.displays = displays\nimport sys, lippmann.cli\n"
+    end += "sys.argv[1:] = ['displays', '--debug']\nlippmann.cli.main()"
     done = run_python(lines + end)
     assert (done.returncode, done.stdout) == (code, "all said\n")
 

@@ -125,7 +125,7 @@ def test_scenes_of_many_emitters_are_left_to_paths():
 def test_passes_serve_their_samples_and_pictures_do_not_depend_on_the_memory(monkeypatch):
     import lippmann.rendering.preparation.prepare as module
 
-    monkeypatch.setattr(module, "REQUEST", replace(module.REQUEST, usual=4))
+    monkeypatch.setattr(module, "TUNING", replace(module.TUNING, pass_samples=4))
     integrator, source = stage(room(small()))
     integrator = given(integrator, source, seed=3)
     served, passes = [], integrator.light.vertex_passes
