@@ -58,7 +58,7 @@ def codes(images):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["pooled", "full"])
+@pytest.mark.parametrize("method", [pytest.param("pooled", marks=pytest.mark.long), "full"])
 def test_the_stated_flicker_holds_against_long_renderings(method):
     display = load_display("seed-lenticular").resized(128, 128)
     stated = frames(display, method=method, spp=4)

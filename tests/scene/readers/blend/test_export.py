@@ -211,7 +211,7 @@ def test_files_outside_are_refused(fake_blender, blend):
         read_blend(blend)
 
 
-@pytest.mark.parametrize("content", [b"PK\x03\x04", b"BLEND", bytes(16)])
+@pytest.mark.parametrize("content", [b"RIFF", b"BLEND", bytes(16)])
 def test_what_is_no_blender_file_is_never_shown_to_blender(tmp_path, no_blender, content):
     path = tmp_path / "a.blend"
     path.write_bytes(content)
