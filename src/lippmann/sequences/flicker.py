@@ -43,8 +43,14 @@ def mean_psnr(values: Iterable[float]) -> float:
     return -10 * math.log10(sum(errors) / len(errors))
 
 
+def flicker_in_words(figures: Figures) -> str:
+    """The flicker among ``figures`` and its interval."""
+    middle, low, high = (f"{figures[name]:.1f}" for name in ("flicker", "flicker_low", "flicker_high"))
+    return f"flicker {middle} dB ({low} to {high})"
+
+
 def film_in_words(estimates: Iterable[Figures | None]) -> str | None:
-    """One line on the frames' estimates; None where a frame has none."""
+    """One line on the frames' estimates; None where no frame has one."""
     frames = [estimate for estimate in estimates if estimate is not None]
     means = {
         name: mean_psnr(cast("float", one[name]) for one in frames)
@@ -55,7 +61,4 @@ def film_in_words(estimates: Iterable[Figures | None]) -> str | None:
         return None
     worst = min(cast("float", one["psnr"]) for one in frames)
     line = f"estimated PSNR of the frames {means['psnr']:.1f} dB, of the worst {worst:.1f} dB"
-    if "flicker" not in means:
-        return line
-    middle, low, high = (f"{means[name]:.1f}" for name in ("flicker", "flicker_low", "flicker_high"))
-    return f"{line}, of their flicker {middle} dB ({low} to {high})"
+    return f"{line}, of their {flicker_in_words(means)}" if "flicker" in means else line

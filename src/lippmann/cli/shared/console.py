@@ -61,8 +61,9 @@ def estimate_in_words(estimate: Mapping[str, object], part: str = "micro-image")
     words = Estimate.from_dict(estimate).in_words(part)
     if "flicker" not in estimate:
         return words
-    middle, low, high = (f"{estimate[name]:.1f}" for name in ("flicker", "flicker_low", "flicker_high"))
-    return f"{words}, flicker {middle} dB ({low} to {high})"
+    from lippmann.sequences.flicker import flicker_in_words
+
+    return f"{words}, {flicker_in_words(estimate)}"
 
 
 def remarks(console: Console, made: Provenance) -> None:

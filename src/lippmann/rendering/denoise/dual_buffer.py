@@ -95,8 +95,9 @@ class Denoised:
         noisy, clean = self._clean_halves()
         first, second = (encode(half, self._coding) for half in clean)
         apart: Floats = (np.float32(0.25) * np.square(first - second)).mean(axis=2)
-        bend = encode(self._mean(), self._coding) - np.float32(0.5) * (first + second)
-        slope = self._slope(noisy)
+        picture = self._mean()
+        bend = encode(picture, self._coding) - np.float32(0.5) * (first + second)
+        slope = self._slope(picture, noisy)
         left = [slope * (half - smooth) + bend for half, smooth in zip(noisy, clean, strict=True)]
         common = (left[0] * left[1]).mean(axis=2)
         limit = TUNING.hidden * max(1.0, REQUEST.usual / self._renderer.samples)
@@ -159,9 +160,9 @@ class Denoised:
         further = None if paths is None or self._coverage is None else self._coverage()
         return None if paths is None or further is None else list(zip(paths, further, strict=True))
 
-    def _slope(self, noisy: tuple[Floats, Floats]) -> Floats:
+    def _slope(self, picture: Floats, noisy: tuple[Floats, Floats]) -> Floats:
         """Factor from linear errors to errors of the code, per pixel: the curve's slope, or a finite difference."""
-        picture, coding = self._mean(), self._coding
+        coding = self._coding
         slope = coding_slope(picture, coding)
         displayed = np.float32(0.5) * (noisy[0] + noisy[1])
         scatter = np.abs(noisy[0] - noisy[1]).mean(axis=2)
