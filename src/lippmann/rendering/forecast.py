@@ -1,4 +1,4 @@
-"""What a picture will take and show, told beforehand: depth, blur, rays, memory and time, by rendering a few pixels.
+"""Forecast of a picture: its depth, blur, rays, memory and time, from a few rendered pixels.
 
 The pixels of the probe are drawn at random in short runs, so that neighbouring rays stay neighbours, and traced with
 the picture's own settings in ever larger wavefronts for about two seconds. What they took is carried over to all.
@@ -106,7 +106,7 @@ class Forecast:
     notes: tuple[str, ...]
 
     def in_words(self) -> dict[str, str]:
-        """What people want to know of it, by name, in the order of a table."""
+        """The rows of a table for people: names and texts."""
         width, height = self.size
         of_frames = f", {self.frames} frames" if self.frames > 1 else ""
         of_subpixels = ", a ray for every sub-pixel" if self.subpixels else ""
@@ -232,7 +232,7 @@ def _plan(
 
 @dataclass(frozen=True)
 class _ProbeResult:
-    """What the probe took; ``rays`` per sample, by kind."""
+    """Cost of the probe; ``rays`` per sample, by kind."""
 
     samples: int
     seconds: float

@@ -90,14 +90,14 @@ def visible_share(pixels: NDArray[np.float32] | None, background: Color | None, 
         primary ones: an upper bound, as every sample that meets a surface sends at least one, black surfaces apart.
     """
     if pixels is not None and background is not None:
-        step = max(1, len(pixels) // 1024)  # some rows of large pictures tell as much
+        step = max(1, len(pixels) // 1024)  # a sample of the rows suffices
         unlike = np.abs(pixels[::step] - np.asarray(background, dtype=np.float32)) > 1e-3
         return float(unlike.any(axis=-1).mean())
     return min(1.0, (rays.shadow + rays.secondary) / max(1, rays.primary))
 
 
 def warn_of_emptiness(share: float) -> tuple[str, ...]:
-    """The warning, or nothing."""
+    """Warning of a picture in which hardly any pixel shows the scene; else empty."""
     if share >= LEAST_SHARE:
         return ()
     content = "nothing" if share == 0 else f"{share:.1%} of it shows anything"

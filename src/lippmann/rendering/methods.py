@@ -68,7 +68,7 @@ class Job:
 
     @property
     def traced(self) -> OnePicture | QuiltRays:
-        """Whose samples are gathered: of sub-pixels that are denoised, all colours."""
+        """The source whose samples are summed; for sub-pixels that are denoised, one that keeps all colours."""
         source = self.source
         if not isinstance(source, DisplayRays | WindowRays) or not self.request.keeps_colors(source.display):
             return source
@@ -125,7 +125,7 @@ def trace_samples(job: Job) -> Traced:
 
 
 def trace_unjudged(job: Job, *notes: str) -> Traced:
-    """So many samples, of which nothing tells the error; denoised where that is asked for."""
+    """A fixed number of samples without an error estimate; denoised if requested."""
     return _denoised_whole(job, one_stream(job, *notes))
 
 
@@ -153,7 +153,7 @@ def _samples_of_pixels(traced: Traced) -> NDArray[np.uint32]:
 
 
 def one_stream(job: Job, *notes: str) -> Traced:
-    """All samples in one stream: nothing is known of the error."""
+    """All samples in one stream: without half-buffers there is no error estimate."""
     request, source = job.request, job.traced
     plan = cut_wavefronts(
         source.width, source.height, request.samples, channels=source.channels, memory=job.session.memory
@@ -212,7 +212,7 @@ def _in_rounds(job: Job) -> Traced:
 
 
 def _timed_goal(job: Job) -> Goal:
-    """The goal of the request; its time counts from the request's beginning and holds what follows the last sample."""
+    """The goal of the request; its time begins with the request and includes the work after the last sample."""
     # Putting a picture together and writing it takes a tenth of a microsecond a pixel, as a rule.
     writing = 1e-7 * job.source.width * job.source.height
     began = time.perf_counter() if job.request.began is None else job.request.began
@@ -307,7 +307,7 @@ def _reused(job: Job) -> Traced:
 
 
 def _denoised_whole(job: Job, traced: Traced) -> Traced:
-    """What was traced without its noise, where that is asked for and nothing is known of the error anyway."""
+    """A traced picture without half-buffers, denoised if requested."""
     if job.request.denoise == "none":
         return traced
     frame, source = traced.frame, job.traced

@@ -65,7 +65,7 @@ class Stopwatch:
     started: float = field(default_factory=time.perf_counter)
 
     def stage(self, name: str, work: Callable[[], T]) -> T:
-        """What ``work`` returns; its seconds are added to those of the stage ``name``."""
+        """Do ``work`` and return its result; its seconds are added to those of the stage ``name``."""
         self.progress(Progress(name, 0, 1))
         start = time.perf_counter()
         result = work()
@@ -106,7 +106,7 @@ class Session:
     memory: int
     watch: Stopwatch
     choices: dict[str, object] = field(default_factory=dict)
-    #: What cameras see, by their views: those of a scene at rest are asked again and again for displays that move.
+    #: Visible depths by the views of cameras: a film asks for the same ones at every frame.
     depths: dict[bytes, VisibleDepth | None] = field(default_factory=dict)
 
     def place(self, display: Display) -> Placement:
@@ -239,7 +239,7 @@ class Session:
             stands_alone=not self.scene.lies_off_surfaces,
             weighs_emitters=isinstance(self.built, BuiltScene) and not self.built.borrowed,
         )
-        # Of an earlier picture nothing is left.
+        # Drops the choices of an earlier picture.
         self.choices.clear()
         self.choices.update(light.choices)
         return integrator.lit_by(light)

@@ -68,23 +68,23 @@ class Goal:
 
     @property
     def most(self) -> int:
-        """Samples per pixel at which it is given up."""
+        """Most samples per pixel, with which rendering stops short of the goal."""
         return min(self.spp or TUNING.most, TUNING.most)
 
     @property
     def least_worst(self) -> float | None:
-        """PSNR in dB that every micro-image is to reach, if there is such a bound."""
+        """PSNR in dB that the worst micro-image must reach; None for no bound."""
         bounds = [] if self.quality_worst is None else [self.quality_worst]
         if self.quality is not None:
             bounds.append(self.quality - TUNING.most_below)
         return max(bounds, default=None)
 
     def seconds_left(self, spent: float) -> float:
-        """What is left of ``max_time`` after so many seconds and the reserve; infinite without a limit."""
+        """Seconds of ``max_time`` that remain after ``spent`` and the reserve; infinite without a limit."""
         return math.inf if self.max_time is None else self.max_time - self.reserve - spent
 
     def missing(self, estimate: Estimate) -> float:
-        """How many dB the picture is short of the quality; at most 0 if it has it, minus infinity if none is asked."""
+        """PSNR in dB that the picture lacks: at most 0 at the goal, minus infinity without a quality."""
         short = -math.inf
         for _, value, low, asked in self._asked(estimate):
             has = min(value, low + TUNING.tolerance) if self.is_promise else value
@@ -92,7 +92,7 @@ class Goal:
         return short
 
     def describe(self, estimate: Estimate) -> str:
-        """Where the picture stands, for a progress report."""
+        """Estimated PSNR beside the goal, for a progress report."""
         parts = [] if self.quality is None else [f"{estimate.psnr:.1f} of {self.quality:g} dB"]
         if self.quality_worst is not None or not parts:
             bound = "" if self.quality_worst is None else f" of {self.quality_worst:g}"
@@ -100,7 +100,7 @@ class Goal:
         return ", ".join(parts)
 
     def describe_shortfall(self, estimate: Estimate) -> str:
-        """What a picture lacks that ended short of the goal; no figure is rounded up to what was asked for."""
+        """The shortfall of a picture that ended before the goal; no figure is rounded up to the goal."""
         shortfalls = []
         for what, value, low, asked in self._asked(estimate):
             if value < asked:
@@ -110,8 +110,8 @@ class Goal:
         return ", ".join(shortfalls) or "too few samples to be sure"
 
     def _asked(self, estimate: Estimate) -> list[tuple[str, float, float, float]]:
-        """Of the picture and of its worst part, where a quality is asked of them: its name, its PSNR, the lower end of
-        the interval, and what is asked."""
+        """Name, PSNR, lower end of its interval and required PSNR: of the picture and of its worst part, as far as a
+        quality is asked of them."""
         both = [
             ("the picture", estimate.psnr, estimate.psnr_low, self.quality),
             (f"the worst {self.part}", estimate.worst, estimate.worst_low, self.least_worst),
@@ -203,7 +203,7 @@ def reach(
 
 
 def _next_total(samples: int, missing: float, slope: float) -> int:
-    """Samples per pixel at which a picture is expected to have the dB that it misses, as far as one round may go.
+    """Samples per pixel after the next round: as many as the missing dB are expected to take, within its growth limits.
 
     A multiple of the number of batches, so that all of them get the same.
     """
@@ -214,13 +214,13 @@ def _next_total(samples: int, missing: float, slope: float) -> int:
 
 
 def _affordable(seconds: float, sampler: FullInBatches) -> int:
-    """Samples per pixel that so many seconds are planned for."""
+    """Samples per pixel that are taken within a share of ``seconds``."""
     most = TUNING.time_share * max(0.0, seconds) / max(_seconds_per_sample(sampler), 1e-9)
     return math.floor(min(most, TUNING.most))
 
 
 def _seconds_per_sample(sampler: FullInBatches) -> float:
-    """Of every pixel, compiling aside."""
+    """Seconds of one sample of every pixel, without compilation."""
     return sampler.seconds_trace / max(sampler.samples, 1)
 
 

@@ -175,7 +175,7 @@ class Denoised:
             low = high * np.clip(truth[far] / np.maximum(high, np.float32(1e-6)), 0, 1).min(axis=1, keepdims=True)
         else:
             truth = np.where(picture > 1, np.minimum(displayed, 1), truth)
-            far = picture - truth > 1e-4  # smaller steps are as good as a slope, and hold rounding
+            far = picture - truth > 1e-4  # smaller differences are mostly rounding
             low, high = truth[far], picture[far]
         slope[far] = coding_chord(low, high, coding)
         return slope

@@ -89,7 +89,7 @@ class GuidedDenoiser:
         self._lenses: NDArray[np.int32] | None = None
         self._progress = progress
         self._guides: Guides | None = None
-        #: Of every tile of the source, by the guides.
+        #: The surfaces in every tile of the source, by the guides.
         self._surfaces: list[SurfacePart | None] = []
         self.seconds = 0.0
         self.used: Effort = "fast"
@@ -134,7 +134,7 @@ class GuidedDenoiser:
         )
 
     def coverage(self) -> tuple[Coverage, Coverage] | None:
-        """Coverage by either half of the guides' rays."""
+        """Coverage of every pixel by the guides' rays, one for each half of them; None where it is not known."""
         started = time.perf_counter()
         coverage_halves = self.guides().coverage
         self.seconds += time.perf_counter() - started
@@ -145,7 +145,7 @@ class GuidedDenoiser:
         side = 128
         small = np.zeros((side, side, 3), dtype=np.float32)
         effort = effort_of(self._kind, samples)
-        denoise(small, small, small, clean_guides=True, effort=effort, threads=self._threads)  # starts its threads
+        denoise(small, small, small, clean_guides=True, effort=effort, threads=self._threads)  # starts threads
         started = time.perf_counter()
         denoise(small, small, small, clean_guides=True, effort=effort, threads=self._threads)
         return TUNING.runs * (time.perf_counter() - started) * self._source.width * self._source.height / side**2
@@ -207,7 +207,7 @@ class SurfacePart:
 
     @staticmethod
     def of(normal: NDArray[np.generic]) -> SurfacePart | None:
-        """From the normals ``(H, W, 3)``, 0 where there is no surface; None for a picture without surfaces."""
+        """The part with all surfaces of a picture, by its normals ``(H, W, 3)``, 0 off surfaces; None without any."""
         is_surface = (normal[..., 0] != 0) | (normal[..., 1] != 0) | (normal[..., 2] != 0)
         place = _rectangle(is_surface)
         return None if place is None else SurfacePart(place, _widened(is_surface[place])[..., None])

@@ -96,7 +96,7 @@ def denoise(
 
     height, width = images["color"].shape[:2]
     if turned:
-        images = {name: _turned(images.pop(name)) for name in list(images)}  # each frees the memory of the one before
+        images = {name: _turned(images.pop(name)) for name in list(images)}  # frees each unturned image
     # One device serves one filter at a time, and its threads do not survive a fork.
     with exclusive():
         result = _filtered(pyoidn, images, set_up, threads or machine.usable_cores())
@@ -121,13 +121,13 @@ def _picture(values: NDArray[np.generic], name: str) -> FloatArray:
     if array.ndim != 3 or array.shape[2] != 3 or 0 in array.shape:
         raise UsageError(f"the {name} has the shape {array.shape}", parameter="denoise", rule="it must be (H, W, 3)")
     if not np.isfinite(array).all():
-        # The network would smear a single one over its whole neighbourhood.
+        # The network would spread a single NaN over the pixels around it.
         raise UsageError(f"the {name} holds values that are not finite", parameter="denoise", fix="replace them")
     return array
 
 
 def load_denoiser() -> ModuleType:
-    """The library, so that it is known to be there before anything is rendered.
+    """Load the library, so that a missing one is reported before anything is rendered.
 
     Raises
     ------
@@ -194,7 +194,7 @@ def _on_cpu(pyoidn: ModuleType, images: dict[str, FloatArray], set_up: SetUp, th
 
 
 def _on_gpu(pyoidn: ModuleType, images: dict[str, FloatArray], set_up: SetUp) -> FloatArray:
-    """The same by copies in the GPU's memory, which does not see the processor's."""
+    """As :func:`_filtered`, on copies in the memory of the GPU."""
     output = np.empty_like(next(iter(images.values())))
     height, width = output.shape[:2]
     device = _gpu(pyoidn)

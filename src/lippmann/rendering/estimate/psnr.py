@@ -66,7 +66,7 @@ class Estimate:
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, object]) -> Estimate:
-        """What :meth:`to_dict` wrote.
+        """The estimate that :meth:`to_dict` wrote.
 
         Raises
         ------
@@ -78,7 +78,7 @@ class Estimate:
         return cls(**numbers, worst_lens=(column, row), by_chance=cast("float | None", plain.get("by_chance")))
 
     def in_words(self, part: str = "micro-image") -> str:
-        """One line for people; ``part`` is what a part of the picture that is judged by itself is called."""
+        """One line for people; ``part`` names the parts: micro-images, or the views of a quilt."""
         return (
             f"{self.psnr:.1f} dB ({self.psnr_low:.1f} to {self.psnr_high:.1f}), "
             f"worst {part} {self.worst:.1f} dB ({self.worst_low:.1f} to {self.worst_high:.1f})"

@@ -58,7 +58,7 @@ def render_eye_preview(
     visible = EyeMap(display, (width, height), subpixels=bool(resolved.subpixels)).seen_by(eye)
     samples = _choose_samples(request, resolved, len(visible.column))
     denoises = _denoises(request, resolved, scene)
-    # The noise is taken out of what the eye sees, not of what is traced.
+    # The eye's view is denoised, not the traced pixels.
     plain = replace(resolved, spp=samples, denoise="none")
     session = open_session(scene, plain, (width, height), progress=progress)
     placement = session.place(display)

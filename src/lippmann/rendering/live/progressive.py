@@ -73,7 +73,7 @@ class Progressive:
         if not self._denoises:
             mean = np.asarray(self._sums.sum(axis=0) / self.samples, np.float32)
             return self._frame(develop(mean, self._pixels, self._view.request), seconds, is_denoised=False)
-        # The noise is taken out anew each time that there are 1.7 times the samples.
+        # Denoised again at every 1.7-fold number of samples.
         return self._denoise(seconds) if self.samples >= 1.7 * self._denoised_at else None
 
     def _sample(self, seconds: dict[str, float]) -> None:
@@ -134,7 +134,7 @@ class Progressive:
 def _denoised(
     noisy: tuple[Floats, Floats], guides: tuple[Floats, Floats], samples: int, threads: int
 ) -> Iterator[Floats | None]:
-    """Steps of taking the noise out, the last of which brings the picture: no step takes long.
+    """Short steps of denoising, the last of which yields the picture.
 
     A function, not a method: a picture that is left half-way and held by its own steps would stay in memory until
     Python looks for such circles, which in a process of many objects it hardly ever does.

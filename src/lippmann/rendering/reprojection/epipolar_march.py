@@ -189,7 +189,7 @@ def march(
                 passes = fresh or nearer(before, near)
                 place = place_at(points, field, source, here_x, here_y)
                 if place.is_known and nearer(s, place.disparity):
-                    # In front of a smooth surface, or beside the outline of a nearer one.
+                    # The place lies in front of a smooth surface, or beside the outline of a nearer one.
                     if passes and not alike(near, place.disparity, TUNING.one_surface) and nearer(near, beside):
                         beside = near
                     in_front = True

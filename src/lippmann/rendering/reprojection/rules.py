@@ -87,7 +87,7 @@ def is_behind(s: float, limit: float) -> bool:
 
 @inlined
 def coded_value(value: float, coded: bool) -> float:
-    """A colour value as differences of it are judged."""
+    """Colour value in [0, 1] for comparisons: the square root of a ``coded`` one, which approximates sRGB."""
     value = min(max(value, 0.0), 1.0)
     return np.sqrt(value) if coded else value
 

@@ -69,7 +69,7 @@ def search(
     traced = np.flatnonzero(points.status == TRACED).astype(np.uint32)
     follow_points(points, field, beside, traced, rules, marked)
     colors = points.color.reshape(-1, 3)
-    for _ in range(16):  # the search ends by itself; later rounds would find a handful of pixels
+    for _ in range(16):  # bounds the search; later rounds would find a handful of pixels
         numbers = np.flatnonzero(marked).astype(np.uint32)
         if not len(numbers):
             return
@@ -197,7 +197,7 @@ def follow_points(
                         continue
                     other = np.float64(points.disparity[r, c])
                     if alike(s, other, TUNING.one_surface):
-                        # What looks different from every side is not the same anywhere.
+                        # The colours of a view-dependent surface differ between lenses: they prove nothing.
                         if (
                             points.fragile[row, column]
                             or points.fragile[r, c]

@@ -96,7 +96,7 @@ class CausticPhotons:
         if self._chances is None:
             return no_photons()
         if not self._radius and number > 0:
-            self.of_pass(0)  # sets the radius
+            self.of_pass(0)  # the first pass sets the radius
         if number not in self._maps:
             while len(self._maps) >= self._kept:
                 del self._maps[next(iter(self._maps))]

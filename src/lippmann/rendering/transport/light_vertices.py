@@ -276,7 +276,7 @@ class LightVertexPasses:
         return self._current[1]
 
     def _pilot(self, region: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
-        """Chances of the senders, as what their rays bring within the region."""
+        """Sampling probabilities of the emitters, by a few rays of each into the region; None for no light."""
         senders = len(self._rays.senders)
         if senders == 0:
             return None
@@ -292,9 +292,9 @@ class LightVertexPasses:
 
 
 def _dealt(chances: NDArray[np.float64], count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """``count`` numbers of senders as near to their chances as whole numbers are, mixed; and their true chances."""
+    """Shuffled indices of emitters, ``count`` in all, in proportion to ``chances``; and their shares after rounding."""
     edges = np.round(np.cumsum(chances) / chances.sum() * count).astype(np.int64)
     each = np.diff(edges, prepend=0)
     number = np.repeat(np.arange(len(chances)), each)
-    # Points of a stratified sequence are not to fall into few emitters' hands.
+    # Shuffled, so that each emitter gets points from all over the stratified sequence.
     return np.random.default_rng(0).permutation(number), each / count

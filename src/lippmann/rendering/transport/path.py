@@ -100,7 +100,7 @@ class PathIntegrator:
         return [Absorption(self.features)] if self.features.has_absorption else []
 
     def _sharing(self) -> list[Technique]:
-        """Those that share a path's light with something else."""
+        """Techniques that sample a part of the light in place of, or beside, the plain path."""
         light, techniques = self.light, list[Technique]()
         if light.photons is not None:
             techniques.append(PhotonGathering(light.photons, self.depth, self._environment))

@@ -110,7 +110,7 @@ class Vertex:
 
     @cached_property
     def albedo(self) -> Color3f:
-        """Of the Lambertian part of the surface's scattering."""
+        """Albedo of the Lambertian part of the surface's BSDF."""
         return lambertian(self.si, self.bsdf, self.active)
 
     @cached_property

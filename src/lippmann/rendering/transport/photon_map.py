@@ -58,16 +58,16 @@ class Photons:
         return len(self.surfaces)
 
     def inside(self, region: NDArray[np.float64] | None) -> Photons:
-        """Those that lie in a box."""
+        """The photons in a box."""
         return self.chosen(are_inside(self.position, region))
 
     def chosen(self, which: NDArray[np.generic]) -> Photons:
-        """Some of them, by a mask or by numbers."""
+        """The photons that a mask or indices select."""
         return Photons(*(getattr(self, each.name)[which] for each in fields(self)))
 
     @staticmethod
     def dark(count: int) -> Photons:
-        """So many photons without power, at the origin."""
+        """``count`` photons without power, at the origin."""
         point = np.zeros((count, 3), np.float32)
         return Photons(point, point, point, point, np.zeros(count, np.uint32))
 
