@@ -46,6 +46,15 @@ def test_a_renamed_quilt_knows_what_it_is(lippmann, quilt):
         assert picture.size == (30, 40)
 
 
+def test_of_another_program_s_quilt_no_provenance_is_said(lippmann, tmp_path):
+    path = tmp_path / "city_qs8x6a0.75 (1).webp"
+    Image.new("RGB", (384, 384), (90, 90, 90)).save(path)
+    assert lippmann("info", path).out.splitlines() == [
+        f"{path}: quilt, 384x384, uint8",
+        "views       8x6 of 48x64 pixels, aspect 0.75",
+    ]
+
+
 @pytest.mark.long
 def test_a_lost_layout_is_given_back(lippmann, tmp_path):
     path = tmp_path / "quilt.jpg"

@@ -89,6 +89,9 @@ def test_what_is_not_meant_is_refused(display, picture, tmp_path):
     (tmp_path / "x.dat").write_bytes(b"1")
     with pytest.raises(PictureError, match="the layout is not recognized; say layout="):
         import_image(tmp_path / "x.dat")
+    (tmp_path / "IMG_0001.LFR").write_bytes(b"\x89LFP\r\n\x1a\n")
+    with pytest.raises(PictureError, match="raw light fields are not read; decode them with the Light Field Toolbox"):
+        import_image(tmp_path / "IMG_0001.LFR")
 
 
 @pytest.mark.parametrize(("layout", "library"), [("lftoolbox", "h5py"), ("zarr", "zarr")])

@@ -96,9 +96,15 @@ def test_transparent_quilts_and_other_formats_are_named(tmp_path):
     Image.new("RGBA", (512, 256), (200, 100, 50, 128)).save(tmp_path / "x_qs4x2a2.png")
     with pytest.raises(PictureError, match="is partly transparent"):
         read_quilt(tmp_path / "x_qs4x2a2.png")
-    Image.new("RGB", (512, 256)).save(tmp_path / "x_qs4x2a2.webp")
-    with pytest.raises(PictureError, match=r"unknown ending '\.webp'"):
-        read_quilt(tmp_path / "x_qs4x2a2.webp")
+    Image.new("RGB", (512, 256)).save(tmp_path / "x_qs4x2a2.bmp")
+    with pytest.raises(PictureError, match=r"unknown ending '\.bmp'"):
+        read_quilt(tmp_path / "x_qs4x2a2.bmp")
+
+
+def test_webp_quilts_are_read(tmp_path):
+    codes = np.random.default_rng(1).integers(0, 256, (256, 512, 3)).astype(np.uint8)
+    Image.fromarray(codes).save(tmp_path / "x_qs4x2a2.webp", lossless=True)
+    np.testing.assert_array_equal(read_quilt(tmp_path / "x_qs4x2a2.webp").values, codes)
 
 
 def test_a_quilt_that_lies_on_its_side_is_turned_upright(tmp_path):
@@ -240,6 +246,16 @@ def test_views_may_be_numbered_from_one_and_without_zeros(folder, tmp_path):
     np.testing.assert_array_equal(Image.open(tmp_path / "out" / "view_11.png"), codes_of(11))
 
 
+def test_of_a_grid_of_cameras_the_middle_row_is_taken(tmp_path):
+    for row in range(3):
+        for column in range(4):
+            Image.new("RGB", (8, 8), (row, column, 0)).save(tmp_path / f"out_{row:02}_{column:02}.png")
+    Image.new("RGB", (512, 256)).save(tmp_path / "all_qs4x3a1.png")  # no view
+    found = read_views(tmp_path)
+    assert [tuple(found.view_values(view)[0, 0]) for view in range(4)] == [(1, column, 0) for column in range(4)]
+    assert found.notes == ("of 3 rows of cameras the middle one is taken: the views of a quilt stand side by side",)
+
+
 def test_an_absent_view_is_named(folder):
     (folder / "shot2_017.png").unlink()
     with pytest.raises(PictureError, match="view 17 is missing; views run to 47"):
@@ -273,7 +289,7 @@ def test_a_damaged_view_is_named(folder):
         ([], "there are no views"),
         (["a.png"], "the name has no number"),
         (["a_2.png", "a_3.png"], "the first view is 2"),
-        (["a_0.png", "b_0.png"], r"b_0\.png: is view 0, as a_0\.png is"),
+        (["a_0.png", "b_0.png"], r"b_0\.png: is the same view as a_0\.png"),
         (["a_0.png", "lippmann.json"], "a folder of integral views"),
     ],
 )

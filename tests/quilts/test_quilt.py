@@ -55,6 +55,9 @@ def test_rows_of_all_views_are_those_of_each():
         ("old one_qs5x9.png", (5, 9, None)),
         ("x_qs2x2a1_qs11x6a0.5625.exr", (11, 6, 0.5625)),
         ("_qs32x1a2.png", (32, 1, 2.0)),
+        ("x_qs8x6a0.75 (1).png", (8, 6, 0.75)),  # downloaded twice
+        ("x_QS8x6a.75_final.jpg", (8, 6, 0.75)),
+        ("testCircleqs5x9a0.5625.png", (5, 9, 0.5625)),
         ("hologram_qs5x9a1.7777777777777777.png", (5, 9, 16 / 9)),  # the maker's WebXR library
     ],
 )
@@ -66,7 +69,6 @@ def test_names_are_read(tmp_path, name, layout):
     ("name", "said"),
     [
         ("teapot.png", "does not say how many views"),
-        ("x_qs8x6a0.75_final.png", "does not say how many views"),
         ("x_qs8x.png", "does not say how many views"),
         ("x_qs0x6a0.75.png", "0 columns and 6 rows"),
         ("x_qs33x6a0.75.png", "33 columns and 6 rows; there are 1 to 32"),

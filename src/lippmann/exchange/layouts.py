@@ -20,6 +20,9 @@ from lippmann.image.stored_values import Stored
 from lippmann.progress import ProgressCallback, silent
 from lippmann.runtime.plugins import Plugin, function_of
 
+#: Raw files of Lytro's cameras: micro-images before demosaicing and calibration.
+_LYTRO = (".lfp", ".lfr", ".lfx")
+
 
 @dataclass(frozen=True)
 class Exported:
@@ -221,6 +224,9 @@ def recognize(path: Path) -> str:
     own = [name for name in LAYOUTS if _layout(name).ending == ending]
     if found := own or [name for name in _names() if _layout(name).ending == ending]:
         return found[0]
+    if ending in _LYTRO:
+        fix = "decode them with the Light Field Toolbox or PlenoptiCam, and import the .mat file or the folder of views"
+        raise PictureError("raw light fields are not read", where=str(path), fix=fix)
     raise PictureError("the layout is not recognized", where=str(path), fix="say layout=...")
 
 

@@ -23,21 +23,16 @@ from lippmann.exchange.metadata_text import read_note_file, write_note_file
 from lippmann.image.encoding import FormatName, encode_values
 from lippmann.image.metadata import parse_json
 from lippmann.image.part_folders import MANIFEST, Kind
-from lippmann.image.read import open_file
 from lippmann.image.stored_values import Values
 from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.quilts.files import READ, open_view
+from lippmann.quilts.view_names import Place, list_views, places_of_views
 from lippmann.runtime.atomic_write import replacing_folder
 
 LAYOUT = "views"
 
-#: Row and column of a view, or its number alone.
-Place = tuple[int, ...]
-
-#: Endings of the picture files that are read.
-_READ = (".png", ".exr", ".tif", ".tiff")
-
+#: The end of names of a single row or column of views, whose other number all share.
 _TWO = re.compile(r"(\d{1,6})\D(\d{1,6})\D*$")
-_ONE = re.compile(r"(\d{1,9})\D*$")
 
 
 def write_view_folder(
@@ -96,35 +91,15 @@ def read_view_folder(
         If a view is missing, doubled or damaged, differs from the first in size or type, or has no number in its name.
     """
     metadata = read_note_file(folder, LAYOUT)
-    paths = _in_rows(_numbered(folder), folder, grid)
+    paths = _in_rows(places_of_views(list_views(folder, READ)), folder, grid)
     values, notes = read_view_files(paths, progress)
     return LightField(values, metadata, notes=notes)
 
 
-def _numbered(folder: Path) -> Mapping[Place, Path]:
-    """Files by the numbers in their names: row and column, or one number."""
-    try:
-        paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in _READ and path.name[0] != ".")
-    except OSError as error:
-        raise PictureError(f"cannot be read: {error.strerror}", where=str(folder)) from None
-    if not paths:
-        raise PictureError("there are no views", where=str(folder), rule=f"they end in {', '.join(_READ)}")
-    pattern = _TWO if all(_TWO.search(path.stem) for path in paths) else _ONE
-    by_place: dict[Place, Path] = {}
-    for path in paths:
-        numbers = pattern.search(path.stem)
-        if numbers is None:
-            rule = "views are named by row and column, or counted row by row"
-            raise PictureError("the name has no number", where=str(path), rule=rule)
-        place = tuple(int(number) for number in numbers.groups())
-        if place in by_place:
-            raise PictureError(f"is the same view as {by_place[place].name}", where=str(path))
-        by_place[place] = path
-    return by_place
-
-
 def _in_rows(by_place: Mapping[Place, Path], folder: Path, grid: tuple[int, int] | None) -> list[list[Path]]:
     """The files in rows; a missing view raises :class:`PictureError`."""
+    if grid is None and all(len(place) == 1 for place in by_place):
+        by_place = _in_line(by_place)
     first = np.array(sorted(by_place)).min(axis=0)
     if (first > 1).any():
         raise PictureError("the first view is missing", where=str(folder), rule="views are counted from 0 or 1")
@@ -150,6 +125,19 @@ def _in_rows(by_place: Mapping[Place, Path], folder: Path, grid: tuple[int, int]
                 raise PictureError(f"{what} is missing", where=str(folder))
             rows[row].append(by_place[number])
     return rows
+
+
+def _in_line(by_place: Mapping[Place, Path]) -> Mapping[Place, Path]:
+    """Numbered files as one row or column of views, if their names end in the two numbers of such."""
+    ends = [(int(match[1]), int(match[2])) for path in by_place.values() if (match := _TWO.search(path.stem))]
+    numbers = [number for (number,) in by_place]
+    if len(ends) < len(by_place):
+        return by_place
+    if len({row for row, _ in ends}) == 1:
+        return {(0, number): path for (number,), path in by_place.items()}
+    return (
+        {(number, 0): path for (number,), path in by_place.items()} if [row for row, _ in ends] == numbers else by_place
+    )
 
 
 def is_composable(folder: Path) -> bool:
@@ -183,14 +171,14 @@ def read_view_files(
         If a file is missing or damaged, holds transparent colours, or differs from the first in size or type.
     """
     down, across = len(paths), len(paths[0])
-    file, notes = open_file(paths[0][0]), FileNotes()
-    first: Values = file.decode(as_srgb=True)[0]
-    views = np.empty((down, across, *first.shape), dtype=first.dtype)
+    views, notes = None, FileNotes()
     for number, path in enumerate(path for row in paths for path in row):
-        if number:
-            file = open_file(path)
-        notes.add(path.name, file.notes)
-        view = file.decode(as_srgb=True)[0] if number else first
+        with open_view(path) as file:
+            notes.add(path.name, file.notes)
+            view = file.read()
+        if views is None:
+            first = view
+            views = np.empty((down, across, *first.shape), dtype=first.dtype)
         if view.shape != first.shape:
             rule = f"the first view, {paths[0][0].name}, has {_size(first)}"
             raise PictureError(f"has {_size(view)} pixels", where=str(path), rule=rule)
@@ -199,6 +187,7 @@ def read_view_files(
             raise PictureError(f"holds {view.dtype} values", where=str(path), rule=rule)
         views[divmod(number, across)] = view
         progress(Progress("read", number + 1, down * across))
+    assert views is not None  # there are views
     return views, notes.lines()
 
 

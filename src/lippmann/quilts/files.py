@@ -6,7 +6,6 @@ The size of a picture is checked before memory is allocated for it.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -34,12 +33,13 @@ from lippmann.quilts.quilt import (
     names_layout,
 )
 from lippmann.quilts.quilt_metadata import metadata_of_text, quilt_text
+from lippmann.quilts.view_names import list_views, middle_row, places_of_views
 from lippmann.runtime.atomic_write import replacing_folder
 from lippmann.runtime.regular_file import check_kind
 
-#: Endings of the picture files that are read; JPEG is not written.
-_JPEG = (".jpg", ".jpeg")
-_READ = (*FORMATS, *_JPEG)
+#: Endings of the picture files that are read; photographs are not written.
+_PHOTOGRAPHS = (".jpg", ".jpeg", ".webp", ".avif")
+READ = (*FORMATS, *_PHOTOGRAPHS)
 
 
 def is_quilt(path: Path) -> bool:
@@ -50,7 +50,7 @@ def is_quilt(path: Path) -> bool:
     PictureError
         If the file is missing or damaged.
     """
-    if path.suffix.lower() in _JPEG:
+    if path.suffix.lower() in _PHOTOGRAPHS:
         return names_layout(path)
     text = open_file(path).text
     if not text:
@@ -59,7 +59,7 @@ def is_quilt(path: Path) -> bool:
 
 
 def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
-    """Read a quilt: PNG, OpenEXR, TIFF or JPEG.
+    """Read a quilt: PNG, OpenEXR, TIFF, JPEG, WebP or AVIF.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
         If the file is missing or damaged, nothing says its layout, or the layout does not fit its size.
     """
     _check_ending(path)
-    with _open(path) as file:
+    with open_view(path) as file:
         metadata = metadata_of_text(file.text, str(path))
         if layout is None:
             # A name that says nothing is refused only where the metadata says nothing either.
@@ -97,8 +97,8 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
     Parameters
     ----------
     folder:
-        The folder. Views are numbered by the last number in their file names, from 0 or 1, that of the leftmost camera
-        first.
+        The folder. Views are numbered in their file names, from 0 or 1, that of the leftmost camera first; of a grid of
+        cameras, named by row and column, the middle row is taken.
     layout:
         Columns, rows and aspect ratio of the quilt. None: one row of all views.
     progress:
@@ -109,7 +109,7 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
     PictureError
         If a view is missing or damaged, or differs from the first in size.
     """
-    paths = _numbered(folder)
+    paths, taken = _numbered(folder)
     if layout is None:
         layout = QuiltLayout(len(paths), 1, None)
     if len(paths) != layout.views:
@@ -117,7 +117,7 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
         raise PictureError(f"it holds {len(paths)} views", where=str(folder), rule=rule)
     quilt, notes = None, FileNotes()
     for number, path in enumerate(paths):
-        with _open(path) as file:
+        with open_view(path) as file:
             if quilt is None:
                 _check_held(file.size, layout.views, folder)
                 quilt = _blank_quilt(file.size, layout, file.stored())
@@ -132,7 +132,7 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
         notes.add(path.name, file.notes)
         progress(Progress("read", number + 1, layout.views))
     assert quilt is not None  # there are views
-    return replace(quilt, notes=notes.lines())
+    return replace(quilt, notes=taken + notes.lines())
 
 
 def _check_held(view_size: tuple[int, int], views: int, folder: Path) -> None:
@@ -233,31 +233,21 @@ def write_views(
             progress(Progress("write", number + 1, quilt.layout.views))
 
 
-def _numbered(folder: Path) -> Sequence[Path]:
-    """The views of a folder in order; a gap, a double or a name without a number raises :class:`PictureError`."""
-    try:
-        paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in _READ and path.name[0] != ".")
-    except OSError as error:
-        raise PictureError(f"cannot be read: {error.strerror}", where=str(folder)) from None
+def _numbered(folder: Path) -> tuple[Sequence[Path], tuple[str, ...]]:
+    """The views of a folder in order, and notes; a gap, a double or a name without a number raises
+    :class:`PictureError`."""
     if (folder / MANIFEST).exists():
         rule = "its pictures have one pixel for every lens"
         raise PictureError("is a folder of integral views", where=str(folder), rule=rule, fix="compose it")
-    if not paths:
-        raise PictureError("there are no views", where=str(folder), rule=f"they end in {', '.join(_READ)}")
-    by_number: dict[int, Path] = {}
-    for path in paths:
-        digits = re.findall(r"[0-9]+", path.stem)
-        if not digits:
-            raise PictureError("the name has no number", where=str(path), rule="views are numbered from the left")
-        if (number := int(digits[-1])) in by_number:
-            raise PictureError(f"is view {number}, as {by_number[number].name} is", where=str(path))
-        by_number[number] = path
+    by_number, rows = middle_row(places_of_views(list_views(folder, READ)))
     first = min(by_number)
     if first > 1:
-        raise PictureError(f"the first view is {first}", where=str(folder), rule="views are numbered from 0 or 1")
+        rule, fix = "views are numbered from 0 or 1", "interlace them: 'lippmann interlace' takes any names"
+        raise PictureError(f"the first view is {first}", where=str(folder), rule=rule, fix=fix)
     if missing := _first_missing(by_number, first):
         raise PictureError(f"view {missing} is missing", where=str(folder), rule=f"views run to {max(by_number)}")
-    return [by_number[number] for number in sorted(by_number)]
+    note = f"of {rows} rows of cameras the middle one is taken: the views of a quilt stand side by side"
+    return [by_number[number] for number in sorted(by_number)], (note,) if rows > 1 else ()
 
 
 def _first_missing(numbers: Iterable[int], first: int) -> int | None:
@@ -268,11 +258,11 @@ def _first_missing(numbers: Iterable[int], first: int) -> int | None:
 
 
 def _check_ending(path: Path) -> None:
-    if path.suffix.lower() not in _READ:
-        raise PictureError.unknown("ending", path.suffix, _READ, where=str(path))
+    if path.suffix.lower() not in READ:
+        raise PictureError.unknown("ending", path.suffix, READ, where=str(path))
 
 
-class _OpenFile(NamedTuple):
+class OpenView(NamedTuple):
     """A picture file whose header is read: width and height, type of its values, their decoder, notes, text."""
 
     size: tuple[int, int]
@@ -283,21 +273,21 @@ class _OpenFile(NamedTuple):
 
 
 @contextmanager
-def _open(path: Path) -> Iterator[_OpenFile]:
+def open_view(path: Path) -> Iterator[OpenView]:
     """The opened file with its header; errors of libraries about the file become :class:`PictureError`."""
-    if path.suffix.lower() not in _JPEG:
+    if path.suffix.lower() not in _PHOTOGRAPHS:
         file = open_file(path)
         size = file.width, file.height
-        yield _OpenFile(
+        yield OpenView(
             size, lambda: file.check_stored(file.stored), lambda: file.decode(as_srgb=True)[0], file.notes, file.text
         )
         return
     check_kind(path, PictureError)
     try:
-        with path.open("rb") as stream, open_photograph(stream, path, ("JPEG",)) as photograph:
+        with path.open("rb") as stream, open_photograph(stream, path, ("JPEG", "WEBP", "AVIF")) as photograph:
             if max(photograph.size) > MOST_SIDE:
                 raise PictureError(f"it has {photograph.size[0]} x {photograph.size[1]} pixels", where=str(path))
-            yield _OpenFile(
+            yield OpenView(
                 photograph.size, lambda: "uint8", lambda: opaque_colors(photograph.srgb_codes(), path), photograph.notes
             )
     except (OSError, SyntaxError) as error:

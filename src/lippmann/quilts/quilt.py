@@ -32,7 +32,9 @@ LEAST_SIDE, MOST_SIDE, MOST_TILES = 256, 16384, 32
 #: Width in pixels of a quilt in a notebook, at most.
 _NOTEBOOK_WIDTH = 768
 
-_NAME = re.compile(r"_qs(\d{1,4})x(\d{1,4})(?:a(\d{1,4}(?:\.\d{1,17})?))?$")
+#: As players find it: anywhere in the name, the last of several, so that ``_qs8x6a0.75 (1)`` is known. Without an
+#: aspect the name ends there.
+QUILT_NAME = re.compile(r".*qs(\d{1,4})x(\d{1,4})(?:a(\d{0,4}(?:\.\d{1,17})?)(?<=\d)(?![\d.]*\d)|$)", re.IGNORECASE)
 _PAIR = re.compile(r"_(?:half_)?2x1$")
 _CONVENTION = "a quilt's name ends in columns x rows and aspect ratio, such as _qs8x6a0.75.png"
 
@@ -298,7 +300,7 @@ def _pair_of_display(
 
 def names_layout(path: Path) -> bool:
     """Whether a file's name says a quilt's layout."""
-    return _NAME.search(path.stem) is not None or _PAIR.search(path.stem) is not None
+    return QUILT_NAME.search(path.stem) is not None or _PAIR.search(path.stem) is not None
 
 
 def names_half_pair(path: Path) -> bool:
@@ -328,7 +330,7 @@ def layout_of_name(path: Path) -> QuiltLayout:
     """
     if _PAIR.search(path.stem):
         return QuiltLayout(2, 1, None)
-    match = _NAME.search(path.stem)
+    match = QUILT_NAME.search(path.stem)
     if match is None:
         raise PictureError("the name does not say how many views there are", where=str(path), rule=_CONVENTION)
     aspect = None if match[3] is None else float(match[3])

@@ -347,7 +347,8 @@ def test_without_any_depth_there_is_no_scene(tmp_path):
         scene_of(tmp_path, np.zeros((4, 4), np.float32))
     (tmp_path / "photo.png").write_bytes(encoded(np.zeros((4, 4, 3), np.uint8)))
     with pytest.raises(
-        SceneError, match=r"^photo\.png: needs a depth map; add depth_map=\.\.\., or lay photo_depth\.png"
+        SceneError,
+        match=r"^photo\.png: needs a depth map; .*quilts.* own; add depth_map=\.\.\., or lay photo_depth\.png",
     ):
         load_scene(tmp_path / "photo.png")
 

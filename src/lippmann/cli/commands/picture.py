@@ -418,7 +418,7 @@ def _quilt_lines(path: Path, quilt: Quilt) -> list[str]:
     lines.append(f"views       {quilt.layout.columns}x{quilt.layout.rows} of {view_width}x{view_height} pixels{aspect}")
     if quilt.display is not None:
         lines.append(f"display     {quilt.display.name}")
-    return lines + _provenance_lines(quilt.provenance)
+    return lines + (_provenance_lines(quilt.provenance) if quilt.provenance != Provenance() else [])
 
 
 def _position(eye: tuple[float, float, float]) -> str:

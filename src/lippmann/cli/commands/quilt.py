@@ -190,7 +190,7 @@ def pack(
 
 @quilt.command("unpack", cls=HelpfulCommand)
 def unpack(
-    picture: Annotated[Path, typer.Argument(help="A quilt: PNG, EXR, TIFF or JPEG.")],
+    picture: Annotated[Path, typer.Argument(help="A quilt: PNG, EXR, TIFF, JPEG, WebP or AVIF.")],
     output: options.Folder,
     layout: Layout = None,
     aspect: Aspect = None,

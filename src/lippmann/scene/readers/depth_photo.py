@@ -78,7 +78,8 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
         depth_map = depth_beside(path)
         if depth_map is None:
             fix = f"add depth_map=..., or lay {path.stem[:40]}_depth.png beside it"
-            raise SceneError("needs a depth map", where=path.name, fix=fix)
+            rule = "pictures are read as photographs with depth: 'lippmann weave' takes quilts, 'lippmann view' our own"
+            raise SceneError("needs a depth map", where=path.name, rule=rule, fix=fix)
         notes = (*notes, f"depth from {depth_map.name}, which lies beside it")
     found = read_depth_map(depth_map) if depth_map is not None else own
     assert found is not None

@@ -1,0 +1,99 @@
+"""Where the views of a folder belong, by the numbers in their files' names.
+
+Numbers that all names share say nothing. Of the others the last one counts the views, or the last two side by side are
+row and column, where rows and columns repeat. The names of the Stanford light field archive also hold where the camera
+stood, ``out_ROW_COLUMN_Y_X``, in mm, x to the right and y downwards; their rows and columns run either way.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from pathlib import Path
+from statistics import fmean
+
+import numpy as np
+
+from lippmann.errors import PictureError
+from lippmann.quilts.quilt import QUILT_NAME
+
+#: Row and column of a view, counted from the top left camera, or its number alone.
+Place = tuple[int, ...]
+
+_NUMBER = re.compile(r"[0-9]{1,9}")
+_STANFORD = re.compile(r"_(\d{1,6})_(\d{1,6})_(-?\d{1,9}\.\d{1,9})_(-?\d{1,9}\.\d{1,9})(?![\d.])")
+
+
+def list_views(folder: Path, endings: Collection[str]) -> list[Path]:
+    """The pictures of a folder by name; hidden files and quilts are none.
+
+    Raises
+    ------
+    PictureError
+        If the folder cannot be read, or holds no picture.
+    """
+    try:
+        paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in endings and path.name[0] != ".")
+    except OSError as error:
+        raise PictureError(f"cannot be read: {error.strerror}", where=str(folder)) from None
+    if not (views := [path for path in paths if not QUILT_NAME.search(path.stem)]):
+        raise PictureError("there are no views", where=str(folder), rule=f"they end in {', '.join(endings)}")
+    return views
+
+
+def places_of_views(paths: Sequence[Path]) -> dict[Place, Path]:
+    """The files by row and column, or by one number.
+
+    Raises
+    ------
+    PictureError
+        If a name has no number, or two files are the same view.
+    """
+    stems = [path.stem for path in paths]
+    if all(_STANFORD.search(stem) for stem in stems):
+        return _by_place(paths, _stanford_places(stems))
+    numbers = [tuple(int(number) for number in _NUMBER.findall(stem)) for stem in stems]
+    for path, found in zip(paths, numbers, strict=True):
+        if not found:
+            rule = "views are numbered, or named by row and column"
+            raise PictureError("the name has no number", where=str(path), rule=rule)
+    if len({len(found) for found in numbers}) > 1:
+        return _by_place(paths, [found[-1:] for found in numbers])
+    columns = list(zip(*numbers, strict=True))
+    varying = [index for index, column in enumerate(columns) if len(set(column)) > 1] or [len(columns) - 1]
+    last = varying[-1]
+    repeating = [index for index in varying if len(set(columns[index])) < len(paths)]
+    pair = (last - 1, last) if {last - 1, last} <= {*repeating} else (last,)
+    return _by_place(paths, [tuple(found[index] for index in pair) for found in numbers])
+
+
+def _by_place(paths: Iterable[Path], places: Iterable[Place]) -> dict[Place, Path]:
+    by_place: dict[Place, Path] = {}
+    for path, place in zip(paths, places, strict=True):
+        if place in by_place:
+            raise PictureError(f"is the same view as {by_place[place].name}", where=str(path))
+        by_place[place] = path
+    return by_place
+
+
+def _stanford_places(stems: Sequence[str]) -> list[Place]:
+    """Row and column, turned where the cameras stand the other way round."""
+    fields = [match.groups() for stem in stems if (match := _STANFORD.search(stem))]
+    places = np.array([[int(row), int(column)] for row, column, _, _ in fields])
+    for axis in (0, 1):
+        numbers = places[:, axis]
+        first, last = int(numbers.min()), int(numbers.max())
+        ends = [
+            fmean(float(found[2 + axis]) for found, number in zip(fields, numbers, strict=True) if number == end)
+            for end in (first, last)
+        ]
+        if ends[0] > ends[1]:
+            places[:, axis] = first + last - numbers
+    return [(int(row), int(column)) for row, column in places]
+
+
+def middle_row(by_place: Mapping[Place, Path]) -> tuple[dict[int, Path], int]:
+    """Of a grid the views of the middle row by column, else all by number; and how many rows there are."""
+    rows = sorted({place[:-1] for place in by_place})
+    middle = rows[len(rows) // 2]
+    return {place[-1]: path for place, path in by_place.items() if place[:-1] == middle}, len(rows)
