@@ -245,13 +245,14 @@ def _reuse(result: dict[str, Any]) -> str:
     titles = {
         "small": "The paper's display, 512x512 pixels, classic light, ray depth 2, one ray a pixel",
         "large": "The same optics, 3840x2160 pixels (480 lenses of 8 pixels)",
-        "dear": "1920x1080 pixels, path light, lamps of some size, 16 samples a pixel",
+        "dear": "1920x1080 pixels, path light, emitters of some size, 16 samples a pixel",
     }
     parts = [
         """## Reusing points (`reuse.py`)
 
 Seconds are those of tracing and reuse; *saved* is the share of `full`'s time. The paper's PSNR is its average over the
-micro-images. [Reprojection](reprojection.md) says what the ways mean."""
+micro-images. [Reprojection](reprojection.md) says what the ways mean. Pictures of 512x512 pixels are timed in processor
+seconds of one thread; the larger ones were timed by the clock on two cores, with an earlier version of the bridges."""
     ]
     header = "| scene | way | pixels traced | time | full | saved | paper's PSNR | worst micro-image |"
     for name, rows in result["results"].items():
