@@ -146,3 +146,24 @@ def test_default_light_is_pooled_and_a_slanted_sheet_gets_sub_pixels():
     assert (slanted.method, slanted.subpixels) == ("pooled", True)
     plain = lippmann.render(scene, display, method="full", subpixels=False).provenance
     assert (plain.method, plain.spp, plain.subpixels) == ("full", 16, False)
+
+
+def test_unlit_surfaces_get_samples_as_their_edges_need_them():
+    """The confetti is nothing but edges; the plate has four, in few pixels."""
+    generator = np.random.default_rng(5)
+    places = generator.uniform(-1, 1, (3000, 1, 3)) * (4, 3, 1) + generator.normal(0, 0.1, (3000, 3, 3))
+    confetti = Mesh("", places.reshape(-1, 3).astype(np.float32), np.arange(9000, dtype=np.uint32).reshape(-1, 3), 0)
+    corners = np.array([[-4, -3, 0], [4, -3, 0], [4, 3, 0], [-4, 3, 0]], np.float32)
+    plate = Mesh("", corners, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), 0)
+    material = Material("own colour", base_color=(0.9, 0.2, 0.1), unlit=True)
+    edged, plain = (
+        lippmann.load_scene(SceneDescription("unlit", [mesh], [material], [Instance(0, np.eye(4))]))
+        for mesh in (confetti, plate)
+    )
+    assert lippmann.render(plain, lenticular()).provenance.spp == 16
+    image = lippmann.render(edged, lenticular())
+    assert image.provenance.method == "full"
+    assert 16 < image.provenance.spp <= 128
+    reference = lippmann.render(edged, lenticular(), method="full", spp=1024)
+    error = np.mean(np.square(encode_srgb(image.pixels) - encode_srgb(reference.pixels)))
+    assert -10 * np.log10(error) > 36.0

@@ -120,8 +120,9 @@ def trace_samples(job: Job) -> Traced:
         return trace_unjudged(job, why)
     if job.is_part:
         return _denoised_part(job)
-    is_plain = job.request.denoise == "none" and not job.request.is_open_ended
-    return _fixed_samples(job) if is_plain else _in_rounds(job)
+    request = job.request
+    is_fixed = request.denoise == "none" and not request.is_open_ended and request.spp_reserve is None
+    return _fixed_samples(job) if is_fixed else _in_rounds(job)
 
 
 def trace_unjudged(job: Job, *notes: str) -> Traced:

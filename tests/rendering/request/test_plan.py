@@ -87,11 +87,13 @@ def test_a_photograph_has_one_ray_a_pixel_and_keeps_its_colours():
     assert (found.method, found.denoise, found.spp, found.pixel_filter) == ("full", "none", 1, "point")
     assert (found.tone_map, found.exposure) == ("none", 0.0)
     assert found.reason == "full: a photograph has no noise"
+    assert found.spp_reserve is None
 
 
 def test_unlit_models_keep_their_colours_and_have_smooth_outlines():
     found = resolve(RenderRequest(tone_map="auto"), unlit(), load_display("seed-lenticular"))
-    assert (found.method, found.denoise, found.pixel_filter, found.tone_map) == ("pooled", "oidn", "box", "none")
+    assert (found.method, found.denoise, found.pixel_filter, found.tone_map) == ("full", "none", "box", "none")
+    assert (found.spp, found.spp_reserve) == (16, 128)
 
 
 def test_lit_surfaces_beside_unlit_ones_have_noise():

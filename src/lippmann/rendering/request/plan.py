@@ -230,6 +230,7 @@ def _method(facts: _Facts) -> Choice[Method]:
         (scene.lies_off_surfaces, "full", f"{kind}, whose light lies on no surface"),
         (facts.is_photograph, "full", "a photograph has no noise"),
         (facts.is_denoised_draft, "full", "a draft, denoised"),  # sharing takes a while for 0.4 dB
+        (facts.shows_own_colors, "full", "unlit surfaces have no noise inside their edges"),
         (request.denoise != "auto", "full", f"{denoising}, as asked for"),
         (name in PROPERTIES, "full", f"{name} has no noise"),
         (not facts.is_pooled_light, "full", f"the light of {name} is not pooled"),
@@ -297,12 +298,13 @@ def _quality(facts: _Facts, method: Method) -> Choice[float | None]:
 
 def _reserve(facts: _Facts, method: Method, samples: int | None, values: int | None) -> Choice[int | None]:
     is_given = facts.request.spp is not None or facts.request.effort != "normal" or samples is None
-    is_other = facts.form not in ("picture", "forecast") or method != "pooled" or values is None
+    has_none = method != "pooled" and (facts.is_one_ray or not facts.shows_own_colors)
+    is_other = facts.form not in ("picture", "forecast") or has_none or values is None
     spent = (values or 1) * (samples or 1)
     factor = min(TUNING.reserve, TUNING.most_in_reserve // spent)
     return _first(
         (is_given, None, "the number of samples, or the goal, was asked for"),
-        (is_other, None, "a pooled picture in one piece has one"),
+        (is_other, None, "pictures in one piece have one, pooled or unlit"),
         (factor < 2, None, "the picture is too large"),
         (True, factor * (samples or 1), "up to so many if it is not clean by its own estimate"),
     )
