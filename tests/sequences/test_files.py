@@ -9,13 +9,18 @@ import signal
 import subprocess
 import sys
 import time
+import weakref
 from dataclasses import replace
+from typing import ClassVar
 
+import numpy as np
 import pytest
 
 from lippmann.display import load_display
 from lippmann.errors import PictureError
+from lippmann.image import Provenance
 from lippmann.options.placement import PlacementOptions
+from lippmann.rendering.preview import Preview
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime.atomic_write import temporary_file
 from lippmann.sequences.files import journal_of, saved_sequence
@@ -68,6 +73,36 @@ def contents(folder):
 def test_a_whole_run_leaves_its_frames_alone(unbroken):
     assert list(unbroken) == [f"f_{number:02}.png" for number in FRAMES]
     assert len(set(unbroken.values())) == 4
+
+
+def test_a_frame_is_let_go_before_the_next_is_rendered(engine, moving_ball, display, tmp_path):
+    """A film takes the memory of a still."""
+    alive = set()
+
+    class Form:
+        settings: ClassVar[dict[str, str]] = {}
+
+        def render(self, scene, display, request, progress, build):
+            assert not alive
+            pixels = np.zeros((2, 2, 3), np.float32)
+            alive.add(id(pixels))
+            weakref.finalize(pixels, alive.discard, id(pixels))
+            return Preview(pixels, Provenance(method="full"))
+
+        def write(self, frame, path, bits):
+            path.write_bytes(frame.pixels.tobytes())
+
+    motion = open_motion(moving_ball)
+    with saved_sequence(
+        motion,
+        tmp_path / "f.png",
+        lambda number: tmp_path / f"{number}.png",
+        display,
+        FRAMES,
+        QUICK,
+        form=Form(),
+    ) as saved:
+        assert [frame.number for frame in saved] == list(FRAMES)
 
 
 @pytest.mark.long

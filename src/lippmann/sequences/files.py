@@ -177,4 +177,6 @@ def _whole(
     """Frames rendered in one piece, and saved."""
     for number, image in render_frames(motion, display, frames, where, request, form, progress):
         form.write(image, path_of(number), bits)
-        yield number, image.provenance
+        provenance = image.provenance
+        del image  # while the next is rendered
+        yield number, provenance

@@ -306,15 +306,18 @@ def render_frames(
     """The frames of :func:`render_sequence`, in any form, once it is known where the display stands."""
     kept = KeptScene()
     request = hold_exposure(request, motion, display, where, kept.build)
-    for position, frame in enumerate(frames):
+
+    def render(position: int, frame: int) -> Shown:
         report = _report_of_frame(progress, position, len(frames))
         asked = replace(of_frame(request, frame), placement=where(frame))
         image = form.render(motion.scene(frame), display, asked, report, kept.build)
         made = image.provenance
         # Noise that stands still has no flicker that the frames' own errors would tell.
         estimate = made.estimate if request.fixed_noise else with_flicker(made.estimate)
-        options = {**made.options, "frame": frame}
-        yield frame, replace(image, provenance=replace(made, options=options, estimate=estimate))
+        return replace(image, provenance=replace(made, options={**made.options, "frame": frame}, estimate=estimate))
+
+    for position, frame in enumerate(frames):
+        yield frame, render(position, frame)  # which no variable holds while the next is rendered
 
 
 def render_tiled_frames(

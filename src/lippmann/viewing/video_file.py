@@ -117,7 +117,7 @@ def write_codes(
 ) -> None:
     """Write frames ``(H, W, 3)`` of 8-bit codes as an animation; parameters and errors as of :func:`write_animation`.
 
-    The next frame is made while one is coded and written: memory holds two of them.
+    The next frame is made while one is coded and written; no more are held.
     """
     check_animation_path(path, codec)
     film = _film_of(path)
@@ -152,6 +152,7 @@ def _beside(write: Callable[[Iterator[Pixels]], None], frames: Iterable[Pixels])
         try:
             for frame in frames:
                 hand_over(frame)
+                del frame  # while the next is made
                 if writing.done():
                     break
         except BaseException:
