@@ -194,6 +194,15 @@ def test_permission_denied(tmp_path):
         tmp_path.chmod(0o755)
 
 
+def test_a_folder_that_takes_no_files_is_not_called_removed(tmp_path, monkeypatch):
+    def refuse(*_: object, **__: object) -> None:
+        raise FileNotFoundError(errno.ENOENT, "No such file or directory")  # what /proc answers
+
+    monkeypatch.setattr(os, "open", refuse)
+    with pytest.raises(OutputError, match="cannot be written: its folder takes no files; choose another place"):
+        atomic_write.check_writable(tmp_path / "x.png")
+
+
 def test_permission_denied_by_the_system(tmp_path, monkeypatch):
     def denied(*_):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))

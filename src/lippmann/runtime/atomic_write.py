@@ -404,4 +404,6 @@ def reason_and_fix(error: OSError) -> tuple[str, str]:
 
 def _output_error(path: Path, error: OSError) -> OutputError:
     reason, fix = reason_and_fix(error)
+    if error.errno == errno.ENOENT and path.parent.is_dir():  # as in /proc
+        reason, fix = "its folder takes no files", "choose another place"
     return OutputError(f"cannot be written: {reason}", where=str(path), fix=fix)

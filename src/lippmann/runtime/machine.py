@@ -185,8 +185,8 @@ def check_input(size: int, what: str, *, where: str) -> None:
     free, fix = _left(limit)
     limit.granted += size
     if size > free:
-        took = f"{what} takes {_amount(size)} of memory"
-        raise MemoryLimitError(took, where=where, rule=f"{_amount(free)} are left", fix=fix)
+        took = f"{what} takes {amount_in_words(size)} of memory"
+        raise MemoryLimitError(took, where=where, rule=f"{amount_in_words(free)} are left", fix=fix)
 
 
 def input_memory_left() -> int:
@@ -218,5 +218,8 @@ def _resident() -> int:
     return int(psutil.Process().memory_info().rss)
 
 
-def _amount(size: int) -> str:
-    return f"{size / 2**30:.1f} GiB" if size >= 1 << 30 else f"{max(1, round(size / 2**20))} MiB"
+def amount_in_words(size: int) -> str:
+    """Bytes of memory, such as ``1.5 GiB``, ``12 MiB`` or ``1 KiB``."""
+    if size >= 1 << 30:
+        return f"{size / 2**30:.1f} GiB"
+    return f"{size / 2**20:.0f} MiB" if size >= 1 << 20 else f"{max(1, size >> 10)} KiB"

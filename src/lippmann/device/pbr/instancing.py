@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from lippmann.errors import SceneError
+from lippmann.runtime.machine import amount_in_words
 
 #: Bytes of a triangle in a merged shape: its indices and its part of the acceleration structure while that is built.
 BYTES_PER_TRIANGLE = 120
@@ -93,17 +94,13 @@ def choose_instances(meshes: Mapping[K, CopiedMesh], memory: int, *, name: str =
 def too_many(what: str, copies: int, need: int, memory: int, name: str) -> SceneError:
     """The error of copies that need more bytes than there are."""
     return SceneError(
-        f"{what} need {_size(need)}",
+        f"{what} need {amount_in_words(need)}",
         where=name,
         parameter="memory",
-        rule=f"the scene may take {_size(memory)}, about {int(copies * memory / need):,} such copies",
+        rule=f"the scene may take {amount_in_words(memory)}, about {int(copies * memory / need):,} such copies",
         fix="allow more memory, or place fewer copies",
     )
 
 
 def _bytes_of(meshes: Mapping[K, CopiedMesh], instanced: set[K]) -> int:
     return sum(mesh.bytes_once * (1 if key in instanced else mesh.copies) for key, mesh in meshes.items())
-
-
-def _size(size: int) -> str:
-    return f"{size / 2**30:.3g} GiB" if size >= 2**30 else f"{size / 2**20:.3g} MiB"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from lippmann.errors import MemoryLimitError
 from lippmann.runtime import engine
+from lippmann.runtime.machine import amount_in_words
 
 #: A lane of a wavefront at its widest moment: its radiance, its ray counts, the sums and their copies.
 BYTES_PER_LANE = 96
@@ -90,8 +91,8 @@ def lanes_within(memory: int, kept: int, needed: int, what: str, preferred: int 
 def too_small(memory: int, what: str, required: int, fix: str = "raise the limit") -> MemoryLimitError:
     """The error that ``memory`` bytes do not hold ``what``, which needs ``required``."""
     return MemoryLimitError(
-        f"{memory / 2**20:.0f} MiB are too small for {what}",
+        f"{amount_in_words(memory)} are too small for {what}",
         parameter="memory",
-        rule=f"it needs {required / 2**20:.0f} MiB",
+        rule=f"it needs {amount_in_words(required)}",
         fix=fix,
     )
