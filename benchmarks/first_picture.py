@@ -56,7 +56,7 @@ def eye_pixels(display: Display) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     width, height = display.size_mm
     count = [max(2, round(SEEN * side / max(display.size_mm))) for side in (width, height)]
     x, y = np.meshgrid(*((np.arange(n) + 0.5) / n - 0.5 for n in count))
-    seen = display.panel_point_seen_by(*default_eye(display), x * width, -y * height)
+    seen = display.visible_panel_point(*default_eye(display), x * width, -y * height)
     u, v = (np.floor(value).astype(int) for value in display.pixel_coordinates(*seen))
     inside = (u >= 0) & (u < display.panel.width) & (v >= 0) & (v < display.panel.height)
     return np.clip(u, 0, display.panel.width - 1), np.clip(v, 0, display.panel.height - 1), inside

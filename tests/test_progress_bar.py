@@ -8,7 +8,7 @@ import pytest
 
 import lippmann
 from lippmann.progress import Progress, silent
-from lippmann.progress_bar import Overall, shown
+from lippmann.progress_bar import Overall, show_progress
 
 
 def shares(reports):
@@ -52,11 +52,11 @@ def test_real_work_runs_forwards_to_the_end(engine, options):
 
 
 def test_a_callback_is_told_and_without_a_terminal_nothing_is_shown(monkeypatch):
-    with shown(silent) as told:
+    with show_progress(silent) as told:
         assert told is silent
     stream = io.StringIO()
     monkeypatch.setattr("sys.stderr", stream)
-    with shown(None) as told:
+    with show_progress(None) as told:
         told(Progress("trace", 1, 2))
     assert stream.getvalue() == ""
 
@@ -71,7 +71,7 @@ def test_the_bar_fits_eighty_columns(monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setenv("TERM", "dumb")
     monkeypatch.setenv("NO_COLOR", "1")
-    with shown(None) as told:
+    with show_progress(None) as told:
         for done in range(5):
             told(Progress("guides", done, 4, "worst micro-image 33.3 of 40 dB, 36.1 of 42 dB, about 1234 s left"))
     lines = stream.getvalue().replace("\r", "\n").split("\n")

@@ -29,7 +29,7 @@ from lippmann.options.placement import PlacementOptions
 from lippmann.options.quality import MachineOptions, QualityOptions, RenderKeywords
 from lippmann.options.scene import SceneOptions
 from lippmann.progress import ProgressCallback, silent
-from lippmann.progress_bar import shown
+from lippmann.progress_bar import show_progress
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import Placement, options_of_sequence
 from lippmann.scene.readers.load import load_scene
@@ -110,8 +110,8 @@ def render(
         from lippmann.rendering.picture import render_picture as rendered
 
     request = _request(placement, options)
-    with shown(progress) as told:
-        return rendered(_scene(scene), with_bleed(_display(display), bleed), request, told)
+    with show_progress(progress) as report:
+        return rendered(_scene(scene), with_bleed(_display(display), bleed), request, report)
 
 
 @takes(QualityOptions, MachineOptions, without=LEFT_OUT["tiles"])
@@ -166,7 +166,7 @@ def render_to_file(
     from lippmann.tiles.tiled_render import render_to_file as rendered
 
     request = _request(placement, options)
-    with shown(progress) as told:
+    with show_progress(progress) as report:
         return rendered(
             _scene(scene),
             with_bleed(_display(display), bleed),
@@ -175,7 +175,7 @@ def render_to_file(
             bits=bits,
             resume=resume,
             runner=runner,
-            progress=told,
+            progress=report,
         )
 
 
@@ -218,8 +218,8 @@ def preview(
     """
     from lippmann.rendering.preview import render_preview
 
-    with shown(progress) as told:
-        return render_preview(_scene(scene), camera, size, RenderRequest.of(options), told)
+    with show_progress(progress) as report:
+        return render_preview(_scene(scene), camera, size, RenderRequest.of(options), report)
 
 
 @takes(QualityOptions, MachineOptions, without=LEFT_OUT["quilt"])
@@ -269,14 +269,14 @@ def render_quilt(
 
     device = display if isinstance(display, Display) else load_display(str(display))
     layout = quilt_of_display(device, views, size)
-    with shown(progress) as told:
+    with show_progress(progress) as report:
         frame = rendered(
             _scene(scene),
             device,
             (layout.layout.columns, layout.layout.rows),
             (layout.width, layout.height),
             _request(placement, options),
-            told,
+            report,
         )
     return Quilt(frame.pixels, layout.layout, provenance=frame.provenance, display=device)
 
@@ -338,13 +338,13 @@ def render_turntable(
     classic = options.get("integrator") == "classic"
     where = options_of_sequence(placement)
     motion = open_turntable(_scene(scene), frames, swing=swing, placement=where, classic=classic)
-    told = progress or silent
+    report = progress or silent
     pictures = render_sequence(
         motion,
         display,
         range(motion.count),
         placement=where,
-        progress=told,
+        progress=report,
         fixed_noise=fixed_noise,
         **options,
     )
@@ -389,8 +389,8 @@ def plan(
     """
     from lippmann.rendering.forecast import forecast
 
-    with shown(progress) as told:
-        return forecast(_scene(scene), _display(display), _request(placement, options), told)
+    with show_progress(progress) as report:
+        return forecast(_scene(scene), _display(display), _request(placement, options), report)
 
 
 @takes(SceneOptions, PlacementOptions, LightOptions, QualityOptions, MachineOptions, integrator="path")

@@ -74,8 +74,8 @@ def bar() -> Iterator[ProgressCallback]:
         TimeRemainingColumn(compact=True),
         TextColumn("{task.fields[remark]}"),
     )
-    with RichProgress(*columns, console=Console(stderr=True), transient=True) as shown:
-        task = shown.add_task("starting", total=1.0, remark="")
+    with RichProgress(*columns, console=Console(stderr=True), transient=True) as progress_bar:
+        task = progress_bar.add_task("starting", total=1.0, remark="")
         overall = Overall()
         began = time.perf_counter()
 
@@ -84,7 +84,7 @@ def bar() -> Iterator[ProgressCallback]:
             if not remark and progress.stage == "trace" and progress.done:
                 remark = f"{progress.done / max(time.perf_counter() - began, 1e-9) / 1e6:.1f} M samples/s"
             name = STAGE_NAMES.get(progress.stage, progress.stage)
-            shown.update(task, completed=overall(progress), description=name, remark=remark[:_REMARK])
+            progress_bar.update(task, completed=overall(progress), description=name, remark=remark[:_REMARK])
 
         yield report
 
@@ -107,7 +107,7 @@ class PlainProgress:
 
 
 @contextmanager
-def shown(progress: ProgressCallback | None) -> Iterator[ProgressCallback]:
+def show_progress(progress: ProgressCallback | None) -> Iterator[ProgressCallback]:
     """The callback that was given; without one a bar in terminals and notebooks, and nothing elsewhere."""
     if progress is not None:
         yield progress

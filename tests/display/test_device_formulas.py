@@ -36,7 +36,7 @@ def assert_same_on_device(display, device, seed):
         lens = display.lens_of(x, y, *ops)
         ray = display.light_ray(x, y, *ops)
         projected = display.project(number(point[0]), number(point[1]), number(z), *lens, *ops)
-        seen = display.panel_point_seen_by(number(point[0]), number(point[1]), number(300 - z), x, y, *ops)
+        seen = display.visible_panel_point(number(point[0]), number(point[1]), number(300 - z), x, y, *ops)
         return [
             *lens,
             *(x, y, *ray[0], *ray[1], *projected, *seen),

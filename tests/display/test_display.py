@@ -377,15 +377,15 @@ def test_an_eye_on_a_ray_sees_its_panel_point(displays, data):
     cx, cy = display.lens_center(i, j, x, y)
     t = (display.aperture_distance + 40 - oz) / dz
     eye = ox + t * dx, oy + t * dy, oz + t * dz
-    np.testing.assert_allclose(display.panel_point_seen_by(*eye, cx, cy), (x, y), atol=1e-8)
+    np.testing.assert_allclose(display.visible_panel_point(*eye, cx, cy), (x, y), atol=1e-8)
     # Elsewhere on the same lens it sees the same point; along a cylindrical lens the line of sight runs straight on.
     angle = math.radians(display.lens_array.slant)
     shift = 0.2 * display.lens_array.pitch
     lx, ly = cx + shift * math.cos(angle), cy - shift * math.sin(angle)
-    np.testing.assert_allclose(display.panel_point_seen_by(*eye, lx, ly), (x, y), atol=1e-8)
+    np.testing.assert_allclose(display.visible_panel_point(*eye, lx, ly), (x, y), atol=1e-8)
     if display.lens_array.layout == "lenticular":
         lx, ly = cx + 0.7 * math.sin(angle), cy + 0.7 * math.cos(angle)
-        seen = display.panel_point_seen_by(*eye, lx, ly)
+        seen = display.visible_panel_point(*eye, lx, ly)
         straight = 0.7 * (1 + display.gap / eye[2])
         np.testing.assert_allclose(along(display, seen[0] - x, seen[1] - y), straight, atol=1e-8)
         np.testing.assert_allclose(across(display, seen[0] - x, seen[1] - y), 0, atol=1e-8)

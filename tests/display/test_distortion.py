@@ -47,14 +47,14 @@ def test_a_ray_meets_the_point_that_an_eye_on_it_sees(name):
     eye = ox - t * dx, oy - t * dy, oz - t * dz
     at_lens = ox - oz / dz * dx, oy - oz / dz * dy
     if name in ("square", "hexagonal"):  # a cylinder's ray does not converge along it
-        np.testing.assert_allclose(bent.panel_point_seen_by(*eye, *at_lens), (x, y), atol=4e-3)
+        np.testing.assert_allclose(bent.visible_panel_point(*eye, *at_lens), (x, y), atol=4e-3)
 
 
 @pytest.mark.parametrize("name", ["upright", "slanted"])
 def test_an_eye_sees_the_place_of_its_direction_across_cylinders(name):
     bent, straight = display(name), display(name, None)
     eye, (x, y) = (70.0, -20.0, 280.0), places()
-    seen, before = (d.panel_point_seen_by(*eye, x, y) for d in (bent, straight))
+    seen, before = (d.visible_panel_point(*eye, x, y) for d in (bent, straight))
     axis = bent.lattice.center(*bent.lattice.lens_at(x, y, NUMPY), x, y, NUMPY)
     across = bent.lattice.across(seen[0] - axis[0], seen[1] - axis[1])
     pinhole = bent.lattice.across(before[0] - axis[0], before[1] - axis[1])
@@ -69,7 +69,7 @@ def test_the_eye_of_a_view_sees_its_place(name):
     down = 0.0 if name in ("upright", "slanted") else -1.5
     eye = eye_of_offset(bent, 3.0, down)
     center = bent.lattice.center(*bent.lattice.lens_at(0.0, 0.0, NUMPY), 0.0, 0.0, NUMPY)
-    x, y = bent.panel_point_seen_by(eye[0] + center[0], eye[1] + center[1], eye[2], *center)
+    x, y = bent.visible_panel_point(eye[0] + center[0], eye[1] + center[1], eye[2], *center)
     if name == "slanted":
         assert bent.lattice.across(x - center[0], y - center[1]) == pytest.approx(
             bent.lattice.across(0.3, 0.0), abs=4e-3

@@ -80,12 +80,12 @@ def test_points_keep_their_height(display):
 
 def test_an_eye_far_ahead_sees_the_middle_of_every_micro_image(display):
     centers = (np.arange(64) - 31.5) * 8 * D
-    x, y = display.panel_point_seen_by(0.0, 0.0, 1e9, centers, np.zeros(64))
+    x, y = display.visible_panel_point(0.0, 0.0, 1e9, centers, np.zeros(64))
     np.testing.assert_allclose(x, centers, atol=1e-5)
     np.testing.assert_allclose(y, 0, atol=1e-5)
 
 
 def test_an_eye_to_the_right_sees_pixels_to_the_left(display):
     """From (30, 0, 300): lens 32, centred at 4 d, shows what lies 6.8 (30 - 4 d) / 300 to the left of it."""
-    x, _ = display.panel_point_seen_by(30.0, 0.0, 300.0, 0.5, 0.0)
+    x, _ = display.visible_panel_point(30.0, 0.0, 300.0, 0.5, 0.0)
     assert x == pytest.approx(4 * D - 6.8 * (30 - 4 * D) / 300)

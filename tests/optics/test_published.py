@@ -235,7 +235,7 @@ def test_viewing_zones_are_where_every_lens_shows_its_own_views(diagonal, views,
     lens = 0.5 * display.lens_array.pitch  # the screen reaches half a lens beyond the last centre
 
     def sees_one_set(x, z):
-        place, _ = display.panel_point_seen_by(
+        place, _ = display.visible_panel_point(
             np.full_like(centers, x), centers * 0, centers * 0 + z, centers, centers * 0
         )
         i, _ = display.lens_of(place, place * 0)

@@ -78,7 +78,7 @@ def truth(display, eye, rows):
     lines = []
     for step in (np.arange(12) + 0.5) / 12 - 0.5:
         x, y = display.panel_point(*np.meshgrid(u, v))
-        place = display.panel_point_seen_by(eye, 20.0, 600.0, x, y, NUMPY)
+        place = display.visible_panel_point(eye, 20.0, 600.0, x, y, NUMPY)
         # A row below lies under the same lens.
         down = -step * rows * display.panel.pixel_pitch
         right = down * np.tan(np.radians(display.lens_array.slant))

@@ -9,7 +9,7 @@ import pytest
 
 from lippmann.display import load_display
 from lippmann.display.lens_profile import LensProfile
-from lippmann.display.seen_pixels import EyeMap
+from lippmann.display.visible_pixels import EyeMap
 from lippmann.image import IntegralImage
 from lippmann.studio_app.real_lens import RealEyeMap
 from lippmann.viewing.optical_replay import replay_optics
@@ -46,7 +46,7 @@ def test_mixed_pixels_are_those_of_replay(name, subpixels):
     x, y, z = default_eye(display)
     size = 3 * display.panel.width, 3 * display.panel.height
     for eye in ((x, y, z), (-0.2 * z, 0.1 * z, 1.2 * z)):
-        found = RealEyeMap(display, size, subpixels=subpixels).seen_by(eye)
+        found = RealEyeMap(display, size, subpixels=subpixels).pixels_for_eye(eye)
         traced = picture[found.row, found.column]
         if subpixels:
             # A ray carries one colour of the three.
@@ -55,7 +55,7 @@ def test_mixed_pixels_are_those_of_replay(name, subpixels):
         # The page, too, knows fewer directions of round lenses.
         least = 40 if display.lens_array.layout == "lenticular" else 30
         assert psnr(found.arrange(traced), expected) > least
-        ideal = EyeMap(display, size, subpixels=False).seen_by(eye)
+        ideal = EyeMap(display, size, subpixels=False).pixels_for_eye(eye)
         # Ideal lenses show something else.
         assert (
             psnr(ideal.arrange(picture[ideal.row, ideal.column]), expected) < psnr(found.arrange(traced), expected) - 5
@@ -70,7 +70,7 @@ def test_mixed_pixels_are_those_of_replay(name, subpixels):
 @pytest.mark.slow
 def test_pictures_of_lenses_are_spread_over_theirs():
     display = DISPLAYS["print"]
-    found = RealEyeMap(display, (400, 250), subpixels=False).seen_by(default_eye(display))
+    found = RealEyeMap(display, (400, 250), subpixels=False).pixels_for_eye(default_eye(display))
     values = np.random.default_rng(5).random((len(found.row), 3), dtype=np.float32)
     lenses = found.arrange_lenses(values)
     assert lenses.shape[1] == display.lens_grid.columns
@@ -80,6 +80,6 @@ def test_pictures_of_lenses_are_spread_over_theirs():
 @pytest.mark.slow
 def test_an_eye_that_gets_no_light_sees_black():
     display = DISPLAYS["print"]
-    found = RealEyeMap(display, (40, 25), subpixels=True).seen_by((9000.0, 0.0, 300.0))
+    found = RealEyeMap(display, (40, 25), subpixels=True).pixels_for_eye((9000.0, 0.0, 300.0))
     assert len(found.row) >= 2
     assert found.arrange(np.ones((len(found.row), 3), np.float32)).max() <= 1

@@ -11,7 +11,7 @@ from stand_in import TINY, StandIn
 
 from lippmann.errors import SceneError
 from lippmann.studio_app import render_thread
-from lippmann.studio_app.render_thread import RenderThread, Wanted, Watcher, _next_row_step, _next_share
+from lippmann.studio_app.render_thread import RenderThread, ViewRequest, Watcher, _next_row_step, _next_share
 from lippmann.studio_app.state import StudioState
 
 STATE = StudioState(display=TINY)
@@ -33,7 +33,7 @@ class Record:
 
 
 def wanted(number, scene="teapot", load=lambda: "scene", display=DISPLAY, eye=(0.0, 0.0, 300.0)):
-    return Wanted(number, scene, load, display, STATE.view(eye, (40, 30)))
+    return ViewRequest(number, scene, load, display, STATE.view(eye, (40, 30)))
 
 
 @pytest.fixture
@@ -184,11 +184,11 @@ def moving(thread, view, most=200):
     def take(shown):
         seen.append(shown)
         if len(seen) < most:
-            thread.want(watcher, Wanted(len(seen) + 1, "teapot", lambda: "scene", DISPLAY, view))
+            thread.want(watcher, ViewRequest(len(seen) + 1, "teapot", lambda: "scene", DISPLAY, view))
 
     watcher = Watcher(take, lambda error: pytest.fail(str(error)))
     thread.add(watcher)
-    thread.want(watcher, Wanted(1, "teapot", lambda: "scene", DISPLAY, view))
+    thread.want(watcher, ViewRequest(1, "teapot", lambda: "scene", DISPLAY, view))
     return seen
 
 
@@ -232,7 +232,7 @@ def test_a_coarse_panel_is_made_whole_at_rest_even_beside_a_render(start):
 
     thread, record = start(Rows)
     thread.gather(False)
-    thread.want(record.watcher, Wanted(1, "teapot", lambda: "scene", DISPLAY, STATE.native_view()))
+    thread.want(record.watcher, ViewRequest(1, "teapot", lambda: "scene", DISPLAY, STATE.native_view()))
     record.wait_for(lambda r: len(r.frames) == 2)
     time.sleep(0.1)
     assert steps == [render_thread.MOST_ROW_STEP, 1]

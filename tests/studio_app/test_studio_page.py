@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from stand_in import TINY
 
-from lippmann.display.seen_pixels import EyeMap
+from lippmann.display.visible_pixels import EyeMap
 from lippmann.studio_app.real_lens import RealEyeMap
 from lippmann.studio_app.render_jobs import Job
 from lippmann.studio_app.state import StudioState

@@ -238,7 +238,7 @@ def test_magnifier_shows_raw_pixels_and_frames_the_one_seen(open_tab, page):
             assert is_seen or np.abs(got - 0.72 * code).max() <= 1
             framed += is_seen
             i, j = display.lens_of(*display.panel_point(48 + right + 0.5, 40 + below + 0.5))
-            seen_x, seen_y = display.panel_point_seen_by(3.0, 4.0, 120.0, *display.lattice.center(i, j, 0.0, 0.0, None))
+            seen_x, seen_y = display.visible_panel_point(3.0, 4.0, 120.0, *display.lattice.center(i, j, 0.0, 0.0, None))
             u, v = display.pixel_coordinates(seen_x, seen_y)
             assert is_seen == (np.floor(u) == 48 + right and np.floor(v) == 40 + below)
     assert framed >= 1

@@ -61,7 +61,7 @@ def seen_part(image, eye, frame, shape):
     u = (frame["x"] + (np.arange(width) + 0.5) / width * frame["width"]) * panel.width
     v = (frame["y"] + (np.arange(height) + 0.5) / height * frame["height"]) * panel.height
     x, y = display.panel_point(*np.meshgrid(u, v))
-    u, v = display.pixel_coordinates(*display.panel_point_seen_by(*eye, x, y, NUMPY))
+    u, v = display.pixel_coordinates(*display.visible_panel_point(*eye, x, y, NUMPY))
     column, row = np.floor(u + 1e-6).astype(int), np.floor(v + 1e-6).astype(int)
     inside = (column >= 0) & (column < panel.width) & (row >= 0) & (row < panel.height)
     values = image.pixels[row.clip(0, panel.height - 1), column.clip(0, panel.width - 1)]

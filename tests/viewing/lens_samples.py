@@ -45,7 +45,7 @@ def replay_at_lens_centers(image, eye):
     eye = checked_eye(eye)
     display = image.display
     x, y, i, j = _lens_points(display, eye)
-    panel_x, panel_y = display.panel_point_seen_by(*eye, x, y, NUMPY)
+    panel_x, panel_y = display.visible_panel_point(*eye, x, y, NUMPY)
     u, v = display.pixel_coordinates(panel_x, panel_y)
     column, row = pixel_at(u), pixel_at(v)
     owner_i, owner_j = display.lens_of(*display.panel_point(column + 0.5, row + 0.5), NUMPY)

@@ -19,10 +19,10 @@ from lippmann.scene.readers.depth_map import read_depth_map
 from lippmann.scene.readers.depth_photo import read_depth_photo
 from lippmann.viewing.color_and_depth import (
     depth_codes,
-    distance_seen,
     named,
     range_of,
     rgbd_codes,
+    visible_distance,
     write_depth,
     write_rgbd,
 )
@@ -50,7 +50,7 @@ def test_codes_are_linear_in_inverse_depth():
 
 
 def test_distance_is_from_the_eye_and_infinite_where_nothing_is_hit(slope):
-    distance = distance_seen(slope, EYE, (64, 64))
+    distance = visible_distance(slope, EYE, (64, 64))
     assert np.isinf(distance[:10]).all()
     middle = distance[40]
     assert middle[32] == pytest.approx(605.0, abs=1.5)
@@ -86,7 +86,7 @@ def test_pictures_are_read_back_within_a_code(tmp_path, monkeypatch, slope, bits
         assert len(depth_photo.read_depth_photo(path).meshes) >= 1
         shares = seen[0] * (1.0 if bits == 8 else 65535.0)
         shares = shares if form.white == "near" else shares + 2**bits - 1
-        distance = distance_seen(slope, EYE, (64, 64))
+        distance = visible_distance(slope, EYE, (64, 64))
         expected = depth_codes(distance, *range_of(distance), bits, "near")
         expected = np.repeat(expected[:, ::2], 2, axis=1) if form.half else expected
         assert np.abs(shares - expected).max() <= 1.0
@@ -94,7 +94,7 @@ def test_pictures_are_read_back_within_a_code(tmp_path, monkeypatch, slope, bits
 
 @pytest.mark.parametrize("kind", [".exr", ".tif", ".pfm", ".png"])
 def test_depth_maps_are_read_back(tmp_path, slope, kind):
-    distance = distance_seen(slope, EYE, (64, 48))
+    distance = visible_distance(slope, EYE, (64, 48))
     path = tmp_path / f"photo_depth{kind}"
     write_depth(distance, path)
     if kind == ".exr":
@@ -115,7 +115,7 @@ def test_depth_maps_are_read_back(tmp_path, slope, kind):
 
 def test_what_cannot_be(tmp_path, slope):
     with pytest.raises(UsageError, match="the picture has no depth; that is one of its layers"):
-        distance_seen(slope.with_pixels(slope.pixels, maps={}))
+        visible_distance(slope.with_pixels(slope.pixels, maps={}))
     with pytest.raises(OutputError, match="the name says another form; this one's ends in _rgbd-far"):
         named(tmp_path / "a_rgbd.png", RgbdForm(white="far"))
     Image.fromarray(np.zeros((8, 9, 3), np.uint8)).save(tmp_path / "odd_rgbd.png")

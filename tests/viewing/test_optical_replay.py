@@ -89,7 +89,7 @@ def brute_force(image, eye, u, v, fine=24):
     columns = (np.arange(panel.width * fine) + 0.5) / fine
     rows = (np.arange(panel.height * fine) + 0.5) / fine
     if lens.is_cylinder:
-        _, seen = display.pixel_coordinates(*display.panel_point_seen_by(*eye, x, y, NUMPY))
+        _, seen = display.pixel_coordinates(*display.visible_panel_point(*eye, x, y, NUMPY))
         pixel_rows = np.floor(rows)  # a row counts as a whole, by how much of it a pixel of the picture covers
         covered = np.clip(np.minimum(pixel_rows + 1, seen + 0.5) - np.maximum(pixel_rows, seen - 0.5), 0.0, 1.0)
         rows, covered = rows[covered > 0.0], covered[covered > 0.0] / fine

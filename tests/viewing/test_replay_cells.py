@@ -25,7 +25,7 @@ def test_the_nearest_subpixel_is_seen(cells):
     seen = replay(IntegralImage(values, display), (10, 5, 280), size=(33, 21), subpixels=True)
     column, row = np.meshgrid(np.arange(40), np.arange(24))
     for rows, x, y in lens_plane_points(display, 33, 21):
-        panel_x, panel_y = display.panel_point_seen_by(10, 5, 280, x, y, NUMPY)
+        panel_x, panel_y = display.visible_panel_point(10, 5, 280, x, y, NUMPY)
         for c in range(3):
             centers = display.subpixel_point(column + 0.5, row + 0.5, c, NUMPY)
             distance = np.hypot(panel_x[..., None, None] - centers[0], panel_y[..., None, None] - centers[1])

@@ -39,16 +39,16 @@ def read_pfm(path: Path) -> NDArray[np.float32]:
         raise PictureError("not found", where=str(path)) from None
     except OSError as error:
         raise PictureError(f"cannot be read: {error.strerror}", where=str(path)) from error
-    found = _HEADER.match(content)
-    if found is None:
+    header = _HEADER.match(content)
+    if header is None:
         raise PictureError("is no PFM", where=str(path), rule="it begins with Pf, width and height, and a scale")
-    if found[1] == b"PF":
+    if header[1] == b"PF":
         raise PictureError("is a PFM in colour", where=str(path), rule="a depth or disparity has one channel")
-    width, height, scale = int(found[2]), int(found[3]), float(found[4])
-    body = len(content) - found.end()
+    width, height, scale = int(header[2]), int(header[3]), float(header[4])
+    body = len(content) - header.end()
     if body != 4 * width * height:
         kind = "is cut short" if body < 4 * width * height else "is too long"
         rule = f"{width} x {height} values take {4 * width * height} bytes"
         raise PictureError(f"{kind}: {body} bytes follow its header", where=str(path), rule=rule)
-    values = np.frombuffer(content, dtype="<f4" if scale < 0 else ">f4", offset=found.end())
+    values = np.frombuffer(content, dtype="<f4" if scale < 0 else ">f4", offset=header.end())
     return np.ascontiguousarray(values.reshape(height, width)[::-1], dtype=np.float32)

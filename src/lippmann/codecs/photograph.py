@@ -144,9 +144,9 @@ def _other_profile(picture: Image.Image, file: BinaryIO, path: Path) -> bytes:
     """The profile of a picture without an ICC profile: of AVIF by its code points, of others by EXIF."""
     if picture.format != "AVIF":
         return _exif_profile(picture)
-    told = code_points(file)
+    cicp = code_points(file)
     try:
-        return b"" if told is None else profile_of_cicp(*told)
+        return b"" if cicp is None else profile_of_cicp(*cicp)
     except PictureError as error:
         raise PictureError(error.what, where=str(path), rule=error.rule, fix=error.fix) from None
 

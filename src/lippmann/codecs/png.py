@@ -125,7 +125,7 @@ def png_header(file: BinaryIO, path: Path) -> PngHeader:
     """:func:`read_png_header` of a file that is open, at its beginning; ``path`` is its name, for errors."""
     header: tuple[int, int, int, int] | None = None
     text: dict[str, str] = {}
-    found: dict[bytes, bytes] = {}
+    bodies: dict[bytes, bytes] = {}
     for kind, body in chunks(file, path):
         if kind == b"IHDR" and len(body) == 13:
             width, height, bits, color_type = struct.unpack(">IIBB", body[:10])
@@ -133,14 +133,14 @@ def png_header(file: BinaryIO, path: Path) -> PngHeader:
         elif kind == b"iTXt":
             text.update(_international_text(body, path))
         else:
-            found.setdefault(kind, body)
+            bodies.setdefault(kind, body)
     if header is None or not header[0] or not header[1] or not header[3]:
         raise _damaged(path, "it has no proper header")
     width, height, bits, channels = header
-    orientation = orientations.of_exif(found[b"eXIf"]) if b"eXIf" in found else 1
+    orientation = orientations.of_exif(bodies[b"eXIf"]) if b"eXIf" in bodies else 1
     if orientations.lies(orientation):
         width, height = height, width
-    return PngHeader(width, height, bits, channels, text, _profile(found, path), orientation, _notes(found))
+    return PngHeader(width, height, bits, channels, text, _profile(bodies, path), orientation, _notes(bodies))
 
 
 def read_png(path: Path) -> Pixels:
@@ -221,15 +221,15 @@ def _international_text(body: bytes, path: Path) -> dict[str, str]:
         raise _damaged(path, f"one of its texts cannot be read ({error})") from error
 
 
-def _notes(found: Mapping[bytes, bytes]) -> tuple[str, ...]:
-    density, animation = found.get(b"pHYs", b""), found.get(b"acTL", b"")
+def _notes(bodies: Mapping[bytes, bytes]) -> tuple[str, ...]:
+    density, animation = bodies.get(b"pHYs", b""), bodies.get(b"acTL", b"")
     notes = aspect_note(*struct.unpack(">II", density[:8])) if len(density) == 9 else ()
     return notes + (pictures_note(int.from_bytes(animation[:4], "big")) if len(animation) == 8 else ())
 
 
-def _profile(found: Mapping[bytes, bytes], path: Path) -> bytes:
+def _profile(bodies: Mapping[bytes, bytes], path: Path) -> bytes:
     """ICC profile of the codes by the chunk that comes first (PNG, third edition, 4.3); empty: sRGB."""
-    code_points = found.get(b"cICP", b"")
+    code_points = bodies.get(b"cICP", b"")
     if len(code_points) == 4:
         if not code_points[3]:
             rule = "codes over their full range are read"
@@ -240,16 +240,16 @@ def _profile(found: Mapping[bytes, bytes], path: Path) -> bytes:
             return profile_of_cicp(code_points[0], code_points[1])
         except PictureError as error:
             raise PictureError(error.what, where=str(path), rule=error.rule, fix=error.fix) from None
-    if b"iCCP" in found:
-        _, _, packed = found[b"iCCP"].partition(b"\0")
+    if b"iCCP" in bodies:
+        _, _, packed = bodies[b"iCCP"].partition(b"\0")
         try:
             return zlib.decompressobj().decompress(packed[1:], _LONGEST_TEXT)  # after the byte of the method, deflate
         except zlib.error as error:
             raise _damaged(path, f"its ICC profile cannot be read ({error})") from error
-    if b"sRGB" in found:
+    if b"sRGB" in bodies:
         return b""
-    gamma = int.from_bytes(found.get(b"gAMA", b""), "big") / _FRACTION
-    places = found.get(b"cHRM", b"")
+    gamma = int.from_bytes(bodies.get(b"gAMA", b""), "big") / _FRACTION
+    places = bodies.get(b"cHRM", b"")
     white_first = [number / _FRACTION for number in struct.unpack(">8I", places)] if len(places) == 32 else []
     return rgb_profile([*white_first[2:], *white_first[:2]] or REC709, _curve(gamma))
 

@@ -221,7 +221,7 @@ class TiffPicture:
             separate = page.planarconfig == 2 and page.samplesperpixel > 1
             self.dtype: str = stored_type(page)
             self.bits = int(page.bitspersample) * int(page.samplesperpixel)
-            stored_as_shown = is_stored_so(page)
+            has_plain_tiles = is_stored_so(page)
             profile = page.iccprofile or _described_profile(tags)
         if separate and len(shape) == 3:
             shape = (*shape[1:], shape[0])
@@ -236,7 +236,7 @@ class TiffPicture:
         self.height, self.width, self.channels = sizes
         if orientations.lies(self.orientation):
             self.height, self.width = self.width, self.height
-        self.in_pieces = stored_as_shown and self.orientation <= 1
+        self.in_pieces = has_plain_tiles and self.orientation <= 1
         self.description = text if isinstance(text, str) else ""
         self.icc = profile if isinstance(profile, bytes) else b""
 

@@ -129,8 +129,8 @@ class ZarrPicture:
         self._folder, self._array = folder, open_array(zarr, folder, metadata)
         self.height, self.width = metadata.shape[:2]
         self.dtype: str = self._array.dtype.name
-        found = attributes.get(TEXT_KEY)
-        self.text = "" if found is None else json.dumps(found)
+        attribute = attributes.get(TEXT_KEY)
+        self.text = "" if attribute is None else json.dumps(attribute)
         high, wide = (int(length) for length in self._array.chunks[:2])
         self.chunk = high, wide
 

@@ -224,11 +224,11 @@ class _Check:
 
     def lengths(self, name: str, value: object, *, least: int, axes: int | None = None) -> tuple[int, ...]:
         """Whole numbers, one for each axis."""
-        found = self.list_of(name, value)
-        whole = all(type(length) is int and least <= length < _MOST_LENGTH for length in found)
-        if not found or not whole or (axes is not None and len(found) != axes):
+        lengths = self.list_of(name, value)
+        whole = all(type(length) is int and least <= length < _MOST_LENGTH for length in lengths)
+        if not lengths or not whole or (axes is not None and len(lengths) != axes):
             raise self.damaged(name, value)
-        return tuple(found)
+        return tuple(lengths)
 
     def choice(self, name: str, value: object, known: Sequence[str]) -> str:
         """A text out of a few."""

@@ -195,9 +195,9 @@ class _Files(MutableMapping[str, Any]):
         # Unpacked, and again while the library brings it into its own order.
         check_input(2 * self._most, f"its chunk {key}", where=str(self._folder))
         _check_expansion(self._packing, data, self._most, self._folder, key)
-        found = self._wrapped(data)
-        self._last = key, found
-        return found
+        chunk = self._wrapped(data)
+        self._last = key, chunk
+        return chunk
 
     def __contains__(self, key: object) -> bool:
         if not isinstance(key, str):

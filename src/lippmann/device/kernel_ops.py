@@ -99,27 +99,27 @@ def arrays_of(whole: object) -> list[object]:
 
     Parts are items of collections, fields of dataclasses and attributes of this project's objects.
     """
-    found: list[object] = []
-    _collect(whole, found, set(), 0)
-    return found
+    arrays: list[object] = []
+    _collect(whole, arrays, set(), 0)
+    return arrays
 
 
-def _collect(value: object, found: list[object], seen: set[int], depth: int) -> None:
-    if id(value) in seen or depth > _DEEPEST:
+def _collect(value: object, arrays: list[object], visited: set[int], depth: int) -> None:
+    if id(value) in visited or depth > _DEEPEST:
         return
-    seen.add(id(value))
+    visited.add(id(value))
     if isinstance(value, mi.Object) or type(value).__module__.split(".")[0] in ("drjit", "mitsuba"):
         # Arrays without entries have no variable behind them.
         if not dr.is_array_v(value) or dr.width(value) > 0:
-            found.append(value)
+            arrays.append(value)
     elif isinstance(value, dict):
         for item in value.values():
-            _collect(item, found, seen, depth + 1)
+            _collect(item, arrays, visited, depth + 1)
     elif isinstance(value, (list, tuple, set, frozenset)):
         for item in value:
-            _collect(item, found, seen, depth + 1)
+            _collect(item, arrays, visited, depth + 1)
     elif hasattr(value, "__dict__") and (is_dataclass(value) or type(value).__module__.startswith("lippmann.")):
-        _collect(vars(value), found, seen, depth + 1)
+        _collect(vars(value), arrays, visited, depth + 1)
 
 
 class DeviceOps:

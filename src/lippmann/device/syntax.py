@@ -64,7 +64,7 @@ def _transform(kernel: FunctionType) -> Callable[..., Any]:
 
 def _read(path: Path, key: str) -> CodeType | None:
     try:
-        found, code = marshal.loads(path.read_bytes())
+        stored_key, code = marshal.loads(path.read_bytes())
     except (OSError, ValueError, EOFError, TypeError):  # not there, or damaged
         return None
-    return code if found == key and isinstance(code, CodeType) else None
+    return code if stored_key == key and isinstance(code, CodeType) else None

@@ -371,7 +371,7 @@ class Display:
         along = lattice.along(px, py) * self.magnification / _nonzero(1.0 - pz * self._convergence, ops)
         return lattice.from_axes(across, along)
 
-    def panel_point_seen_by(
+    def visible_panel_point(
         self, ex: Array, ey: Array, ez: Array, lx: Array, ly: Array, ops: ArrayOps = NUMPY
     ) -> tuple[Array, Array]:
         """The panel point that an eye at E (``ez`` > 0) sees when it looks at the point ``(lx, ly)`` of the lens plane.

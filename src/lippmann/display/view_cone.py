@@ -63,7 +63,7 @@ def zone_slopes(display: Display) -> tuple[float, float]:
     return (cone_tangent(display) if display.lens_array.layout == "lenticular" else across), along
 
 
-def size_seen(display: Display) -> tuple[float, float]:
+def visible_size(display: Display) -> tuple[float, float]:
     """Width and height in mm of the part of the lens plane whose micro-images lie on the panel."""
     width, height = display.size_mm
     return width / display.magnification, height / display.magnification

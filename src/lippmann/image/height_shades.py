@@ -12,7 +12,7 @@ _COLUMN, _BAR, _LABELS = 96, 24, 6
 
 
 def height_shades(
-    heights: NDArray[np.floating], seen: NDArray[np.bool_]
+    heights: NDArray[np.floating], visible: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float32], tuple[float, float]]:
     """Display codes of heights, and the heights of the darkest shade and of white.
 
@@ -20,7 +20,7 @@ def height_shades(
     ----------
     heights:
         In mm over the lens plane, of any shape.
-    seen:
+    visible:
         Where a surface is seen, of the same shape; heights are finite there.
 
     Returns
@@ -30,12 +30,12 @@ def height_shades(
         highest height in mm, 0 and 0 where nothing is seen at all.
     """
     shades = np.zeros(heights.shape, np.float32)
-    if not seen.any():
+    if not visible.any():
         return shades, (0.0, 0.0)
-    found = heights[seen]
-    low, high = float(found.min()), float(found.max())
-    share = (found - low) / (high - low) if high > low else np.ones_like(found)
-    shades[seen] = DARKEST + (1.0 - DARKEST) * share
+    visible_heights = heights[visible]
+    low, high = float(visible_heights.min()), float(visible_heights.max())
+    share = (visible_heights - low) / (high - low) if high > low else np.ones_like(visible_heights)
+    shades[visible] = DARKEST + (1.0 - DARKEST) * share
     return shades, (low, high)
 
 

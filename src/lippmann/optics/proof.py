@@ -11,7 +11,7 @@ import numpy as np
 from lippmann.display.display import INFINITE, Display
 from lippmann.display.pixel_aperture import PixelAperture
 from lippmann.display.validation import INCH
-from lippmann.display.view_cone import size_seen
+from lippmann.display.view_cone import visible_size
 from lippmann.json_values import JsonObject, JsonValue
 from lippmann.optics.crosstalk import ANNOYING, VISIBLE, crosstalk, independent_directions, most_strips
 from lippmann.optics.directions import true_directions
@@ -220,7 +220,7 @@ def zone_of(display: Display) -> ViewingZone:
     """The viewing zone of an eye that moves level, by the true directions of the lens."""
     # The cone of slanted lenses is wider.
     level = edge_slope(display) / math.cos(math.radians(display.lens_array.slant))
-    return ViewingZone(size_seen(display)[0], display.viewing_distance, level)
+    return ViewingZone(visible_size(display)[0], display.viewing_distance, level)
 
 
 def _extreme(display: Display) -> float | None:
@@ -235,7 +235,7 @@ def _thicker(display: Display) -> ThickerSheet:
     gap = gap_of(profile, display.lens_array)
     thicker = replace(display, lens=profile, gap=gap)
     # At the edge of the picture micro-images would have to lie farther out.
-    shift = 0.5 * size_seen(display)[0] * (gap - display.gap) / display.viewing_distance
+    shift = 0.5 * visible_size(display)[0] * (gap - display.gap) / display.viewing_distance
     return ThickerSheet(
         gap=gap,
         field=math.degrees(2.0 * math.atan(edge_slope(thicker))),

@@ -79,7 +79,7 @@ class Option:
     @property
     def help_in_flags(self) -> str:
         """The help with other options as the command line names them."""
-        return _OPTION.sub(lambda found: flag_of(found[1]), self.help)
+        return _OPTION.sub(lambda match: flag_of(match[1]), self.help)
 
     def flag_of(self, name: str) -> str:
         """The option of the command line that sets the field ``name``."""
@@ -139,7 +139,7 @@ def option(default: Any, help: str, **facts: Any) -> Any:
 
 def again(kind: type, name: str, **changes: Any) -> Any:
     """A field of ``kind`` for a subclass that has it with another type or default."""
-    each, its = next(found for found in options_of(kind) if found[0].name == name)
+    each, its = next(entry for entry in options_of(kind) if entry[0].name == name)
     return field(default=changes.get("default", each.default), metadata={_KEY: its})
 
 

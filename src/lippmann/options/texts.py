@@ -102,10 +102,10 @@ def _from_plain(kind: Any, value: object) -> object:
         return dict(value)
     elif origin is not None:
         rule = "a table of texts"
-    raise UsageError(_shown(value), rule=rule)
+    raise UsageError(_shorten(value), rule=rule)
 
 
-def _shown(value: object) -> str:
+def _shorten(value: object) -> str:
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 

@@ -114,7 +114,7 @@ def write_interlaced(
         raise UsageError("is for upright lenses", parameter="correct", fix='use lenses="along"')
     whole = replace(display, sheet=None)  # no part of which is cut off: the photographs cover it
     weaving = Weaving(photos.quilt, whole, choice, correct)
-    options, notes = weaving.told()
+    options, notes = weaving.describe_correction()
     finished = replace(finish, profile=Profile(name_of(photos.icc), photos.icc) if photos.icc else None).display(
         display
     )

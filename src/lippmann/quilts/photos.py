@@ -206,7 +206,7 @@ class FitWindow(NamedTuple):
     """
 
     box: tuple[float, float, float, float]
-    shown: tuple[float, float, float, float]
+    visible: tuple[float, float, float, float]
     cropped: tuple[float, float]
 
 
@@ -229,13 +229,13 @@ def fit_window(
     x, y = width / 2 + step * (steps / 2 - number), height / 2
     half = paper[0] * scales[0] / 2, paper[1] * scales[1] / 2
     box = x - half[0], y - half[1], x + half[0], y + half[1]
-    shown = (
+    visible = (
         max(box[0], x - common / 2, 0.0),
         max(box[1], 0.0),
         min(box[2], x + common / 2, float(width)),
         min(box[3], float(height)),
     )
-    return FitWindow(box, shown, (1 - (shown[2] - shown[0]) / width, 1 - (shown[3] - shown[1]) / height))
+    return FitWindow(box, visible, (1 - (visible[2] - visible[0]) / width, 1 - (visible[3] - visible[1]) / height))
 
 
 def _fitted(picture: Image.Image, window: FitWindow, size: tuple[int, int]) -> Image.Image:
@@ -244,9 +244,9 @@ def _fitted(picture: Image.Image, window: FitWindow, size: tuple[int, int]) -> I
 
     left, top, right, bottom = window.box
     scale = size[0] / (right - left), size[1] / (bottom - top)
-    edges = [round((edge - (left, top)[k % 2]) * scale[k % 2]) for k, edge in enumerate(window.shown)]
+    edges = [round((edge - (left, top)[k % 2]) * scale[k % 2]) for k, edge in enumerate(window.visible)]
     part = max(1, edges[2] - edges[0]), max(1, edges[3] - edges[1])
-    resized = picture.resize(part, Image.Resampling.LANCZOS, box=window.shown)
+    resized = picture.resize(part, Image.Resampling.LANCZOS, box=window.visible)
     if part == size:
         return resized
     view = Image.new("RGB", size, (_PAPER,) * 3)

@@ -89,7 +89,7 @@ def weave(
     """
     check_weave(quilt, display, choice)
     weaving = Weaving(quilt, display, choice, correct)
-    options, notes = weaving.told()
+    options, notes = weaving.describe_correction()
     width, height = display.panel.width, display.panel.height
     pixels = np.empty((height, width, 3), dtype=np.float32)
     step = _rows_at_a_time(quilt, display)
@@ -151,7 +151,7 @@ def weave_to_file(
     """
     check_weave(quilt, display, choice)
     weaving = Weaving(quilt, display, choice, correct)
-    options, notes = weaving.told()
+    options, notes = weaving.describe_correction()
     step = _rows_at_a_time(quilt, display)
 
     def rows(first: int, last: int) -> FloatArray:
@@ -187,7 +187,7 @@ class Weaving:
         start, stop = max(0, first - margin), min(self.display.panel.height, last + margin)
         return self._correction.rows(self._parts(start, stop), start)[first - start : last - start]
 
-    def told(self) -> tuple[dict[str, object], tuple[str, ...]]:
+    def describe_correction(self) -> tuple[dict[str, object], tuple[str, ...]]:
         """What a file says of the correction, and lines for people: of the rows about the middle."""
         if self._correction is None:
             return {}, ()

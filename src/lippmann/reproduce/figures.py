@@ -21,8 +21,8 @@ def missed_figures(results: Results) -> list[Markup]:
     )
     parts: list[Markup] = []
     for position, scene in enumerate(results.runs):
-        shown = _parts_of(results.of(scene, key))
-        parts.append(_gallery(*shown) if position == 0 else folded(scene, _gallery(*shown)))
+        panels = _parts_of(results.of(scene, key))
+        parts.append(_gallery(*panels) if position == 0 else folded(scene, _gallery(*panels)))
     return [paragraph(text), *parts]
 
 
@@ -33,10 +33,10 @@ def scene_figures(results: Results) -> list[Markup]:
         f"First of each pair what the panel shows, fully traced: {lenses} strips, one behind each lens. Then what an "
         "eye in the middle in front of the display sees through the lenses."
     )
-    shown = []
+    figures = []
     for scene in results.runs:
         image = results.full(scene).image
-        shown += [
+        figures += [
             _figure(diagnostic_maps.display_codes(image), f"{scene}: on the panel", f"integral image of the {scene}"),
             _figure(
                 diagnostic_maps.replayed_codes(image),
@@ -44,7 +44,7 @@ def scene_figures(results: Results) -> list[Markup]:
                 f"the {scene} as an eye sees it",
             ),
         ]
-    return [paragraph(text), _gallery(*shown)]
+    return [paragraph(text), _gallery(*figures)]
 
 
 def gloss_figures(results: Results) -> list[Markup]:
@@ -56,28 +56,28 @@ def gloss_figures(results: Results) -> list[Markup]:
         return before - after
 
     scene = max(results.runs, key=gain)
-    shown = []
+    figures = []
     for key, words in zip(keys, ("gloss not respected", "gloss respected"), strict=True):
-        found = tables.comparison(results.of(scene, key))
-        caption = f"{scene}, interpolated, {words}: {tables.decibels(found.psnr)} dB"
-        shown.append(_figure(diagnostic_maps.error_codes(found), caption, f"errors of the {scene}, {words}"))
+        quality = tables.comparison(results.of(scene, key))
+        caption = f"{scene}, interpolated, {words}: {tables.decibels(quality.psnr)} dB"
+        figures.append(_figure(diagnostic_maps.error_codes(quality), caption, f"errors of the {scene}, {words}"))
     text = (
         "Errors against full tracing, from none (black) to a root-mean-square difference of "
         f"{BRIGHTEST:g} of coded values and above (yellow), where respecting gloss changes most:"
     )
-    return [paragraph(text), _gallery(*shown)]
+    return [paragraph(text), _gallery(*figures)]
 
 
 def _parts_of(run: Run) -> list[Markup]:
     image, scene = run.image, run.scene
     traced = tables.percent(run.traced_share)
-    shown = (
+    pictures = (
         (diagnostic_maps.missed_codes(image), f"Missed pixels; {traced} traced", "where pixels came from"),
         (diagnostic_maps.reprojected_codes(image), "Reprojected pixels only", "reprojected pixels"),
         (diagnostic_maps.traced_codes(image), "Traced pixels only", "traced pixels"),
         (diagnostic_maps.display_codes(image), "The whole picture", "whole picture"),
     )
-    return [_figure(codes, words, f"{scene}: {alt}") for codes, words, alt in shown if codes is not None]
+    return [_figure(codes, words, f"{scene}: {alt}") for codes, words, alt in pictures if codes is not None]
 
 
 def _figure(codes: diagnostic_maps.Codes, caption: str, alt: str) -> Markup:

@@ -78,9 +78,9 @@ def _conditions(results: Results) -> str:
 def _facts(results: Results, manner: Manner) -> Markup:
     """What one wants to know first of interpolation in one manner."""
     runs = [results.of(scene, Variant("interpolated", manner).key) for scene in results.runs]
-    found = [tables.comparison(run) for run in runs]
-    least = min(one.paper.mean_psnr for one in found)
-    worst = min(one.worst.psnr for one in found)
+    qualities = [tables.comparison(run) for run in runs]
+    least = min(one.paper.mean_psnr for one in qualities)
+    worst = min(one.worst.psnr for one in qualities)
     entries = (
         ("of the pixels saved", _range([100 * (1 - run.traced_share) for run in runs], "%")),
         ("of the rays saved", _range([100 * (1 - run.ray_share) for run in runs], "%")),
@@ -107,14 +107,14 @@ def _promise(results: Results) -> list[Markup]:
     for variant in results.of_manner(Manner.PAPER):
         for scene in results.runs:
             run = results.of(scene, variant.key)
-            found = tables.comparison(run)
+            quality = tables.comparison(run)
             rows.append(
                 [
                     f"{scene}, {variant.method}",
                     tables.percent(1 - run.traced_share),
                     tables.percent(1 - run.ray_share),
-                    tables.decibels(found.paper.mean_psnr),
-                    tables.decibels(found.worst.psnr),
+                    tables.decibels(quality.paper.mean_psnr),
+                    tables.decibels(quality.worst.psnr),
                 ]
             )
     text = (
@@ -155,7 +155,7 @@ def _time(results: Results) -> list[Markup]:
         "looking after points takes longer than tracing them would: every pixel is projected, ordered and checked on "
         "the way, whatever a ray costs."
     )
-    shown = [
+    parts = [
         paragraph(text),
         element("h3", f"Cheap light: {_frame(results)}"),
         paragraph(cheap),
@@ -165,17 +165,17 @@ def _time(results: Results) -> list[Markup]:
     physical = results.physical
     if physical is not None:
         samples = physical.full(physical.experiment.scenes[0]).image.provenance.spp
-        dear = (
+        costly = (
             f"Paths of physically based light, {samples} samples per pixel, on a larger frame. A pixel now costs many "
             "rays, and looking after a point what it cost before."
         )
-        shown += [
+        parts += [
             element("h3", f"Physically based light: {_frame(physical)}"),
-            paragraph(dear),
+            paragraph(costly),
             _slowdowns(physical),
             *(tables.table_2(physical, manner) for manner in Manner),
         ]
-    return shown
+    return parts
 
 
 def _quality(results: Results, scene: str) -> list[Markup]:
@@ -223,7 +223,7 @@ def _ray_chart(results: Results) -> list[Markup]:
                 f"{scene}, {variant.title}: {tables.percent(run.ray_share)} of the rays, "
                 f"{tables.percent(run.time_share)} of the time"
             )
-            marks.append(charts.Mark(100 * run.ray_share, 100 * run.time_share, *_look(variant), said))
+            marks.append(charts.Mark(100 * run.ray_share, 100 * run.time_share, *_mark_style(variant), said))
     x = charts.Axis.around([*(mark.x for mark in marks), 100], "Rays, share of full tracing's", " %", low=0)
     y = charts.Axis.around([*(mark.y for mark in marks), 100], "Seconds, share of full tracing's", " %", low=0)
     text = (
@@ -231,10 +231,10 @@ def _ray_chart(results: Results) -> list[Markup]:
         "after points costs more than the rays they spare."
     )
     chart = charts.scatter(marks, x, y, title="Share of rays against share of time")
-    return [paragraph(text), chart, charts.key([(*_look(variant), variant.title) for variant in COMPARED])]
+    return [paragraph(text), chart, charts.key([(*_mark_style(variant), variant.title) for variant in COMPARED])]
 
 
-def _look(variant: Variant) -> tuple[str, str]:
+def _mark_style(variant: Variant) -> tuple[str, str]:
     """Shape and colour of a variant's marks."""
     assert variant.manner is not None
     return _SHAPES[variant.manner], _COLORS[variant.method]
@@ -245,8 +245,8 @@ def _gloss(results: Results) -> list[Markup]:
         "A mirror, glass or a highlight has another colour in every direction, so the colour that one lens saw is "
         "wrong for the next. The paper reuses it all the same; the mode that respects gloss traces such pixels anew."
     )
-    shown = (tables.gloss_table(results, method) for method in METHODS)
-    return [paragraph(text), *shown, *gloss_figures(results)]
+    quality_tables = (tables.gloss_table(results, method) for method in METHODS)
+    return [paragraph(text), *quality_tables, *gloss_figures(results)]
 
 
 def _method(results: Results) -> list[Markup]:

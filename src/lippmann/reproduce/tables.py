@@ -47,14 +47,14 @@ def table_2(results: Results, manner: Manner) -> Markup:
         spans.append(("the paper", 1))
     rows = []
     for scene in results.runs:
-        shown = [scene, seconds(results.full(scene).seconds)]
+        cells = [scene, seconds(results.full(scene).seconds)]
         for variant in variants:
             run = results.of(scene, variant.key)
-            shown += [seconds(run.seconds), in_words(run.time_share)]
-            shown += [percent(run.traced_share), percent(run.ray_share)]
+            cells += [seconds(run.seconds), in_words(run.time_share)]
+            cells += [percent(run.traced_share), percent(run.ray_share)]
         if manner is Manner.PAPER:
-            shown.append(_printed_saving(scene))
-        rows.append(shown)
+            cells.append(_printed_saving(scene))
+        rows.append(cells)
     note = ""
     if manner is Manner.PAPER and paper_values.TREE in results.runs:
         note = f". * The paper's own seconds come to {paper_values.TREE_COMPUTED_PERCENT} %"
@@ -83,11 +83,11 @@ def table_3(results: Results, scene: str) -> Markup:
     head = ("Method", *(str(lens) for lens in lenses), f"mean of {len(lenses)}", "mean of all")
     rows = []
     for variant in COMPARED:
-        found = comparison(results.of(scene, variant.key))
-        row = found.paper.psnr[0]
-        shown = [float(row[lens]) for lens in lenses]
-        mean = element("b", decibels(finite_mean(shown)))
-        rows.append([variant.title, *map(decibels, shown), mean, decibels(found.paper.mean_psnr)])
+        quality = comparison(results.of(scene, variant.key))
+        row = quality.paper.psnr[0]
+        cells = [float(row[lens]) for lens in lenses]
+        mean = element("b", decibels(finite_mean(cells)))
+        rows.append([variant.title, *map(decibels, cells), mean, decibels(quality.paper.mean_psnr)])
     if scene == paper_values.TEAPOT:
         blank = [NOTHING] * len(lenses)
         rows.append(["the paper prints", *blank, f"{paper_values.TEAPOT_PSNR:g}", NOTHING])
@@ -104,12 +104,12 @@ def quality_table(results: Results, manner: Manner) -> Markup:
     head = ["Scene", *("paper's mean", "PSNR", "1st percentile", "worst lens", "SSIM") * len(variants)]
     rows = []
     for scene in results.runs:
-        shown = [scene]
+        cells = [scene]
         for variant in variants:
-            found = comparison(results.of(scene, variant.key))
-            figures = (found.paper.mean_psnr, found.psnr, found.percentile_1.psnr, found.worst.psnr)
-            shown += [*map(decibels, figures), f"{found.views.mean:.4f}"]
-        rows.append(shown)
+            quality = comparison(results.of(scene, variant.key))
+            figures = (quality.paper.mean_psnr, quality.psnr, quality.percentile_1.psnr, quality.worst.psnr)
+            cells += [*map(decibels, figures), f"{quality.views.mean:.4f}"]
+        rows.append(cells)
     spans = [("", 1), *((variant.method, 5) for variant in variants)]
     return table(head, rows, caption=manner.value, spans=spans)
 

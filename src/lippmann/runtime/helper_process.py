@@ -93,8 +93,8 @@ class HelperProcess:
 
         message = {"path": str(path.resolve()), "memory": input_memory_left(), **request}
         answer = self.ask(json.dumps(message).encode(), where=path.name)
-        with np.load(io.BytesIO(answer), allow_pickle=False) as found:
-            return dict(found)
+        with np.load(io.BytesIO(answer), allow_pickle=False) as arrays:
+            return dict(arrays)
 
     def _answer(self, process: subprocess.Popen[bytes], request: bytes, where: str) -> bytes | None:
         """The answer; None from a process that ended."""
@@ -182,14 +182,14 @@ def serve_arrays(read: Callable[[dict[str, Any]], Mapping[str, NDArray[np.generi
         request = json.loads(data)
         limit_memory(request["memory"])
         try:
-            found = dict(read(request))
+            arrays = dict(read(request))
         except RefusedFileError as error:
             name, text = error.args
-            found = {name: np.array(text)}
+            arrays = {name: np.array(text)}
         except Exception as error:  # noqa: BLE001  # libraries raise errors of many kinds
-            found = {"error": np.array(_words(error, request["path"]))}
+            arrays = {"error": np.array(_words(error, request["path"]))}
         written = io.BytesIO()
-        np.savez(written, **found)  # type: ignore[arg-type]  # names are free
+        np.savez(written, **arrays)  # type: ignore[arg-type]  # names are free
         return written.getvalue()
 
     serve(answer)

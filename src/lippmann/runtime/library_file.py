@@ -63,12 +63,12 @@ class Host:
 
     def folders(self) -> list[Path]:
         """Folders in which LLVM libraries are usually installed, each once, the nearest to the user first."""
-        found = [self.at(entry) for entry in self._loader_path()]
+        folders = [self.at(entry) for entry in self._loader_path()]
         inside = "Library/bin" if self.system == "win32" else "lib"
         homes = [self.prefix, self.environment.get("CONDA_PREFIX", "")]
-        found += [self.at(home) / inside for home in homes if home]
-        found += {"darwin": self._mac, "win32": self._windows}.get(self.system, self._linux)()
-        return list(dict.fromkeys(found))
+        folders += [self.at(home) / inside for home in homes if home]
+        folders += {"darwin": self._mac, "win32": self._windows}.get(self.system, self._linux)()
+        return list(dict.fromkeys(folders))
 
     def at(self, path: str) -> Path:
         """``path`` below :attr:`root`."""
@@ -88,7 +88,7 @@ class Host:
 
     def _linux(self) -> list[Path]:
         fixed = [f"/usr/lib/{self.processor}-linux-gnu", "/usr/lib64", "/usr/lib", "/usr/local/lib", "/usr/local/lib64"]
-        found = [self.at(name) for name in fixed]
+        folders = [self.at(name) for name in fixed]
         for folder, pattern in (
             ("/usr/lib", "llvm*/lib"),
             ("/usr/lib", "llvm/*/lib*"),
@@ -96,21 +96,21 @@ class Host:
             ("/usr/local", "llvm*/lib"),
             ("/opt", "llvm*/lib"),
         ):
-            found += self._glob(folder, pattern)
+            folders += self._glob(folder, pattern)
         brew = self.environment.get("HOMEBREW_PREFIX")
-        return found + (self._glob(f"{brew}/opt", "llvm*/lib") if brew else [])
+        return folders + (self._glob(f"{brew}/opt", "llvm*/lib") if brew else [])
 
     def _mac(self) -> list[Path]:
         own = self.environment.get("HOMEBREW_PREFIX")
         usual = ["/opt/homebrew", "/usr/local"]  # Apple silicon, Intel; a library of the other processor is refused
-        found = []
+        folders = []
         for prefix in dict.fromkeys([own, *usual] if own else usual):
-            found += self._glob(f"{prefix}/opt", "llvm*/lib")
-        found += self._glob("/opt/local/libexec", "llvm-*/lib")
-        return [*found, self.at("/opt/local/lib"), self.at("/usr/local/lib")]
+            folders += self._glob(f"{prefix}/opt", "llvm*/lib")
+        folders += self._glob("/opt/local/libexec", "llvm-*/lib")
+        return [*folders, self.at("/opt/local/lib"), self.at("/usr/local/lib")]
 
     def _windows(self) -> list[Path]:
-        found = []
+        folders = []
         for variable, inside in (
             ("ProgramW6432", "LLVM/bin"),
             ("ProgramFiles", "LLVM/bin"),
@@ -119,5 +119,5 @@ class Host:
             ("ProgramData", "scoop/apps/llvm/current/bin"),
         ):
             if self.environment.get(variable):
-                found.append(self.at(self.environment[variable]) / inside)
-        return found
+                folders.append(self.at(self.environment[variable]) / inside)
+        return folders

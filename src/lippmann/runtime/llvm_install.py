@@ -135,8 +135,8 @@ def _of_system(
 ) -> Remedy:
     path = tools.find(name)
     obstacle = missing if path is None else "" if tools.is_root else "it needs the rights of an administrator"
-    shown = [word for word in words if word not in ("--assumeyes", "--noconfirm", "--non-interactive")]
-    return Remedy((path or name, *(run or words)), f"{as_root}{name} {' '.join(shown)}", obstacle)
+    plain_words = [word for word in words if word not in ("--assumeyes", "--noconfirm", "--non-interactive")]
+    return Remedy((path or name, *(run or words)), f"{as_root}{name} {' '.join(plain_words)}", obstacle)
 
 
 def _conda(host: Host, tools: Tools) -> Remedy | None:

@@ -106,7 +106,7 @@ class Door(Generic[P]):
         """Those of other packages, broken ones too, by name."""
         from importlib.metadata import entry_points  # slow to import, and to ask
 
-        found: list[Plugin[P]] = []
+        plugins: list[Plugin[P]] = []
         owners = dict.fromkeys(self.own_claims, "Lippmann")
         for entry in sorted(entry_points(group=self.kind.group), key=lambda each: (each.name, each.value)):
             distribution = "an unknown package" if entry.dist is None else f"{entry.dist.name} {entry.dist.version}"
@@ -121,8 +121,8 @@ class Door(Generic[P]):
             if not problem:
                 plugin = Plugin(entry.name, distribution, claims, extension=value)
             owners.update(dict.fromkeys(plugin.claims, str(plugin)))
-            found.append(plugin)
-        return tuple(found)
+            plugins.append(plugin)
+        return tuple(plugins)
 
     def find(self, claim: str) -> Plugin[P] | None:
         """The extension of a word, Lippmann's own first; None if there is none."""
@@ -150,8 +150,8 @@ def function_of(target: Target) -> Callable[..., Any]:
         return target
     from pkgutil import resolve_name
 
-    found: Callable[..., Any] = resolve_name(target)
-    return found
+    target_object: Callable[..., Any] = resolve_name(target)
+    return target_object
 
 
 def _words(fault: BaseException) -> str:

@@ -36,11 +36,11 @@ def kept_policy() -> Iterator[None]:
 
 def _policies() -> dict[int, tuple[int, int]]:
     """The policy and priority of each thread, by its number."""
-    found = {}
+    policies = {}
     for name in os.listdir(_THREADS):
         with suppress(OSError):
-            found[int(name)] = _policy(int(name))
-    return found
+            policies[int(name)] = _policy(int(name))
+    return policies
 
 
 def _policy(thread: int) -> tuple[int, int]:

@@ -106,17 +106,17 @@ def place_by_camera(
         focus = center if center > 0.0 else (nearest + farthest) / 2.0
     if not (np.isfinite(focus) and focus > 0.0):
         raise SceneError(f"camera '{camera.name}' focuses at {focus:g}", parameter="camera", rule="a distance above 0")
-    seen: VisibleDepth | None = None
+    visible: VisibleDepth | None = None
     may_cut = is_unbounded or nearest < _first_recorded(camera, focus, display, scale * depth_scale)
     if probe is not None and (pop_out is not None or may_cut):
-        seen = probe(_view(camera, frame, focus, display, scale))
+        visible = probe(_view(camera, frame, focus, display, scale))
     if pop_out is not None:
-        near, far = (nearest, farthest) if seen is None else (seen.near, seen.far)
+        near, far = (nearest, farthest) if visible is None else (visible.near, visible.far)
         focus = max(near + pop_out * (far - near), np.finfo(float).tiny)
-    if seen is not None and seen.near > 0.0:
-        most = _farthest_focus(camera, seen.near, display, scale * depth_scale)
+    if visible is not None and visible.near > 0.0:
+        most = _farthest_focus(camera, visible.near, display, scale * depth_scale)
         if pop_out is not None and focus > most * (1.0 + 2.0 * _MARGIN):
-            _refuse_pop_out(pop_out, max(0.0, (most - seen.near) / (seen.far - seen.near)), display)
+            _refuse_pop_out(pop_out, max(0.0, (most - visible.near) / (visible.far - visible.near)), display)
         if focus > most:
             if pop_out is None:
                 warnings.append(
@@ -204,8 +204,8 @@ def frame_whole(camera: Camera, points: Bounds, display: Display) -> Matrix:
         placed = transform_points(change, points)
         if (placed[:, 2] >= display.viewing_distance).any():
             return change
-        seen = placed[:, :2] / (1.0 - placed[:, 2:] / display.viewing_distance)
-        low, high = seen.min(axis=0), seen.max(axis=0)
+        projected = placed[:, :2] / (1.0 - placed[:, 2:] / display.viewing_distance)
+        low, high = projected.min(axis=0), projected.max(axis=0)
         is_whole = (np.maximum(-low, high) <= panel / 2.0).all()
         fill = float(((high - low) / panel).max())
         if step == 0 and (not is_whole or fill >= _LEAST_FILL):

@@ -33,7 +33,7 @@ def extreme_points_of(description: SceneDescription) -> Bounds:
 
     Empty for a description that places none of these.
     """
-    found = []
+    outermost = []
     farthest: dict[tuple[int, int], Bounds] = {}  # of arrays that many meshes share
     for number, places in description.fitted_placements.items():
         mesh = description.meshes[number]
@@ -47,12 +47,12 @@ def extreme_points_of(description: SceneDescription) -> Bounds:
             places = places[_may_lie_outside(points, places)]
         if len(points) * len(places) > _COPIED_POINTS:
             points = np.array(list(itertools.product(*zip(points.min(axis=0), points.max(axis=0), strict=True))))
-        found.append(farthest_points(_copies(points, places)))
+        outermost.append(farthest_points(_copies(points, places)))
     if description.splats is not None:
-        found.append(typical_points(description.splats))
+        outermost.append(typical_points(description.splats))
     if description.volume is not None:
-        found.append(visible_corners(description.volume))
-    return farthest_points(np.concatenate(found)) if found else np.zeros((0, 3))
+        outermost.append(visible_corners(description.volume))
+    return farthest_points(np.concatenate(outermost)) if outermost else np.zeros((0, 3))
 
 
 def farthest_points(points: Bounds) -> Bounds:
@@ -90,13 +90,13 @@ def _may_lie_outside(points: Bounds, places: Matrix) -> NDArray[np.bool_]:
         reach = centers[part].astype(np.float32) @ directions.T - radius[part, None].astype(np.float32)
         least = np.maximum(least, reach.max(axis=0))
     slack = np.float32(1e-5) * np.float32(np.abs(centers).max() + radius.max())
-    found = [
+    may_be_outer = [
         (centers[part].astype(np.float32) @ directions.T + radius[part, None].astype(np.float32) >= least - slack).any(
             axis=1
         )
         for part in parts
     ]
-    return np.concatenate(found)
+    return np.concatenate(may_be_outer)
 
 
 def used_positions(mesh: Mesh) -> Bounds:

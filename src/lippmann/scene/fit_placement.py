@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lippmann.display import Display
-from lippmann.display.view_cone import size_seen, zone_slopes
+from lippmann.display.view_cone import visible_size, zone_slopes
 from lippmann.scene.camera_placement import FILL
 from lippmann.scene.matrices import Bounds, Vector, depth_scaling, scaling, translation
 from lippmann.scene.values.description import Matrix
@@ -99,37 +99,37 @@ def fit_scene(
     resolved = _largest_in_depth(depth, share, display)
     middle = np.array([(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, high[2]])
     # Where there is no extent, rounding noise must not count as one.
-    seen = (points - middle) * (np.array([width, height, depth]) > 0.0)
+    offsets = (points - middle) * (np.array([width, height, depth]) > 0.0)
 
     def depths(sizes: Bounds) -> tuple[Bounds, Bounds]:
         """Share of the depth that is shown, and how much of it would lie in front, for sizes ``(m,)``."""
-        shown = np.minimum(1.0, resolved / sizes) if depth_scale is None else np.full(len(sizes), depth_scale)
-        return shown, share * depth * sizes * shown
+        depth_share = np.minimum(1.0, resolved / sizes) if depth_scale is None else np.full(len(sizes), depth_scale)
+        return depth_share, share * depth * sizes * depth_share
 
     def spans(sizes: Bounds) -> tuple[Bounds, Bounds]:
         """:func:`_spans` of sizes ``(m,)``, in mm per world unit."""
-        shown, front = depths(sizes)
-        heights = np.minimum(front, display.aperture_distance)[:, None] + seen[:, 2] * (sizes * shown)[:, None]
-        return _spans(seen[:, :2], sizes, heights, display)
+        depth_share, front = depths(sizes)
+        heights = np.minimum(front, display.aperture_distance)[:, None] + offsets[:, 2] * (sizes * depth_share)[:, None]
+        return _spans(offsets[:, :2], sizes, heights, display)
 
     def at(size: float) -> Fit:
         """The fit of a given size, in mm per world unit."""
         sizes = np.array([size])
-        shown, full_front = (float(values[0]) for values in depths(sizes))
+        depth_share, full_front = (float(values[0]) for values in depths(sizes))
         front = min(full_front, display.aperture_distance)
         x, y = (0.0, 0.0) if covers else spans(sizes)[0][0]
         anchor = translation(-middle - (x, y, 0.0))
-        matrix = translation((0.0, 0.0, front)) @ depth_scaling(shown) @ scaling(size) @ anchor
-        return Fit(matrix, depth * size, shown, front, full_front)
+        matrix = translation((0.0, 0.0, front)) @ depth_scaling(depth_share) @ scaling(size) @ anchor
+        return Fit(matrix, depth * size, depth_share, front, full_front)
 
     def fills(sizes: Bounds) -> Bounds:
         """Share of the panel that all views fill together, on the axis where they fill more, for sizes ``(m,)``."""
-        return np.asarray((spans(sizes)[1] / size_seen(display)).max(axis=1), np.float64)
+        return np.asarray((spans(sizes)[1] / visible_size(display)).max(axis=1), np.float64)
 
     if covers and width > 0.0 and height > 0.0:
         return at(scale * _least_covering((width, height), at, display))
     if width > 0.0 or height > 0.0:
-        sides = [FILL * side for side in size_seen(display)]
+        sides = [FILL * side for side in visible_size(display)]
         size = min(side / extent for side, extent in zip(sides, (width, height), strict=True) if extent > 0.0)
         most = _LARGEST_SIZE * size
     else:  # a line toward the viewer
@@ -147,7 +147,7 @@ def _surely_whole(width: float, height: float, depth: float, display: Display) -
     """
     reach = np.array([width, height]) + 2.0 * depth * np.array(zone_slopes(display))
     return float(
-        min(FILL / 2.0 * (np.array(size_seen(display)) / reach).min(), display.viewing_distance / (2.0 * depth))
+        min(FILL / 2.0 * (np.array(visible_size(display)) / reach).min(), display.viewing_distance / (2.0 * depth))
     )
 
 
@@ -179,7 +179,7 @@ def _least_covering(extents: tuple[float, float], at: Callable[[float], Fit], di
     return size
 
 
-def _spans(seen: Bounds, sizes: Bounds, heights: Bounds, display: Display) -> tuple[Bounds, Bounds]:
+def _spans(offsets: Bounds, sizes: Bounds, heights: Bounds, display: Display) -> tuple[Bounds, Bounds]:
     """Where all views together show points, for m sizes: the middle ``(m, 2)`` and the span ``(m, 2)``.
 
     The eye of slope s sees the point (x, y, z) of the display's frame in the lens plane at ``(x - s z) / (1 - z / D)``,
@@ -188,7 +188,7 @@ def _spans(seen: Bounds, sizes: Bounds, heights: Bounds, display: Display) -> tu
 
     Parameters
     ----------
-    seen:
+    offsets:
         ``(n, 2)``, world units.
     sizes:
         ``(m,)``, mm per world unit.
@@ -199,8 +199,8 @@ def _spans(seen: Bounds, sizes: Bounds, heights: Bounds, display: Display) -> tu
     each = np.arange(len(sizes))
     middle, span = np.zeros((len(sizes), 2)), np.zeros((len(sizes), 2))
     for axis, slope in enumerate(zone_slopes(display)):
-        place, shift = seen[:, axis] * inverse, slope * np.abs(heights) / sizes[:, None] * inverse
-        still = _CENTERED * np.abs(seen[:, axis]).max(initial=0.0)
+        place, shift = offsets[:, axis] * inverse, slope * np.abs(heights) / sizes[:, None] * inverse
+        still = _CENTERED * np.abs(offsets[:, axis]).max(initial=0.0)
         # Newton steps: the difference of the two sides falls as the middle moves, by the two points' own slopes.
         for _ in range(_CENTERINGS):
             centered = place - middle[:, axis, None] * inverse

@@ -44,10 +44,10 @@ def try_scene(text: str, variant: str, where: str) -> None:
     """
     request = json.dumps({"variant": variant, "text": text, "memory": input_memory_left()}).encode()
     try:
-        found = json.loads(_process.ask(request, where=where))
+        answer = json.loads(_process.ask(request, where=where))
     except HelperEndedError as error:
         raise SceneError(f"Mitsuba breaks down at the scene ({error})", where=where, fix=_FIX) from None
-    if "refusal" in found:
-        raise RefusedSceneError(found["refusal"])
-    if "fault" in found:
-        raise SceneError(f"Mitsuba would be misled: {found['fault']}", where=where, fix=_FIX)
+    if "refusal" in answer:
+        raise RefusedSceneError(answer["refusal"])
+    if "fault" in answer:
+        raise SceneError(f"Mitsuba would be misled: {answer['fault']}", where=where, fix=_FIX)

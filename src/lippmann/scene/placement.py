@@ -182,9 +182,9 @@ def place(
         display_from_world = _resize(np.eye(4), options)
     display_from_world = translation(options.shift) @ display_from_world
     where = inverse(display_from_world)
-    found = stand(where, bounds, display, mode=mode, bounds_in=bounds_in, warnings=warnings)
+    placement = stand(where, bounds, display, mode=mode, bounds_in=bounds_in, warnings=warnings)
     is_whole = mode == "fit" and (fills_panel or (options.scale <= 1.0 and not any(options.shift)))
-    return replace(found, exposure=exposure, may_cut=None if is_whole else options)
+    return replace(placement, exposure=exposure, may_cut=None if is_whole else options)
 
 
 def stand(

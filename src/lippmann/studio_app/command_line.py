@@ -45,7 +45,7 @@ def words_of_state(state: StudioState) -> list[str]:
 def option_values(state: StudioState) -> Mapping[str, str | bool | list[str]]:
     """The options of a render by name, as they are typed; switches are bool. What commands assume is left out."""
     values: dict[str, str | bool | list[str]] = {}
-    for each, _ in sorted(options_of(StudioState), key=lambda found: found[0].name != "display"):
+    for each, _ in sorted(options_of(StudioState), key=lambda entry: entry[0].name != "display"):
         value = getattr(state, each.name)
         if each.name not in _OTHERS and value is not None and value != _ASSUMED.get(each.name, default_of(each)):
             values[each.name] = _typed(value)

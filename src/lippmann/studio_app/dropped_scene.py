@@ -37,23 +37,27 @@ def main_file(folder: Path, places: Sequence[Path]) -> Path:
     of_photos = {depth_beside(folder / place) for place in places if kind_of_name(place) in PHOTOS}
     known = [place for place in places if READERS.find(kind_of_name(place)) is not None]
     scenes = [place for place in known if folder / place not in of_photos]
-    found = [place for place in scenes if kind_of_name(place) not in PHOTOS]
-    if all(kind_of_name(place) == _SLICE for place in found) and holds_dicom(folder):
+    candidates = [place for place in scenes if kind_of_name(place) not in PHOTOS]
+    if all(kind_of_name(place) == _SLICE for place in candidates) and holds_dicom(folder):
         tops = {place.parts[0] for place in places}
         return Path(tops.pop()) if len(tops) == 1 else Path()
-    found = found or scenes
-    if len(found) > 1:
-        found = [place for place in found if not any(_names(folder / each, place) for each in found if each != place)]
-    top = min((len(place.parts) for place in found), default=0)
-    found = [place for place in found if len(place.parts) == top]
-    if len(found) == 1:
-        return found[0]
+    candidates = candidates or scenes
+    if len(candidates) > 1:
+        candidates = [
+            place
+            for place in candidates
+            if not any(_names(folder / each, place) for each in candidates if each != place)
+        ]
+    top = min((len(place.parts) for place in candidates), default=0)
+    candidates = [place for place in candidates if len(place.parts) == top]
+    if len(candidates) == 1:
+        return candidates[0]
     if not scenes:
         raise SceneError("no scene is among these files", rule=f"known are {', '.join(READERS.claims())}")
     rule = "a scene is dropped with the files that it names"
     if all(kind_of_name(place) in PHOTOS for place in scenes):
         rule = "a photograph is dropped with its depth map, named like it: photo.jpg and photo_depth.png"
-    raise SceneError(f"{len(found) or len(scenes)} scenes were dropped", rule=rule, fix="drop one")
+    raise SceneError(f"{len(candidates) or len(scenes)} scenes were dropped", rule=rule, fix="drop one")
 
 
 def _names(path: Path, other: Path) -> bool:

@@ -12,7 +12,7 @@ import anyio.to_thread
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.display.seen_pixels import EyeMap
+from lippmann.display.visible_pixels import EyeMap
 from lippmann.errors import LippmannError, UsageError
 from lippmann.studio_app.page_values import (
     display_size,
@@ -24,7 +24,7 @@ from lippmann.studio_app.page_values import (
 )
 from lippmann.studio_app.real_lens import RealEyeMap
 from lippmann.studio_app.render_jobs import KINDS, Job
-from lippmann.studio_app.render_thread import Shown, Watcher
+from lippmann.studio_app.render_thread import LiveResult, Watcher
 from lippmann.studio_app.session import WITHOUT_FILE, StudioSession, opened_state
 from lippmann.studio_app.state import StudioState
 from lippmann.studio_app.state_toml import text_of_state, with_whole_paths
@@ -81,9 +81,9 @@ class LiveSocket:
         self._newest: dict[str, Any] = {}
         self._looked = asyncio.Event()
         self._state = session.state
-        self._shown: Shown | None = None
+        self._pending: LiveResult | None = None
         self._sent = self._acknowledged = self._view = 0
-        self._told: tuple[object, ...] | None = None
+        self._sent_facts: tuple[object, ...] | None = None
         self._watcher = Watcher(self._take_frame, self._take_error, self._take_busy)
 
     async def run(self) -> None:
@@ -97,7 +97,7 @@ class LiveSocket:
             self._say(session.jobs.last.message())
         if self._follows:
             self._want_all()
-        work = self._receive_all(), self._send_all(), self._look_all()
+        work = self._receive_all(), self._send_all(), self._watch_views()
         tasks = [asyncio.create_task(each) for each in work]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -139,7 +139,7 @@ class LiveSocket:
         except LippmannError as error:
             self._say({"type": "error", "line": str(error)})
 
-    async def _look_all(self) -> None:
+    async def _watch_views(self) -> None:
         """Take over the newest view, and again after a while."""
         while True:
             await self._looked.wait()
@@ -150,7 +150,7 @@ class LiveSocket:
 
     def _commands(self) -> dict[str, Callable[[dict[str, Any]], None]]:
         return {
-            "view": self._look,
+            "view": self._set_view,
             "pick": self._pick,
             "render": self._render,
             "cancel": lambda _: self._session.jobs.cancel(),
@@ -163,7 +163,7 @@ class LiveSocket:
         self._acknowledged = max(self._acknowledged, min(self._sent, int(number_of(said, "frame", 0, _LARGEST_NUMBER))))
         self._changed.set()
 
-    def _look(self, said: dict[str, Any]) -> None:
+    def _set_view(self, said: dict[str, Any]) -> None:
         self._newest = said
         self._looked.set()
 
@@ -182,12 +182,12 @@ class LiveSocket:
             x, y, z = numbers_of(said, "eye", 3, _FARTHEST)
             is_real = said.get("real") is True and self._session.display(state).lens is not None
             view = state.view((x, y, z), (width, height), RealEyeMap if is_real else EyeMap)
-        self._session.thread.want(self._watcher, self._session.wanted(self._view, state, view))
+        self._session.thread.want(self._watcher, self._session.request_view(self._view, state, view))
 
     def _want_all(self) -> None:
         self._view += 1
         state = self._state = self._session.state
-        self._session.thread.want(self._watcher, self._session.wanted(self._view, state, state.native_view()))
+        self._session.thread.want(self._watcher, self._session.request_view(self._view, state, state.native_view()))
 
     def _take_over(self, said: dict[str, Any]) -> StudioState:
         """The state that a message carries: that of its page, whatever other pages have set since."""
@@ -234,8 +234,8 @@ class LiveSocket:
 
     # ---- From the studio, in other threads -------------------------------------------------------------------------
 
-    def _take_frame(self, shown: Shown) -> None:
-        self._soon(partial(self._put_frame, shown))
+    def _take_frame(self, result: LiveResult) -> None:
+        self._soon(partial(self._put_frame, result))
 
     def _take_error(self, error: LippmannError) -> None:
         self._say_soon({"type": "error", "line": str(error)})
@@ -268,17 +268,17 @@ class LiveSocket:
             "displays": session.display_names(),
         }
 
-    def _facts(self, shown: Shown) -> dict[str, Any] | None:
+    def _facts(self, result: LiveResult) -> dict[str, Any] | None:
         """What is to be said of a frame beside it; None if it has been."""
-        session, state, frame = self._session, self._state, shown.frame
+        session, state, frame = self._session, self._state, result.frame
         display = session.display(state)
         # Of the frame too: one of an older view may come after the state has changed.
         facts = facts_of_view(display, frame.placement, round(frame.exposure, 3))
         known = (state, display, facts)
-        told, self._told = self._told, known
-        if told == known:
+        previous, self._sent_facts = self._sent_facts, known
+        if previous == known:
             return None
-        is_new = told is None or told[1] is not display
+        is_new = previous is None or previous[1] is not display
         return {
             "type": "facts",
             "title": session.title(state),
@@ -292,11 +292,11 @@ class LiveSocket:
         words = self._session.command(state)
         return f"# This scene has no file: {WITHOUT_FILE}" if words is None else shell_line(words)
 
-    def _put_frame(self, shown: Shown) -> None:
-        facts = self._facts(shown)
+    def _put_frame(self, result: LiveResult) -> None:
+        facts = self._facts(result)
         if facts is not None:
             self._say(facts)
-        self._shown = shown
+        self._pending = result
         self._changed.set()
 
     def _say(self, message: dict[str, Any]) -> None:
@@ -311,24 +311,24 @@ class LiveSocket:
             while self._messages:
                 message = self._messages.pop(next(iter(self._messages)))
                 await self._socket.send_text(message_text(message))
-            if self._shown is not None and self._sent - self._acknowledged < _MOST_ON_THE_WAY:
-                shown, self._shown = self._shown, None
-                await self._send_frame(shown)
+            if self._pending is not None and self._sent - self._acknowledged < _MOST_ON_THE_WAY:
+                result, self._pending = self._pending, None
+                await self._send_frame(result)
                 self._changed.set()
 
-    async def _send_frame(self, shown: Shown) -> None:
-        frame = shown.frame
+    async def _send_frame(self, result: LiveResult) -> None:
+        frame = result.frame
         height, width = frame.pixels.shape[:2]
-        is_good = self._follows or shown.is_final or frame.samples >= _LOSSLESS_FROM
+        is_good = self._follows or result.is_final or frame.samples >= _LOSSLESS_FROM
         header = FrameHeader(
             "png" if is_good and self._coding == "jpeg" else self._coding,
             self._sent + 1,
-            shown.number,
+            result.number,
             width,
             height,
             frame.samples,
             sum(frame.seconds.values()),
-            shown.is_final,
+            result.is_final,
             frame.is_denoised,
         )
         body = await anyio.to_thread.run_sync(encode_frame, header, frame.pixels)

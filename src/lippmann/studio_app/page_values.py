@@ -45,16 +45,16 @@ def state_of_values(values: object) -> StudioState:
     if not isinstance(values, Mapping):
         raise UsageError("the state", rule="must be an object of JSON")
     kinds = {each.name: each.type for each, _ in options_of(StudioState)}
-    found: dict[str, Any] = {}
+    settings: dict[str, Any] = {}
     for name, value in values.items():
         if name not in kinds:
             raise UsageError.unknown("setting", name, kinds)
         _check_of_page(value, name)
         try:
-            found[name] = from_plain(kinds[name], value)
+            settings[name] = from_plain(kinds[name], value)
         except UsageError as error:
             raise UsageError(error.what, parameter=name, rule=error.rule) from None
-    return StudioState(**found)
+    return StudioState(**settings)
 
 
 def facts_of_view(display: Display, placement: Placement, exposure: float) -> dict[str, object]:
@@ -104,7 +104,7 @@ def _display_facts(display: Display) -> list[list[str]]:
 
 
 def _in_words(warning: str) -> str:
-    return _PARAMETER.sub(lambda found: f"{found[1].replace('_', ' ')} {found[2]}", warning)
+    return _PARAMETER.sub(lambda match: f"{match[1].replace('_', ' ')} {match[2]}", warning)
 
 
 def _pair(ends: tuple[float, float]) -> list[float | None]:

@@ -24,7 +24,7 @@ class PanelSite:
         self._picture = picture
         self._panels = panels_or_none()
         self._viewer = ViewerSite([picture])
-        self._static = {f"/{name}": found for name, found in static_files().items() if name not in ("", "panel")}
+        self._static = {f"/{name}": response for name, response in static_files().items() if name not in ("", "panel")}
         self._static["/"] = static_files()["panel"]
 
     def get(self, request: Request) -> Response:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import NUMPY, Display
-from lippmann.display.seen_pixels import EyeMap, Floats, PixelSet, Vector
+from lippmann.display.visible_pixels import EyeMap, Floats, PixelSet, Vector
 from lippmann.optics.eye_light import EyeLight, panel_frame
 from lippmann.runtime.machine import usable_cores
 from lippmann.runtime.row_threads import Bands
@@ -106,7 +106,7 @@ class RealEyeMap(EyeMap):
             grid.ravel()[keys] = np.arange(len(keys))
             self._grid = grid
 
-    def seen_by(self, eye: Vector) -> PixelSet:
+    def pixels_for_eye(self, eye: Vector) -> PixelSet:
         """The pixels whose light an eye at ``eye`` (mm in the display's frame, z > 0) gets, with their weights."""
         from lippmann.studio_app.real_lens_kernel import weigh
 
@@ -117,8 +117,8 @@ class RealEyeMap(EyeMap):
         places = light.interpolate_places(*at.T)
         if self._is_line:
             places[:, 0] += lattice.across(self._center_x, self._center_y)
-            seen = display.panel_point_seen_by(*eye, self._x, self._y, NUMPY)
-            places[:, 1] = display.pixel_coordinates(*seen)[1]
+            panel_point = display.visible_panel_point(*eye, self._x, self._y, NUMPY)
+            places[:, 1] = display.pixel_coordinates(*panel_point)[1]
         else:
             places += np.stack([self._center_x, self._center_y], axis=-1)
         frame, cells = panel_frame(display), np.array(display.panel.cells, dtype=np.float64)
@@ -155,9 +155,9 @@ class RealEyeMap(EyeMap):
         pixel = traced // channels
         parts = (part.astype(np.uint32) for part in (pixel % panel.width, pixel // panel.width, traced % channels))
         column, row, channel_of = parts
-        shown = brightest[self._lenses]
+        brightest_of = brightest[self._lenses]
         mixture = {"starts": starts, "members": members, "weights": weights}
-        return MixedPixels(column, row, channel_of, shown, lenses=self._lenses, grid=self._grid, **mixture)
+        return MixedPixels(column, row, channel_of, brightest_of, lenses=self._lenses, grid=self._grid, **mixture)
 
 
 @lru_cache(2)

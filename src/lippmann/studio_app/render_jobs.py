@@ -191,8 +191,8 @@ class JobRunner:
     def finished(self, number: int) -> Job | None:
         """The job of this number if it is done."""
         with self._lock:
-            found = self._jobs[number - 1] if 1 <= number <= len(self._jobs) else None
-        return found if found is not None and found.phase == "done" else None
+            job = self._jobs[number - 1] if 1 <= number <= len(self._jobs) else None
+        return job if job is not None and job.phase == "done" else None
 
     def start(self, kind: Kind, words: list[str], stem: str, ending: str | None = None) -> None:
         """Begin a render.
@@ -294,11 +294,11 @@ class JobRunner:
         assert process.stderr is not None
         with process.stderr:
             for line in process.stderr:
-                told = _PROGRESS.match(line)
-                if told is None:
+                match = _PROGRESS.match(line)
+                if match is None:
                     said = line.strip()[:500] or said
                 else:
-                    share, name, remark = min(1.0, int(told[1]) / 100), told[2].strip(), told[3] or ""
+                    share, name, remark = min(1.0, int(match[1]) / 100), match[2].strip(), match[3] or ""
                     left = seconds_left(share, time.monotonic() - began, remark)
                     self._update(share, _WORDS_OF.get(name, name.capitalize()), left)
         code = process.wait()

@@ -64,7 +64,7 @@ class Renderer(Protocol):
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ViewRequest:
     """What a watcher wants to see.
 
     Attributes
@@ -87,7 +87,7 @@ class Wanted:
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class LiveResult:
     """A frame for a watcher: ``is_final`` if no better one follows."""
 
     number: int
@@ -114,12 +114,12 @@ class Watcher:
         Takes one line while a scene is loaded, then None.
     """
 
-    on_frame: Callable[[Shown], None]
+    on_frame: Callable[[LiveResult], None]
     on_error: Callable[[LippmannError], None]
     on_busy: Callable[[str | None], None] = lambda _: None
-    _wanted: Wanted | None = field(default=None, repr=False)
+    _request: ViewRequest | None = field(default=None, repr=False)
     _moving: _Frame | None = field(default=None, repr=False)
-    _shown: Wanted | None = field(default=None, repr=False)
+    _current: ViewRequest | None = field(default=None, repr=False)
     _resting: _Rest | None = field(default=None, repr=False)
     _share: float = 1.0
     _row_step: int = MOST_ROW_STEP
@@ -130,7 +130,7 @@ class Watcher:
 class _Frame:
     """A frame on its way."""
 
-    wanted: Wanted
+    request: ViewRequest
     view: LiveView
     steps: Iterator[LiveFrame | None]
     began: float
@@ -141,7 +141,7 @@ class _Frame:
 class _Rest:
     """A view that rests ``since`` a time, of which a coarse picture was shown, or one of all its pixels."""
 
-    wanted: Wanted
+    request: ViewRequest
     since: float
     is_coarse: bool
     steps: Iterator[LiveFrame | None] | None = None
@@ -180,10 +180,10 @@ class RenderThread:
             if watcher in self._watchers:
                 self._watchers.remove(watcher)
 
-    def want(self, watcher: Watcher, wanted: Wanted) -> None:
+    def want(self, watcher: Watcher, request: ViewRequest) -> None:
         """Show this to the watcher, instead of anything it wanted before."""
         with self._changed:
-            watcher._wanted, watcher._resting = wanted, None
+            watcher._request, watcher._resting = request, None
             self._changed.notify()
 
     def pick(self, watcher: Watcher, u: float, v: float, then: Callable[[float | None], None]) -> None:
@@ -231,10 +231,10 @@ class RenderThread:
         with self._changed:
             while not self._is_ended:
                 for watcher in self._watchers:
-                    if watcher._pick is not None and watcher._shown is not None:
+                    if watcher._pick is not None and watcher._current is not None:
                         asked, watcher._pick = watcher._pick, None
-                        return watcher, lambda w=watcher, x=watcher._shown, a=asked: self._tell(w, x, *a)
-                    if watcher._moving is not None or watcher._wanted is not None:
+                        return watcher, lambda w=watcher, x=watcher._current, a=asked: self._tell(w, x, *a)
+                    if watcher._moving is not None or watcher._request is not None:
                         self._go_last(watcher)
                         return watcher, lambda w=watcher: self._show(w)
                 resting = [(watcher, watcher._resting) for watcher in self._watchers if watcher._resting is not None]
@@ -263,30 +263,30 @@ class RenderThread:
         if picture is None:
             watcher._moving = frame
             return
-        wanted = frame.wanted
-        if wanted.view.eye is None:
+        request = frame.request
+        if request.view.eye is None:
             watcher._row_step = _next_row_step(watcher._row_step, now - frame.began)
         else:
             watcher._share = _next_share(watcher._share, frame.busy)
         with self._changed:
-            watcher._shown = wanted
-            if watcher._wanted is None:
-                watcher._resting = _Rest(wanted, now, frame.view is not wanted.view)
-        watcher.on_frame(Shown(wanted.number, picture, False))
+            watcher._current = request
+            if watcher._request is None:
+                watcher._resting = _Rest(request, now, frame.view is not request.view)
+        watcher.on_frame(LiveResult(request.number, picture, False))
 
     def _begin(self, watcher: Watcher) -> _Frame:
         with self._changed:
-            wanted, watcher._wanted = watcher._wanted, None
-        assert wanted is not None
-        renderer = self._prepare(watcher, wanted)
-        view = _coarser(wanted.view, watcher)
-        return _Frame(wanted, view, renderer.frame_steps(view), time.monotonic())
+            request, watcher._request = watcher._request, None
+        assert request is not None
+        renderer = self._prepare(watcher, request)
+        view = _coarser(request.view, watcher)
+        return _Frame(request, view, renderer.frame_steps(view), time.monotonic())
 
     def _gather(self, watcher: Watcher, rest: _Rest) -> None:
-        wanted = rest.wanted
+        request = rest.request
         if rest.steps is None:
-            renderer = self._prepare(watcher, wanted)
-            rest.steps = (renderer.frame_steps if rest.is_coarse else renderer.refine_steps)(wanted.view)
+            renderer = self._prepare(watcher, request)
+            rest.steps = (renderer.frame_steps if rest.is_coarse else renderer.refine_steps)(request.view)
         began = time.monotonic()
         frame = next(rest.steps)
         rest.gathered += time.monotonic() - began
@@ -298,28 +298,30 @@ class RenderThread:
                 if watcher._resting is rest:
                     watcher._resting = None
         if frame is not None:
-            watcher.on_frame(Shown(wanted.number, frame, is_done))
+            watcher.on_frame(LiveResult(request.number, frame, is_done))
 
-    def _tell(self, watcher: Watcher, wanted: Wanted, u: float, v: float, then: Callable[[float | None], None]) -> None:
-        then(self._prepare(watcher, wanted).pick(wanted.view, u, v))
+    def _tell(
+        self, watcher: Watcher, request: ViewRequest, u: float, v: float, then: Callable[[float | None], None]
+    ) -> None:
+        then(self._prepare(watcher, request).pick(request.view, u, v))
 
-    def _prepare(self, watcher: Watcher, wanted: Wanted) -> Renderer:
+    def _prepare(self, watcher: Watcher, request: ViewRequest) -> Renderer:
         """The renderer with the scene and the display that are wanted."""
-        if self._renderer is None or wanted.scene != self._scene:
+        if self._renderer is None or request.scene != self._scene:
             watcher.on_busy("Opening the scene")
             try:
-                scene = wanted.load()
+                scene = request.load()
                 if self._renderer is None:
-                    self._renderer = self._make_renderer(scene, wanted.display)
-                    self._display = wanted.display
+                    self._renderer = self._make_renderer(scene, request.display)
+                    self._display = request.display
                 else:
                     self._renderer.set_scene(scene)
-                self._scene = wanted.scene
+                self._scene = request.scene
             finally:
                 watcher.on_busy(None)
-        if wanted.display is not self._display and wanted.display != self._display:
-            self._renderer.set_display(wanted.display)
-            self._display = wanted.display
+        if request.display is not self._display and request.display != self._display:
+            self._renderer.set_display(request.display)
+            self._display = request.display
         return self._renderer
 
 

@@ -20,7 +20,7 @@ from lippmann.studio_app.command_line import render_command
 from lippmann.studio_app.dropped_scene import ENVIRONMENTS
 from lippmann.studio_app.page_values import title_of
 from lippmann.studio_app.render_jobs import Job, JobRunner, Kind
-from lippmann.studio_app.render_thread import Renderer, RenderThread, Wanted, Watcher
+from lippmann.studio_app.render_thread import Renderer, RenderThread, ViewRequest, Watcher
 from lippmann.studio_app.state import FILES, PLACED_BY, StudioState
 from lippmann.studio_app.state_toml import state_of_text
 from lippmann.studio_app.uploads import Dropped, Uploads
@@ -157,12 +157,12 @@ class StudioSession:
     def display(self, state: StudioState) -> Display:
         """The display of a state."""
         with self._lock:
-            found = self._displays.get(state.display)
-        if found is None:
-            found = state.load_display()
+            display = self._displays.get(state.display)
+        if display is None:
+            display = state.load_display()
             with self._lock:
-                self._displays[state.display] = found
-        return found
+                self._displays[state.display] = display
+        return display
 
     def display_names(self) -> list[tuple[str, list[tuple[str, str]]]]:
         """Presets for a list: groups of names and titles."""
@@ -174,14 +174,14 @@ class StudioSession:
             groups[kind].append((name, display.title or name))
         return list(groups.items())
 
-    def wanted(self, number: int, state: StudioState, view: LiveView) -> Wanted:
+    def request_view(self, number: int, state: StudioState, view: LiveView) -> ViewRequest:
         """What to render for a view of a state."""
         key = (state.scene, SceneOptions.part_of(state))
 
         def load() -> Scene:
             return state.load_scene(allow_outside=self._allow_outside, source=self._held_scene(state))
 
-        return Wanted(number, key, load, self.display(state), view)
+        return ViewRequest(number, key, load, self.display(state), view)
 
     def command(self, state: StudioState) -> list[str] | None:
         """The command line that renders a state; None for a scene that has no file."""
@@ -220,7 +220,7 @@ class StudioSession:
         watcher = Watcher(lambda _: end(None), end)
         self.thread.add(watcher)
         view = state.view(default_eye(self.display(state)), _FIRST_SIZE)
-        self.thread.want(watcher, self.wanted(0, state, view))
+        self.thread.want(watcher, self.request_view(0, state, view))
 
     def close(self) -> None:
         """End all work."""

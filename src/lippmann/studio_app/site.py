@@ -104,8 +104,8 @@ class StudioSite:
             except PictureError as error:
                 raise RefusedError(HTTPStatus.NOT_FOUND, str(error)) from None
         plain = Request(f"/pictures/0/{rest}", request.headers)
-        found = await anyio.to_thread.run_sync(self._pictures[number].get, plain)
-        return _as_response(found)
+        response = await anyio.to_thread.run_sync(self._pictures[number].get, plain)
+        return _as_response(response)
 
     async def _result(self, request: ServerRequest) -> Response:
         job = self._session.jobs.finished(request.path_params["number"])
@@ -160,12 +160,12 @@ class _Route(Route):
 
 async def _static(scope: Scope, receive: Receive, send: Send) -> None:
     path = scope["path"].removeprefix("/")
-    found = static_files().get(path)
-    if scope["type"] != "http" or found is None:
+    response = static_files().get(path)
+    if scope["type"] != "http" or response is None:
         raise not_found()
     if scope["method"] == "POST":
         raise RefusedError(HTTPStatus.METHOD_NOT_ALLOWED, "nothing is taken here")
-    await send_response(send, found)
+    await send_response(send, response)
 
 
 def _as_response(plain: PlainResponse) -> Response:

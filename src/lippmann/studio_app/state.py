@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.display.seen_pixels import EyeMap
+from lippmann.display.visible_pixels import EyeMap
 from lippmann.errors import UsageError
 from lippmann.options.choices import Integrator, ToneMap
 from lippmann.options.light import LightOptions

@@ -87,7 +87,7 @@ def state_of_text(text: str, *, where: str = "state", folder: Path | None = None
             what = error.what if error.what else repr(value)
             raise UsageError(what, where=place, parameter=name, rule=error.rule, fix=error.fix) from None
         if folder is not None and name in FILES:
-            settings[name] = _found(settings[name], folder)
+            settings[name] = _resolve_file(settings[name], folder)
     try:
         return StudioState(**settings)
     except UsageError as error:
@@ -102,12 +102,12 @@ def text_of_state(state: StudioState, folder: Path | None = None) -> str:
     ``folder`` is where the file will lie: names of files in it or below it are told from there.
     """
     lines = []
-    for each, _ in sorted(options_of(StudioState), key=lambda found: found[0].name not in _FIRST):
+    for each, _ in sorted(options_of(StudioState), key=lambda entry: entry[0].name not in _FIRST):
         value = getattr(state, each.name)
         if value is None or (value == default_of(each) and each.name not in _FIRST):
             continue
         if folder is not None and each.name in FILES:
-            value = _told_from(value, folder)
+            value = _relative_name(value, folder)
         lines.append(f"{each.name} = {toml_of(value)}")
     return "\n".join(lines) + "\n"
 
@@ -124,13 +124,13 @@ def _is_file(name: str | None) -> bool:
     return name is not None and Path(name).exists() and (Path(name).name != name or "." in name)
 
 
-def _found(name: str, folder: Path) -> str:
+def _resolve_file(name: str, folder: Path) -> str:
     """A file's name as seen from the working directory, if there is such a file in ``folder``; else the name itself."""
     path = folder / name
     return str(path) if not Path(name).is_absolute() and path.is_file() else name
 
 
-def _told_from(name: str, folder: Path) -> str:
+def _relative_name(name: str, folder: Path) -> str:
     path = Path(name)
     if not _is_file(name):
         return name
@@ -140,8 +140,8 @@ def _told_from(name: str, folder: Path) -> str:
 
 def _syntax_error(message: str, where: str) -> UsageError:
     """One line for what the TOML parser says, which names the line last."""
-    found = re.search(r"\(at line (\d+), column \d+\)", message)
-    place = f"{where}:{found[1]}" if found else where
+    match = re.search(r"\(at line (\d+), column \d+\)", message)
+    place = f"{where}:{match[1]}" if match else where
     return UsageError(f"not valid TOML: {message}", where=place, rule=_KIND)
 
 

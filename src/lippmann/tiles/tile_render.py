@@ -179,13 +179,13 @@ def packed(prepared: Prepared, traced: TracedTile) -> TileResult:
 def lens_sums(display: Display, window: PixelWindow, errors: PixelErrors) -> dict[str, Pixels]:
     """Sums over the part of each micro-image that lies in the tile."""
     lenses, owner, pixels = np.unique(_owners(display, window), return_inverse=True, return_counts=True)
-    found: dict[str, Pixels] = {LENSES: lenses}
+    layers: dict[str, Pixels] = {LENSES: lenses}
     for before, each in (("", errors), (OF_SAMPLES, errors.samples)):
         if each is not None:
             sums = ErrorSums.none(len(lenses), pixels)
             sums.add(owner, each)
-            found |= {before + name: getattr(sums, name) for name in SUMS}
-    return found
+            layers |= {before + name: getattr(sums, name) for name in SUMS}
+    return layers
 
 
 def _owners(display: Display, window: PixelWindow) -> NDArray[np.int64]:

@@ -93,5 +93,5 @@ class PictureWidget(anywidget.AnyWidget):
         with ThreadPoolExecutor(usable_cores()) as pool:
             files = list(pool.map(lambda place: image_tiles.png(*place), places))
         keys = [f"{layer}/{column}_{row}" for layer, column, row in places]
-        shown = dict(zip(keys, files, strict=True))
-        super().__init__(description=description, tiles=shown, light=lens_light(image.display))
+        tiles = dict(zip(keys, files, strict=True))
+        super().__init__(description=description, tiles=tiles, light=lens_light(image.display))

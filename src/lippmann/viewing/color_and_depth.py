@@ -28,7 +28,7 @@ from lippmann.viewing.replay import Eye, default_eye, default_size, replay
 RGBD_FILES, DEPTH_FILES = (".png", ".tif", ".tiff"), (".exr", ".tif", ".tiff", ".png", ".pfm")
 
 
-def distance_seen(image: IntegralImage, eye: Eye | None = None, size: tuple[int, int] | None = None) -> FloatArray:
+def visible_distance(image: IntegralImage, eye: Eye | None = None, size: tuple[int, int] | None = None) -> FloatArray:
     """Distance ``(h, w)`` in mm from the eye along the display's axis; infinite where nothing is hit.
 
     Raises
@@ -91,7 +91,7 @@ def rgbd_codes(
     width, height = default_size(image.display) if size is None else size
     width += width % 2  # so that halves are whole columns
     color = quantize(replay(image, eye, size=(width, height)), bits, image.provenance.transfer)
-    distance = distance_seen(image, eye, (width, height))
+    distance = visible_distance(image, eye, (width, height))
     near, far = range_of(distance) if between is None else between
     depth = depth_codes(distance, near, far, bits, form.white)
     if form.half:

@@ -20,10 +20,10 @@ def shades_of_depth(image: IntegralImage) -> tuple[IntegralImage, tuple[float, f
 
     Shades are display codes, from 0.15 for the farthest surface to 1 for the nearest; 0 where nothing is seen.
     """
-    seen = image.pixels != 0.0
-    if not seen.any():
+    visible = image.pixels != 0.0
+    if not visible.any():
         return image, (0.0, 0.0)
-    shades, (low, high) = height_shades(image.pixels, seen)
+    shades, (low, high) = height_shades(image.pixels, visible)
     options = {**image.provenance.options, "depth_shades": [low, high]}
     provenance = replace(image.provenance, transfer="linear", options=options)
     return image.with_pixels(shades, provenance=provenance), (low, high)
@@ -31,5 +31,5 @@ def shades_of_depth(image: IntegralImage) -> tuple[IntegralImage, tuple[float, f
 
 def legend(shades: IntegralImage, heights: tuple[float, float]) -> NDArray[np.float32]:
     """What the central eye sees of :func:`shades_of_depth`, ``(height, width, 3)``, beside a bar with heights in mm."""
-    seen = shades.replay()
-    return np.ascontiguousarray(np.concatenate([seen, height_legend(len(seen), heights)], axis=1))
+    picture = shades.replay()
+    return np.ascontiguousarray(np.concatenate([picture, height_legend(len(picture), heights)], axis=1))

@@ -99,7 +99,7 @@ def _gathered(image: Picture, light: EyeLight, eye: Eye, size: tuple[int, int], 
     lines = np.empty((0, 0, 2))
     if is_line:
         place[..., 0] += lattice.across(center_x, center_y)
-        _, middle = display.pixel_coordinates(*display.panel_point_seen_by(*eye, x, y, NUMPY))
+        _, middle = display.pixel_coordinates(*display.visible_panel_point(*eye, x, y, NUMPY))
         half = 0.5 * max(1.0, panel.height / size[1])
         lines = np.stack([middle - half, middle + half], axis=-1)
         first, last = float(lines.min()), float(lines.max())

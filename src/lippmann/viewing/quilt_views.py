@@ -81,9 +81,9 @@ def replay_quilt(
         position = np.clip((0.5 - place) * count - 0.5, 0.0, count - 1.0)
         first = np.floor(position if linear else position + 0.5).astype(np.intp)
         share = (position - first if linear else np.zeros_like(position))[..., None]
-        seen = _sample(views, first, x, y, display)
+        near_view = _sample(views, first, x, y, display)
         following = _sample(views, np.minimum(first + 1, count - 1), x, y, display)
-        picture[rows] = seen + (following - seen) * share.astype(np.float32)
+        picture[rows] = near_view + (following - near_view) * share.astype(np.float32)
     return picture
 
 

@@ -164,7 +164,7 @@ def _line_of_sight(
     column, row = i.astype(np.intp), j.astype(np.intp)
     rows = display.lens_grid.rows
     if display.lens_array.layout == "lenticular":
-        panel_point = display.panel_point_seen_by(*eye, lens_x, lens_y, NUMPY)
+        panel_point = display.visible_panel_point(*eye, lens_x, lens_y, NUMPY)
         row, rows = pixel_at(display.pixel_coordinates(*panel_point)[1]), display.panel.height
     inside = (column >= 0) & (column < display.lens_grid.columns) & (row >= 0) & (row < rows)
     return np.where(inside, row, 0), np.where(inside, column, 0), inside

@@ -1,7 +1,7 @@
 """Replay: the picture that an eye in front of the display sees.
 
 Through a point of the lens plane the eye sees one point of the panel
-(:meth:`lippmann.display.Display.panel_point_seen_by`). A round lens is filled with one colour, a cylindrical one has
+(:meth:`lippmann.display.Display.visible_panel_point`). A round lens is filled with one colour, a cylindrical one has
 one colour across. Outside the display's field of view a lens shows a pixel of its neighbour's micro-image, as on a real
 display.
 
@@ -85,7 +85,7 @@ def replay(
     subpixels = image.provenance.subpixels if subpixels is None else subpixels
     picture = np.empty((height, width, 3), dtype=np.float32)
     for rows, x, y in lens_plane_points(image.display, width, height):
-        panel_x, panel_y = image.display.panel_point_seen_by(*eye, x, y, NUMPY)
+        panel_x, panel_y = image.display.visible_panel_point(*eye, x, y, NUMPY)
         picture[rows] = _panel_colors(image, panel_x, panel_y, filter, subpixels)
     return picture
 

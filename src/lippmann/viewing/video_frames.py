@@ -90,8 +90,8 @@ def view_of_quilt(quilt: Quilt, number: int) -> FloatArray:
     """
     width, height = quilt.view_size
     aspect = quilt.layout.aspect or width / height
-    shown = min(width, height * aspect, DEFAULT_WIDTH)
-    return _resized(quilt.view(number), max(1, round(shown)), max(1, round(shown / aspect)))
+    view_width = min(width, height * aspect, DEFAULT_WIDTH)
+    return _resized(quilt.view(number), max(1, round(view_width)), max(1, round(view_width / aspect)))
 
 
 def quilt_of_video(quilt: Quilt, widest: int = WIDEST_QUILT) -> Pixels:

@@ -10,7 +10,7 @@ from PIL import Image as Pillow
 
 import lippmann
 from lippmann.display import Display, LensArray, Panel
-from lippmann.display.seen_pixels import EyeMap
+from lippmann.display.visible_pixels import EyeMap
 from lippmann.errors import UsageError
 from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.live.eye_preview import render_eye_preview
@@ -85,7 +85,7 @@ def test_a_denoiser_that_is_asked_for_is_there_or_missed_at_once(teapot, monkeyp
 
 
 def test_every_pixel_is_traced_once_and_what_lies_past_the_panel_not_at_all():
-    seen = EyeMap(DISPLAYS["hexagonal"], (200, 125), subpixels=False).seen_by((900.0, 0.0, 300.0))
+    seen = EyeMap(DISPLAYS["hexagonal"], (200, 125), subpixels=False).pixels_for_eye((900.0, 0.0, 300.0))
     assert len(np.unique(np.stack([seen.column, seen.row]), axis=1).T) == len(seen.column)
     assert seen.number.max() == len(seen.column) - 1
     assert (seen.number == -1).any()

@@ -104,7 +104,7 @@ def test_a_camera_sees_its_own_part_of_the_cone(distance, slant):
         rng = np.random.default_rng(number)
         x, y = (rng.uniform(-side / 2, side / 2, 50) for side in display.size_mm)
         far = min(distance, 1e9)
-        seen = display.panel_point_seen_by(far * tangent, 0.0, far, x, y, NUMPY)
+        seen = display.visible_panel_point(far * tangent, 0.0, far, x, y, NUMPY)
         # Level cameras: off the lens's axis the height counts, which the weaving takes from the lens plane.
         np.testing.assert_allclose(view_fraction(display, *seen), (number + 0.5) / views, atol=1e-6)
 

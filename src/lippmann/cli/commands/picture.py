@@ -292,7 +292,7 @@ def _replay_depth(
     image = read_picture(picture, display=display)
     position = None if eye is None else triple(eye, "--eye")
     pixels = None if size is None else parse.size(size, "--size")
-    distance = rgbd.distance_seen(image, position, pixels)
+    distance = rgbd.visible_distance(image, position, pixels)
     near, far = rgbd.range_of(distance)
     if form == "depth":
         rgbd.write_depth(distance, path)

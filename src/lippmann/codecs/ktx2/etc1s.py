@@ -212,13 +212,13 @@ def _slice_kernel(
                     if repeats:
                         repeats -= 1
                     else:
-                        found = take_symbol(data, at, predictions)
-                        if found < 0 or found > _REPEAT_PREDICTION:
+                        prediction = take_symbol(data, at, predictions)
+                        if prediction < 0 or prediction > _REPEAT_PREDICTION:
                             return _DAMAGED
-                        if found == _REPEAT_PREDICTION:
+                        if prediction == _REPEAT_PREDICTION:
                             repeats = take_long(data, at, _REPEATS_BITS) + _LEAST_REPEATS - 1
                         else:
-                            symbol = found
+                            symbol = prediction
                     kinds = symbol
                     predicted[x] = symbol >> 4
             kind = kinds & 3

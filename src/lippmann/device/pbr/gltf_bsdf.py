@@ -327,7 +327,7 @@ def _bsdf_class(variant: str) -> type[BSDF]:
         def _body(self, point: Point, wo: Vector3f, above: Bool) -> tuple[Color3f, Float]:
             """All below the clear coat; ``wo`` is in the lobe's frame and leaves ``above`` the surface or below it."""
             m, lobe = self.model, point.lobe
-            seen = (lobe.wi.z > 0) & ((wo.z > 0) == above) & (wo.z != 0)
+            is_visible = (lobe.wi.z > 0) & ((wo.z > 0) == above) & (wo.z != 0)
             mirrored = mi.Vector3f(wo.x, wo.y, dr.abs(wo.z))
 
             gloss, gloss_pdf, cosine, h = self._gloss(lobe, mirrored)
@@ -341,7 +341,7 @@ def _bsdf_class(variant: str) -> type[BSDF]:
             if point.sheen is not None:
                 value = self._under_cloth(point.sheen, value, lobe.wi.z, mirrored.z, h.z)
             if m.transmission is None:
-                return value & (seen & above), pdf & (seen & above)
+                return value & (is_visible & above), pdf & (is_visible & above)
 
             if m.solid:
                 gloss, gloss_pdf, cosine = self._refraction(point, wo)
@@ -350,7 +350,7 @@ def _bsdf_class(variant: str) -> type[BSDF]:
                 reflects = reflecting_chance(self.model, point, metal, dielectric)
             through = entering * (point.transmission * point.gain * gloss)
             through_pdf = (1 - point.diffuse_chance) * (1 - reflects) * gloss_pdf
-            return dr.select(above, value, through) & seen, dr.select(above, pdf, through_pdf) & seen
+            return dr.select(above, value, through) & is_visible, dr.select(above, pdf, through_pdf) & is_visible
 
         def _under_cloth(self, sheen: Sheen, value: Spectrum, cos_i: Float, cos_o: Float, cos_h: Float) -> Color3f:
             """``value`` dimmed by the fibres above it, and their own light."""

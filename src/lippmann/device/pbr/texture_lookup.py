@@ -43,17 +43,17 @@ class Place:
     def __init__(self, si: SurfaceInteraction3f, active: Bool) -> None:
         self.si = si
         self.active = active
-        self._found: dict[str, Array] = {}
+        self._cache: dict[str, Array] = {}
 
     @property
     def member(self) -> UInt32:
         """Number in the family (UInt32)."""
         import mitsuba as mi
 
-        if MEMBER_ATTRIBUTE not in self._found:
+        if MEMBER_ATTRIBUTE not in self._cache:
             number = self.si.shape.eval_attribute_1(MEMBER_ATTRIBUTE, self.si, self.active)
-            self._found[MEMBER_ATTRIBUTE] = mi.UInt32(number + 0.5)
-        return self._found[MEMBER_ATTRIBUTE]
+            self._cache[MEMBER_ATTRIBUTE] = mi.UInt32(number + 0.5)
+        return self._cache[MEMBER_ATTRIBUTE]
 
     @property
     def color(self) -> Color3f:
@@ -76,10 +76,10 @@ class Place:
 
         if attribute is None:
             return self.si.uv
-        if attribute not in self._found:
+        if attribute not in self._cache:
             carried = self.si.shape.eval_attribute_3(attribute, self.si, self.active)
-            self._found[attribute] = mi.Point2f(carried.x, carried.y)
-        return self._found[attribute]
+            self._cache[attribute] = mi.Point2f(carried.x, carried.y)
+        return self._cache[attribute]
 
 
 # The classes below are dataclasses so that Dr.Jit finds the arrays in them when it records or freezes a function.
@@ -196,7 +196,7 @@ class PooledBitmap:
     first: Table
     width: Table
     height: Table
-    shown: tuple[int, ...]
+    channels: tuple[int, ...]
     coded: bool
     sampler: Sampler
 
@@ -225,7 +225,7 @@ class PooledBitmap:
 
         index = self.first.at(place) + mi.UInt32(row) * mi.UInt32(self.width.at(place)) + mi.UInt32(column)
         packed = dr.gather(mi.UInt32, self.pool.texels, index, place.active)
-        codes = [(packed >> (8 * channel)) & 255 for channel in self.shown]
+        codes = [(packed >> (8 * channel)) & 255 for channel in self.channels]
         if self.coded:
             values = [dr.gather(mi.Float, self.pool.linear, code, place.active) for code in codes]
         else:

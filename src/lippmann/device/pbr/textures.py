@@ -125,7 +125,7 @@ class TextureStore:
             first=Table(mi.UInt32(first)),
             width=Table(mi.Float(sizes[:, 1])),
             height=Table(mi.Float(sizes[:, 0])),
-            shown=channels,
+            channels=channels,
             coded=_is_coded(textures[0], channels),
             sampler=sampler,
         )

@@ -75,12 +75,12 @@ def make_table(splats: Splats, memory: int, *, name: str = "") -> SplatTable | N
             rule=f"{memory / 2**30:.1f} GiB are left",
             fix="allow more with memory=..., or leave faint ones out with min_opacity=...",
         )
-    seen = np.flatnonzero(splats.opacities > LEAST_ALPHA)
-    if not len(seen):
+    visible = np.flatnonzero(splats.opacities > LEAST_ALPHA)
+    if not len(visible):
         return None
-    rows, boxes = np.empty((len(seen), 13), np.float32), np.empty((len(seen), 2, 3), np.float32)
-    for start in range(0, len(seen), _AT_A_TIME):
-        part = seen[start : start + _AT_A_TIME]
+    rows, boxes = np.empty((len(visible), 13), np.float32), np.empty((len(visible), 2, 3), np.float32)
+    for start in range(0, len(visible), _AT_A_TIME):
+        part = visible[start : start + _AT_A_TIME]
         scales = splats.scales[part].astype(np.float64)
         scales = np.maximum(scales, np.maximum(_FLATTEST * scales.max(axis=1, keepdims=True), 1e-30))
         turns = rotation_matrices(splats.rotations[part])
@@ -94,5 +94,5 @@ def make_table(splats: Splats, memory: int, *, name: str = "") -> SplatTable | N
         rows[own, :3], rows[own, 12] = centers, opacities
         rows[own, 3:12] = (turns.transpose(0, 2, 1) / scales[:, :, None]).reshape(-1, 9)
         boxes[own, 0], boxes[own, 1] = centers - half, centers + half
-    harmonics = np.ascontiguousarray(splats.harmonics[seen].transpose(0, 2, 1))
+    harmonics = np.ascontiguousarray(splats.harmonics[visible].transpose(0, 2, 1))
     return SplatTable(rows, harmonics, make_bvh(boxes), splats.linear)

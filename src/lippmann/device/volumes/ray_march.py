@@ -202,7 +202,7 @@ def _composite(
             before, is_known = 0.0, False
             while number < steps and left > _OPAQUE:
                 # The brick in which the step begins, and how far it reaches.
-                is_seen = True
+                may_be_visible = True
                 leaves = np.inf
                 for k in range(3):
                     place = start[k] + (number + _INTO) * step * d[k]
@@ -219,8 +219,8 @@ def _composite(
                     if after > number:
                         number = after
                         is_known = False
-                        is_seen = False
-                if not is_seen:
+                        may_be_visible = False
+                if not may_be_visible:
                     continue
                 begins = number * step
                 stops = min(begins + step, far - near)

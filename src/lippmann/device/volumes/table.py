@@ -127,8 +127,8 @@ def _occupied(
     bricks = [max(1, -(-(count - 1) >> BRICK_BITS)) for count in grid.shape]
     occupied = np.empty(bricks, np.bool_)
     # The number of bins below each edge that are seen: between any two edges something is seen if it differs.
-    seen = np.concatenate([[0], np.cumsum(coefficient > 0.0)])
-    _find_occupied(grid, seen, bin_scale, bin_offset, occupied)
+    visible_below = np.concatenate([[0], np.cumsum(coefficient > 0.0)])
+    _find_occupied(grid, visible_below, bin_scale, bin_offset, occupied)
     return occupied
 
 
@@ -144,13 +144,13 @@ def bin_of(value: float, bins: int) -> int:
 @compiled
 def _find_occupied(
     grid: NDArray[np.generic],
-    seen: NDArray[np.int64],
+    visible_below: NDArray[np.int64],
     bin_scale: float,
     bin_offset: float,
     occupied: NDArray[np.bool_],
 ) -> None:
     depth, height, width = grid.shape
-    bins = len(seen) - 3
+    bins = len(visible_below) - 3
     side = 1 << BRICK_BITS
     for bz in range(occupied.shape[0]):
         for by in range(occupied.shape[1]):
@@ -163,4 +163,4 @@ def _find_occupied(
                             value = grid[z, y, x]
                             low, high = min(low, value), max(high, value)
                 a, b = low * bin_scale + bin_offset, high * bin_scale + bin_offset
-                occupied[bz, by, bx] = seen[bin_of(b, bins) + 1] > seen[bin_of(a, bins)]
+                occupied[bz, by, bx] = visible_below[bin_of(b, bins) + 1] > visible_below[bin_of(a, bins)]

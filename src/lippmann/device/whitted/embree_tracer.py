@@ -109,11 +109,11 @@ class EngineTracer:
             pi = self._all.ray_intersect_preliminary(ray, coherent=False, active=active)
             active &= pi.is_valid()
             met = start + pi.t
-            found = self._index(self._all, pi)
-            group = dr.gather(mi.Float, self._groups, found, active)
+            nearest = self._index(self._all, pi)
+            group = dr.gather(mi.Float, self._groups, nearest, active)
             kept = self._clipping.keeps(group, o + d * met, active)
             if kept:
-                index, uv, distance = found, mi.Point2f(pi.prim_uv), met
+                index, uv, distance = nearest, mi.Point2f(pi.prim_uv), met
             start = _past(o, d, met)
             crossed += 1
             active &= ~kept & (crossed < MAX_CROSSINGS)

@@ -140,14 +140,14 @@ def _quadric(inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Cross
     # Neither root loses digits to cancellation; a cone's a may vanish.
     q = -(b + dr.copysign(dr.sqrt(discriminant), b))
     s1, s2 = q / a, c / q
-    found = []
+    roots = []
     for s in (smaller(s1, s2), larger(s1, s2)):
         along = h + s * dh
         good = (discriminant > 0) & (along > row.low) & (along < row.high)
         if inside_only:
             good &= (row.inside == 0) | (a * s + b > 0)
-        found.append(Crossing(to_foot + s, good))
-    return found
+        roots.append(Crossing(to_foot + s, good))
+    return roots
 
 
 def _box(inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]:

@@ -96,9 +96,9 @@ def make_light_buffer(table: ShapeTable, lights: Sequence[ClassicLight]) -> Ligh
     views: list[_View] = []
     of_light = []
     for light in lights:
-        seen = _views(light, shapes)
-        of_light.append((len(views), len(seen)))
-        views += seen
+        light_views = _views(light, shapes)
+        of_light.append((len(views), len(light_views)))
+        views += light_views
         if len(views) > MOST_GRIDS:
             return None
     side = _affordable_side(views)

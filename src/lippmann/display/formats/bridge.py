@@ -59,12 +59,12 @@ class Bridge:
         payload = _inner(self.ask("available_output_devices"), "payload")
         entries = payload if isinstance(payload, Mapping) else {}
         devices = [_inner(entries, key) for key in entries]
-        found = [_panel(each) for each in devices if isinstance(each, Mapping) and "LKG" in _text(each, "hwid")]
-        if not found:
+        panels = [_panel(each) for each in devices if isinstance(each, Mapping) and "LKG" in _text(each, "hwid")]
+        if not panels:
             raise DisplayError(
                 "Looking Glass Bridge finds no panel", fix="connect one, and look whether Bridge lists it"
             )
-        return found
+        return panels
 
     @staticmethod
     def _put(endpoint: str, values: JsonObject) -> Mapping[str, object]:

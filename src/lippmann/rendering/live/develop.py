@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import quantize
-from lippmann.display.seen_pixels import PixelSet
+from lippmann.display.visible_pixels import PixelSet
 from lippmann.rendering.request.render_request import RenderRequest
 
 Floats = NDArray[np.float32]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from lippmann.display import Display
-from lippmann.display.seen_pixels import EyeMap, Floats, Vector
+from lippmann.display.visible_pixels import EyeMap, Floats, Vector
 from lippmann.options.choices import POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
@@ -55,7 +55,7 @@ def render_eye_preview(
     """
     resolved = resolve(replace(request, method="full"), scene, display)
     width, height = display.panel.size_inside(*(size or (LONGER_SIDE, LONGER_SIDE)))
-    visible = EyeMap(display, (width, height), subpixels=bool(resolved.subpixels)).seen_by(eye)
+    visible = EyeMap(display, (width, height), subpixels=bool(resolved.subpixels)).pixels_for_eye(eye)
     samples = _choose_samples(request, resolved, len(visible.column))
     denoises = _denoises(request, resolved, scene)
     # The eye's view is denoised, not the traced pixels.

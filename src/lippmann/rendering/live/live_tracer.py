@@ -19,7 +19,7 @@ from lippmann.device.frozen_kernel import Frozen, aligned
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
 from lippmann.device.types import Array, Float, Float64, Ray3f, UInt32
 from lippmann.display import Display
-from lippmann.display.seen_pixels import PixelSet
+from lippmann.display.visible_pixels import PixelSet
 from lippmann.rendering.film.wavefront import finite_or_black
 from lippmann.rendering.transport.first_surface import Surfaces
 from lippmann.rendering.transport.path import PathIntegrator

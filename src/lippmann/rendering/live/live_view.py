@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.display.seen_pixels import EyeMap, PixelSet
+from lippmann.display.visible_pixels import EyeMap, PixelSet
 from lippmann.errors import UsageError
 from lippmann.options.light import LightOptions
 from lippmann.rendering.request.render_request import RenderRequest

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.display.seen_pixels import window_pixels
+from lippmann.display.visible_pixels import window_pixels
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.choices import POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
@@ -69,7 +69,7 @@ class LiveRenderer:
         self._display = display
         # Caches for the eyes of some pages, and for the whole panel in motion and at rest.
         self._map = lru_cache(4)(lambda kind, *of, subpixels: kind(*of, subpixels=subpixels))
-        self._visible = lru_cache(4)(lambda map, eye: map.seen_by(eye))
+        self._visible = lru_cache(4)(lambda map, eye: map.pixels_for_eye(eye))
         self._window = lru_cache(2)(window_pixels)
         self._latest: PlacedView | None = None
         self._height: Floats = np.zeros(0, np.float32)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.pbr import BuiltScene
 from lippmann.display import Display
-from lippmann.display.view_cone import size_seen, zone_slopes
+from lippmann.display.view_cone import visible_size, zone_slopes
 from lippmann.rendering.transport.first_surface import make_surfaces
 from lippmann.rendering.transport.ray_source import world_ray
 from lippmann.rendering.transport.tuning import TUNING
@@ -118,7 +118,7 @@ def find_cut_edges(
 def _edge(display: Display) -> Reals:
     """Points ``(side, ray, 2)`` of the lens plane half a pixel within the panel's edge, in mm."""
     rays = TUNING.probe_side
-    half_width, half_height = (np.array(size_seen(display)) - display.panel.pixel_pitch) / 2.0
+    half_width, half_height = (np.array(visible_size(display)) - display.panel.pixel_pitch) / 2.0
     along = (np.arange(rays) + 0.5) * (2.0 / rays) - 1.0
     upright = [np.stack([np.full(rays, x), along * half_height], axis=-1) for x in (-half_width, half_width)]
     level = [np.stack([along * half_width, np.full(rays, y)], axis=-1) for y in (-half_height, half_height)]

@@ -131,10 +131,10 @@ def _read_up(header: Header, comments: list[str]) -> None:
     """
     is_of_brush = any("exported from brush" in comment.lower() for comment in comments)
     for comment in comments:
-        found = _VERTICAL.match(comment)
-        if found is None:
+        match = _VERTICAL.match(comment)
+        if match is None:
             continue
-        value = found[1].strip().lower()
+        value = match[1].strip().lower()
         axis = _AXIS.match(value)
         numbers = _NUMBERS.findall(value)
         if axis is not None:

@@ -22,7 +22,7 @@ _FOREIGN = re.compile(r"[^-+.0-9eE]").search  # what no number holds
 _WORD = re.compile(r"\S+")
 _BREAK = re.compile("\n")
 _ONE, _THREE = struct.Struct("=f"), struct.Struct("=3f")
-_LONGEST_SHOWN = 40
+_LONGEST_QUOTED = 40
 
 FLOAT_LIMIT = float(np.finfo(np.float32).max)
 """Numbers of scene files are single precision; larger ones are refused."""
@@ -102,8 +102,8 @@ class Words:
         """The error that the next word (or the one ``back`` words ago) is not what was expected."""
         index = self._at - back
         word = self._words[index] if index < self._count else ""
-        if len(word) > _LONGEST_SHOWN:
-            word = word[:_LONGEST_SHOWN] + "..."
+        if len(word) > _LONGEST_QUOTED:
+            word = word[:_LONGEST_QUOTED] + "..."
         text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in word)
         what = f"found '{text}'" if word else "the file ends too early"
         return SceneError(what, where=self.place(back), rule=f"expected {expected}", fix=fix)

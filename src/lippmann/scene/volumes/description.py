@@ -47,8 +47,8 @@ def describe_volume(
     check_values(stored, slope, intercept, name)
     transfer = automatic(sample(stored, slope, intercept), kind)
     first, last = transfer.values[[0, -1]]
-    shown = f"shown by the transfer function '{transfer.name}', values {first:.5g} to {last:.5g} (transfer_function)"
+    note = f"shown by the transfer function '{transfer.name}', values {first:.5g} to {last:.5g} (transfer_function)"
     depth, height, width = stored.shape
     volume = Volume(stored, np.asarray(world_from_voxel, np.float64), transfer, slope, intercept)
     size = f"{width} x {height} x {depth} voxels of {' x '.join(f'{side:.3g}' for side in volume.spacing)}"
-    return SceneDescription(name, notes=[size, *notes, *([remark] if remark else []), shown], volume=volume)
+    return SceneDescription(name, notes=[size, *notes, *([remark] if remark else []), note], volume=volume)

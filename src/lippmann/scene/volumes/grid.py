@@ -118,10 +118,10 @@ def visible_corners(volume: Volume) -> Numbers:
         total = np.cumsum(share)
         if total[-1] <= 0.0:
             return _corners(volume, np.zeros(3), np.array(volume.size, float))
-        seen = np.flatnonzero((total > _OUTER * total[-1]) & (total - share < (1.0 - _OUTER) * total[-1]))
-        if not len(seen):  # opacities so faint that shares of them are nothing
+        visible = np.flatnonzero((total > _OUTER * total[-1]) & (total - share < (1.0 - _OUTER) * total[-1]))
+        if not len(visible):  # opacities so faint that shares of them are nothing
             return _corners(volume, np.zeros(3), np.array(volume.size, float))
-        low[axis], high[axis] = seen[0] * step, min((seen[-1] + 1) * step, high[axis])
+        low[axis], high[axis] = visible[0] * step, min((visible[-1] + 1) * step, high[axis])
     return _corners(volume, low, high)
 
 

@@ -201,7 +201,7 @@ vec2 bent(vec2 lens, float shift) {
 #endif
 `;
 
-// The panel point that the eye sees: Display.panel_point_seen_by and replay.py. Coordinates (u, v) are pixels of the
+// The panel point that the eye sees: Display.visible_panel_point and replay.py. Coordinates (u, v) are pixels of the
 // panel from its upper left corner.
 const SIGHTLINE = `
 flat in vec2 flatCorner;

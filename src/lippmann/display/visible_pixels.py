@@ -1,7 +1,7 @@
 """The native (sub-)pixels that an eye sees, found in milliseconds for one eye after the other.
 
 Which lens covers a place of the picture does not depend on the eye. It is found once; for each eye there remains a
-line through the lens's centre, see :meth:`lippmann.display.Display.panel_point_seen_by`.
+line through the lens's centre, see :meth:`lippmann.display.Display.visible_panel_point`.
 """
 
 from __future__ import annotations
@@ -74,8 +74,8 @@ class PixelSet:
         if self.blocks is None:
             return picture
         values = np.zeros((len(self.column), 3), np.float32)
-        shown = self.blocks >= 0
-        values[self.blocks[shown]] = picture[shown]
+        covered = self.blocks >= 0
+        values[self.blocks[covered]] = picture[covered]
         return self.arrange(values)
 
 
@@ -109,7 +109,7 @@ class EyeMap:
         cells = panel.subpixel_cells if subpixels else None
         self._cells = np.array(offsets[None, None] if cells is None else cells, np.float64)
 
-    def seen_by(self, eye: Vector) -> PixelSet:
+    def pixels_for_eye(self, eye: Vector) -> PixelSet:
         """The pixels seen by an eye at ``eye`` (mm in the display's frame, z > 0)."""
         panel = self.display.panel
         scale = self.display.gap / float(eye[2])
@@ -124,19 +124,19 @@ class EyeMap:
             column = np.floor(u - right + _ON_BOUNDARY).astype(np.int64)
             row = np.floor(v - down + _ON_BOUNDARY).astype(np.int64)
         channels = self._cells.shape[2]
-        is_seen = (column >= 0) & (column < panel.width) & (row >= 0) & (row < panel.height)
-        keys = np.where(is_seen, (row * panel.width + column) * channels + np.arange(channels), -1).ravel()
+        is_visible = (column >= 0) & (column < panel.width) & (row >= 0) & (row < panel.height)
+        keys = np.where(is_visible, (row * panel.width + column) * channels + np.arange(channels), -1).ravel()
         place = np.arange(len(keys), dtype=np.int32)
         # Of several places that show one pixel the first is written last.
         self._first[keys[::-1]] = place[::-1]
         first = self._first[keys]
-        is_first = (first == place) & is_seen.ravel()
-        number = (np.cumsum(is_first, dtype=np.int32) - 1)[first].reshape(is_seen.shape)
-        number[~is_seen] = -1
-        found = keys[is_first]
-        if len(found) < 2:
-            found = np.append(found, np.zeros(2 - len(found), np.int64))
-        return _pixel_set(found, number, panel.width, self._blocks(number))
+        is_first = (first == place) & is_visible.ravel()
+        number = (np.cumsum(is_first, dtype=np.int32) - 1)[first].reshape(is_visible.shape)
+        number[~is_visible] = -1
+        visible = keys[is_first]
+        if len(visible) < 2:
+            visible = np.append(visible, np.zeros(2 - len(visible), np.int64))
+        return _pixel_set(visible, number, panel.width, self._blocks(number))
 
     def _nearest(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Columns and rows of the pixels whose sub-pixels have the nearest centres; -1 where none is on the panel."""
