@@ -23,9 +23,9 @@ HELP = {"annotated_doc", "lippmann", "shellingham", "typer"}
 RENDER = HELP | {"cffi", "cython_runtime", "drjit", "imagecodecs", "mitsuba", "numpy", "psutil", "pycparser", "pyoidn"}
 BUDGETS = {
     "--help": (HELP, 23),
-    "preview teapot": (RENDER, 282),
-    "render teapot": (RENDER, 277),
-    "render model.glb": (RENDER, 294),
+    "preview teapot": (RENDER, 211),
+    "render teapot": (RENDER, 221),
+    "render model.glb": (RENDER, 244),
 }
 
 

@@ -14,7 +14,7 @@ from typing import Literal, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.codecs import exr, png, tiff, zarr_array
+from lippmann.codecs import png, tiff
 from lippmann.codecs.icc import srgb_profile
 from lippmann.color.transfer import Transfer, dequantize, quantize
 from lippmann.display import Display
@@ -130,6 +130,8 @@ def encode_tiles(
     """
     side = tiff.TILE
     if name == "zarr":
+        from lippmann.codecs import zarr_array
+
         places = (window.slices for window in TileGrid(*size, side))
         zarr_array.write_zarr(path, zip(places, tiles, strict=True), size=size, side=side, dtype=dtype, text=text)
         return
@@ -177,6 +179,8 @@ def encode_values(
         encoded = png.encode_png(values, text=texts, pixel_pitch=pixel_pitch, srgb=transfer == "srgb", icc=icc)
         path.write_bytes(encoded)
     elif name == "exr":
+        from lippmann.codecs import exr
+
         exr.write_exr(path, _channels(layers), text=texts, pixel_pitch=pixel_pitch)
     elif is_tiled(name, size):
         tiles = tiles_of_rows(lambda first, last: values[first:last], size)

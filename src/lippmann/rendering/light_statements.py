@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.request.tuning import TUNING
 from lippmann.scene.values.description import Color
 
 if TYPE_CHECKING:
+    from lippmann.rendering.estimate.psnr import Estimate
     from lippmann.rendering.film.wavefront import RayTotals
 
 #: Least share of pixels that show the scene; pictures below it carry a warning.

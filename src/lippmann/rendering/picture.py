@@ -11,7 +11,6 @@ import numpy as np
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.display.view_cone import panel_window
-from lippmann.image import IntegralImage
 from lippmann.options.choices import REUSING
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.request.plan import resolve
@@ -23,6 +22,7 @@ from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Color
 
 if TYPE_CHECKING:
+    from lippmann.image.integral_image import IntegralImage
     from lippmann.rendering.film.wavefront import Frame
 
 
@@ -60,8 +60,10 @@ def render_picture(
     placement = session.place(stands_as or display)
 
     # Mitsuba may be loaded now that the engine has chosen its libraries.
+    from lippmann.image.integral_image import IntegralImage
     from lippmann.rendering.film.aov import plan_layers, trace_layers
-    from lippmann.rendering.methods import Job, trace
+    from lippmann.rendering.job import Job
+    from lippmann.rendering.methods import trace
     from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 
     display_from_world = placement.display_from_world

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.image import Provenance
+from lippmann.image.provenance import Provenance
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
@@ -46,7 +46,8 @@ def render_preview(
     session = open_session(scene, request, size, progress=progress)
     pose = scene.camera(camera)
 
-    from lippmann.rendering.methods import Job, trace_unjudged
+    from lippmann.rendering.job import Job
+    from lippmann.rendering.methods import trace_unjudged
     from lippmann.rendering.transport.ray_source import CameraRays, OnePicture
     from lippmann.rendering.transport.whitted_camera import WhittedCameraRays
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.display.view_cone import view_window
-from lippmann.image import Provenance
+from lippmann.image.provenance import Provenance
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.picture import placed_options
 from lippmann.rendering.request.plan import resolve
@@ -72,7 +72,8 @@ def render_quilt(
 
     from lippmann.device.pbr import BuiltScene
     from lippmann.device.pbr.scene import scene_corners
-    from lippmann.rendering.methods import Job, trace
+    from lippmann.rendering.job import Job
+    from lippmann.rendering.methods import trace
     from lippmann.rendering.transport.ray_source import QuiltRays
 
     display_from_world = placement.display_from_world

@@ -25,7 +25,6 @@ from lippmann.options.quality import QualityOptions
 from lippmann.options.texts import settings_of
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
-from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.light_statements import light_notes, stated_error, visible_share, warn_of_emptiness
 from lippmann.rendering.request.plan import follow
@@ -43,6 +42,7 @@ if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
     from lippmann.device.whitted.scene import BuiltClassic
     from lippmann.options.placement import PlacementOptions
+    from lippmann.rendering.estimate.psnr import Estimate
     from lippmann.rendering.film.wavefront import Frame
     from lippmann.rendering.transport.integrator import Integrator
     from lippmann.rendering.transport.ray_source import RaySource

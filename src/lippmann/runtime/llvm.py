@@ -18,7 +18,6 @@ from pathlib import Path
 from lippmann.errors import EngineError
 from lippmann.runtime.child_python import python_command
 from lippmann.runtime.library_file import VERSION_IN_NAME, Host, elf_head, kind_of
-from lippmann.runtime.llvm_install import remedy
 
 #: Environment variable with the path of Dr.Jit's library; users may set it to force one.
 PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
@@ -53,6 +52,8 @@ class Library:
 
 def install_command() -> str:
     """Command that installs a suitable LLVM library on this system, or a sentence where none is known."""
+    from lippmann.runtime.llvm_install import remedy
+
     return remedy(OLDEST, NEWEST_TRIED).text
 
 

@@ -72,7 +72,7 @@ def farthest_points(points: Bounds) -> Bounds:
         farthest = reach[first, np.arange(len(directions))]
         index = np.where(farthest > best, start + first, index)
         best = np.maximum(farthest, best)
-    return points[np.unique(index)]
+    return points[np.flatnonzero(np.bincount(index))]
 
 
 def _may_lie_outside(points: Bounds, places: Matrix) -> NDArray[np.bool_]:

@@ -16,7 +16,6 @@ from lippmann.display.comfort import fusion_warning
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.placement import Mode, PlacementOptions
 from lippmann.scene.camera_placement import DepthProbe, frame_whole, place_by_camera
-from lippmann.scene.fit_placement import fit_scene
 from lippmann.scene.matrices import (
     Bounds,
     depth_scaling,
@@ -238,6 +237,8 @@ def _fit(
     covers: bool,
 ) -> Matrix:
     """``display_from_world`` that fits the turned scene to the display, with warnings of what that took."""
+    from lippmann.scene.fit_placement import fit_scene
+
     turned = rotation(options.turn)
     corners = transform_points(turned, box_corners(bounds)) if bounds_in is None else bounds_in(turned)
     fit = fit_scene(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,6 @@ from lippmann.runtime.engine_lock import cached_property
 from lippmann.scene.extreme_points import extreme_points_of, used_positions
 from lippmann.scene.light_options import change_environment, change_source
 from lippmann.scene.matrices import rotation_of
-from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.reflectance import emitted_luminance
 from lippmann.scene.splat_clouds import check_splats, typical_points
 from lippmann.scene.values.description import (
@@ -28,9 +28,11 @@ from lippmann.scene.values.description import (
     Mesh,
     SceneDescription,
 )
-from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.volumes.grid import check_volume, visible_corners
-from lippmann.scene.whitted.world_frame import world_bounds
+
+if TYPE_CHECKING:
+    from lippmann.scene.mitsuba_source import MitsubaSource
+    from lippmann.scene.values.whitted_scene import ClassicScene
 
 Bounds = NDArray[np.float64]
 
@@ -119,11 +121,10 @@ class Scene:
     def bounds(self) -> Bounds:
         """Lowest and highest corner ``(2, 3)`` of the box around all geometry that has an end, world units."""
         if self.description is None:
-            assert self.classic is not None
-            return world_bounds(self.classic)
-        if isinstance(self.description, MitsubaSource):
-            return self.description.bounds()
-        return bounds_of(self.description)
+            return self._classic_bounds()
+        if isinstance(self.description, SceneDescription):
+            return bounds_of(self.description)
+        return self.description.bounds()
 
     def bounds_in(self, frame: Matrix) -> Bounds:
         """The box ``(2, 3)`` along the axes of another frame: ``frame`` is the 4x4 matrix that leads there from world.
@@ -131,12 +132,17 @@ class Scene:
         Tight around the vertices of a description; around the corners of the world's box for a scene of Mitsuba's.
         """
         if self.description is None:
-            assert self.classic is not None
-            return world_bounds(self.classic, frame)
+            return self._classic_bounds(frame)
         if isinstance(self.description, SceneDescription):
             return bounds_of(self.description, frame)
         corners = box_corners(self.bounds) @ frame[:3, :3].T + frame[:3, 3]
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+    def _classic_bounds(self, frame: Matrix | None = None) -> Bounds:
+        from lippmann.scene.whitted.world_frame import world_bounds
+
+        assert self.classic is not None
+        return world_bounds(self.classic, frame)
 
     @cached_property
     def extreme_points(self) -> Bounds:
@@ -153,9 +159,9 @@ class Scene:
         """The cameras that the scene brings, in its order."""
         if self.description is None:
             return self.views
-        if isinstance(self.description, MitsubaSource):
-            return self.description.cameras()
-        return tuple(self.description.cameras)
+        if isinstance(self.description, SceneDescription):
+            return tuple(self.description.cameras)
+        return self.description.cameras()
 
     @property
     def is_unbounded(self) -> bool:
@@ -169,7 +175,7 @@ class Scene:
 
         That is the home camera, and for a scene of Mitsuba's the first sensor that it brings.
         """
-        if self.home_camera is not None or not isinstance(self.description, MitsubaSource):
+        if self.home_camera is not None or self.description is None or isinstance(self.description, SceneDescription):
             return self.home_camera
         return self.cameras[0].name if self.cameras else None
 
@@ -178,9 +184,9 @@ class Scene:
         """Whether the scene has light of its own, or an environment was asked for; see :func:`has_lights`."""
         if self.physical.environment is not None:
             return True
-        if isinstance(self.physical, MitsubaSource):
-            return self.physical.has_lights()
-        return has_lights(self.physical)
+        if isinstance(self.physical, SceneDescription):
+            return has_lights(self.physical)
+        return self.physical.has_lights()
 
     @property
     def has_physical_lights(self) -> bool:
@@ -251,7 +257,7 @@ class Scene:
     @property
     def lights(self) -> tuple[Light, ...]:
         """The light sources of a description; none of a scene of Mitsuba's, which keeps its own."""
-        if isinstance(self.physical, MitsubaSource):
+        if not isinstance(self.physical, SceneDescription):
             return ()
         changed = (change_source(light, self.light) for light in self.physical.lights)
         if self.light_moved is None:
@@ -282,7 +288,7 @@ class Scene:
     @property
     def notes(self) -> tuple[str, ...]:
         """Features that the reader ignored, and its assumptions, one line each."""
-        notes = () if isinstance(self.physical, MitsubaSource) else tuple(self.physical.notes)
+        notes = tuple(self.physical.notes) if isinstance(self.physical, SceneDescription) else ()
         return (*notes, STUDIO_NOTE) if self.in_studio else notes
 
     def camera(self, name: str | None = None) -> Camera:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lippmann.errors import UsageError
-from lippmann.scene.bundled import teapot
+from lippmann.scene.bundled import copper_teapot, teapot
 
 
 def facing_and_vertex_normals(mesh):
@@ -184,7 +184,7 @@ def test_spout_turns_toward_the_viewer():
 
 
 def test_both_forms_share_their_geometry():
-    scene, classic = teapot.describe(), teapot.make()
+    scene, classic = teapot.describe(), copper_teapot.make()
     described = []
     for instance in scene.instances:
         mesh, matrix = scene.meshes[instance.mesh], instance.world_from_mesh
@@ -201,7 +201,7 @@ def test_both_forms_share_their_geometry():
 
 
 def test_pot_stands_on_the_floor_and_within_it():
-    scene = teapot.make()
+    scene = copper_teapot.make()
     pot = scene.triangles.positions[scene.triangles.smooth].reshape(-1, 3)
     floor = scene.triangles.positions[~scene.triangles.smooth].reshape(-1, 3)
     assert pot[:, 1].min() == 0
@@ -212,7 +212,7 @@ def test_pot_stands_on_the_floor_and_within_it():
 
 
 def test_normals_are_turned_with_the_pot():
-    scene = teapot.make()
+    scene = copper_teapot.make()
     smooth = scene.triangles.smooth
     np.testing.assert_allclose(np.linalg.norm(scene.triangles.normals[smooth], axis=-1), 1, atol=1e-12)
     corners = scene.triangles.positions[smooth]

@@ -24,13 +24,13 @@ from lippmann.options.light import LightOptions
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
 from lippmann.scene.matrices import transform_points
-from lippmann.scene.mitsuba_source import MitsubaSource, with_sky
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Color, Matrix, SceneDescription
 
 if TYPE_CHECKING:
     from lippmann.device.splats.table import SplatTable
     from lippmann.device.volumes.table import VolumeTable
+    from lippmann.scene.mitsuba_source import MitsubaSource
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ def build(
     """
     if engine is None:
         engines.start()
-    if isinstance(scene.physical, MitsubaSource):
+    if not isinstance(scene.physical, SceneDescription):
         return _build_source(scene.physical, scene)
     description = replace(
         scene.physical, environment=scene.environment, background=scene.background, lights=scene.lights
@@ -175,6 +175,8 @@ def build_description(
 
 
 def _build_source(source: MitsubaSource, scene: Scene) -> BuiltScene:
+    from lippmann.scene.mitsuba_source import with_sky
+
     seconds: dict[str, float] = {}
     environment = scene.environment
     _check_light(scene.light, has_environment=environment is not None)

@@ -38,6 +38,10 @@ class Hit:
     index: UInt32
     uv: Point2f
 
+    def is_valid(self) -> Bool:
+        """Whether anything is hit."""
+        return self.index != NONE
+
 
 @dataclass
 class Surface:
@@ -118,7 +122,7 @@ class Geometry:
         if not self._table.lights:
             return mi.Bool(False), mi.UInt32(0)
         first = self._triangles + self._table.light_rows.start
-        is_light = (hit.index >= first) & (hit.index != NONE)
+        is_light = (hit.index >= first) & hit.is_valid()
         return is_light, dr.gather(mi.UInt32, self._lights, hit.index - first, is_light)
 
     def surface(self, hit: Hit, o: Point3f, d: Vector3f, active: Bool) -> Surface:

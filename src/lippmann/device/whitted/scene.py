@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
+from lippmann.device.types import Color3f, Point3f, Vector3f
+from lippmann.device.whitted.background_fog import background_color
 from lippmann.device.whitted.geometry import Geometry
 from lippmann.device.whitted.materials import MaterialTable
 from lippmann.device.whitted.shading import LightTable, Shader
@@ -23,6 +25,10 @@ class BuiltClassic:
     lights: LightTable
     shader: Shader
     seconds: float
+
+    def background_color(self, o: Point3f, d: Vector3f) -> Color3f:
+        """Colour of the background for rays from ``o`` along ``d``."""
+        return background_color(self.scene.background, o, d)
 
 
 def build_classic(scene: ClassicScene) -> BuiltClassic:

@@ -112,7 +112,7 @@ def make_light_sampler(scene: MitsubaScene, pilot: Pilot) -> LightSampler:
     where no contribution was found.
     """
     weights = emitter_weights(pilot)
-    return WeightedLightSampler(scene, weights) if len(np.unique(weights)) > 1 else SceneLightSampler(scene)
+    return WeightedLightSampler(scene, weights) if (weights != weights[:1]).any() else SceneLightSampler(scene)
 
 
 def emitter_weights(pilot: Pilot) -> NDArray[np.float64]:

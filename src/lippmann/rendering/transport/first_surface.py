@@ -13,6 +13,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lippmann.device.pbr import BuiltScene
 from lippmann.device.syntax import syntax
 from lippmann.device.types import (
     Bool,
@@ -29,14 +30,11 @@ from lippmann.device.types import (
     UInt32,
     Vector3f,
 )
-from lippmann.device.whitted.background_fog import background_color
-from lippmann.device.whitted.geometry import NONE
-from lippmann.device.whitted.scene import BuiltClassic
 from lippmann.rendering.transport.light_sampling import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import MOST_EVENTS
 
 if TYPE_CHECKING:
-    from lippmann.device.pbr import BuiltScene
+    from lippmann.device.whitted.scene import BuiltClassic
 
 #: Surfaces with a null transmittance above this are skipped, as if they were not there.
 MAX_NULL_TRANSMITTANCE = 0.5
@@ -97,7 +95,7 @@ class Surfaces(Protocol):
 
 def make_surfaces(built: BuiltScene | BuiltClassic) -> Surfaces:
     """Make the surfaces of a built scene."""
-    return WhittedSurfaces(built) if isinstance(built, BuiltClassic) else PhysicalSurfaces(built)
+    return PhysicalSurfaces(built) if isinstance(built, BuiltScene) else WhittedSurfaces(built)
 
 
 class PhysicalSurfaces:
@@ -250,20 +248,20 @@ class WhittedSurfaces:
         """As :meth:`Surfaces.first_point`."""
         o, d = self._mirror(mi.Vector3f(ray.o)), self._mirror(mi.Vector3f(ray.d))
         closest = self._built.geometry.closest(o, d, mi.Bool(True), coherent=True)
-        return closest.index != NONE, mi.Point3f(self._mirror(o + d * closest.t))
+        return closest.is_valid(), mi.Point3f(self._mirror(o + d * closest.t))
 
     def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool]:
         """As :meth:`Surfaces.features`, of the first surface whatever it is."""
         o, d = self._mirror(mi.Vector3f(ray.o)), self._mirror(mi.Vector3f(ray.d))
         first = self._first_hit(o, d)
-        behind = dr.clip(background_color(self._built.scene.background, o, d), 0, 1)
+        behind = dr.clip(self._built.background_color(o, d), 0, 1)
         distance = dr.select(first.hit, dr.norm(mi.Point3f(first.p) - mi.Point3f(ray.o)), ENVIRONMENT_DISTANCE)
         return dr.select(first.hit, first.albedo, behind), first.n, distance, first.hit
 
     def _first_hit(self, o: Vector3f, d: Vector3f) -> SurfaceHit:
         built = self._built
         closest = built.geometry.closest(o, d, mi.Bool(True), coherent=True)
-        hit = closest.index != NONE
+        hit = closest.is_valid()
         is_light, light = built.geometry.find_light(closest)
         is_light &= hit
         on_surface = hit & ~is_light

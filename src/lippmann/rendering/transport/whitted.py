@@ -18,8 +18,8 @@ import mitsuba as mi
 from lippmann.device.sobol import SampleStream
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Array, Bool, Color3f, Float, Ray3f, UInt32, Vector3f
-from lippmann.device.whitted.background_fog import background_color, clearness
-from lippmann.device.whitted.geometry import FAR, NONE, Hit, Surface
+from lippmann.device.whitted.background_fog import clearness
+from lippmann.device.whitted.geometry import FAR, Hit, Surface
 from lippmann.device.whitted.materials import LEAST, Finish
 from lippmann.device.whitted.scene import BuiltClassic
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
@@ -137,7 +137,7 @@ class WhittedIntegrator:
     ) -> tuple[Color3f, UInt32, Bool, tuple[_Ray, _Ray]]:
         """Weighted local radiance; count of shadow rays; view dependence; the reflected and the transmitted ray."""
         built, shading = self._built, self._scene.shading
-        on_surface = active & (hit.index != NONE)
+        on_surface = active & hit.is_valid()
         is_light, light = built.geometry.find_light(hit)
         is_light &= on_surface
         on_surface &= ~is_light
@@ -147,7 +147,7 @@ class WhittedIntegrator:
         color = dr.select(surface.colored, surface.color, finish.color)
         color = built.textures.color(dr.select(surface.colored, -1, finish.texture), color, surface.p, path, on_surface)
         light_color = built.lights.color(light, is_light)
-        background = background_color(self._scene.background, ray.o, ray.d)
+        background = self._built.background_color(ray.o, ray.d)
         if self._plain:
             if shading.mode == "lowest":
                 color, light_color, background = mi.Color3f(1), mi.Color3f(1), mi.Color3f(0)
@@ -233,7 +233,7 @@ def _load(stack: dict[str, Array], entry: UInt32) -> _Ray:
 
 
 def _distance(hit: Hit, active: Bool) -> Float:
-    return dr.select(active & (hit.index != NONE), hit.t, dr.inf)
+    return dr.select(active & hit.is_valid(), hit.t, dr.inf)
 
 
 def _drop_throughput(ray: _Ray) -> _Ray:

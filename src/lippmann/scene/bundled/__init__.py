@@ -7,6 +7,7 @@ teapot also has a form of its own for physically based light. Nothing is built b
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -26,6 +27,8 @@ _MODULES = {
     "tree": "tree",
     "gears": "gears",
 }
+#: Modules of classic forms, of scenes whose own is for physically based light.
+_CLASSIC = {"teapot": "copper_teapot"}
 
 
 def names() -> tuple[str, ...]:
@@ -57,7 +60,7 @@ def make_classic(name: str) -> ClassicScene:
     SceneError
         No bundled scene has this name.
     """
-    scene: ClassicScene = _module(name).make()
+    scene: ClassicScene = _module(name, _MODULES | _CLASSIC).make()
     return scene
 
 
@@ -73,7 +76,7 @@ def stage_of(name: str) -> Stage:
     return place
 
 
-def _module(name: str) -> ModuleType:
-    if name not in _MODULES:
+def _module(name: str, modules: Mapping[str, str] = _MODULES) -> ModuleType:
+    if name not in modules:
         raise SceneError.unknown("bundled scene", name, names())
-    return import_module(f"{__name__}.{_MODULES[name]}")
+    return import_module(f"{__name__}.{modules[name]}")

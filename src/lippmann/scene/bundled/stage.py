@@ -14,12 +14,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import atan, cos, radians, sin
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lippmann.scene.values.description import Camera, Matrix
-from lippmann.scene.values.whitted_scene import ClassicCamera
+
+if TYPE_CHECKING:
+    from lippmann.scene.values.whitted_scene import ClassicCamera
 
 Point = tuple[float, float, float]
 
@@ -82,6 +85,8 @@ class Stage:
 
     def classic_camera(self, *, ray_depth: int) -> ClassicCamera:
         """The same camera in the classic models' terms; focus is not among those."""
+        from lippmann.scene.values.whitted_scene import ClassicCamera
+
         right_up_back = self.rotation
         return ClassicCamera(
             center=self.eye,

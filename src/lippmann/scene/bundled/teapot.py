@@ -1,7 +1,8 @@
 """The teapot: Newell's patches on a half-mirroring checkerboard, the scene that everyone has seen before.
 
 Two lights fall on the same geometry: :func:`describe` gives glazed porcelain in a studio for physically based light,
-:func:`make` the classic metal pot under two lights. Millimetres of the paper's display, +y up, the floor at y = 0.
+:mod:`.copper_teapot` the classic metal pot under two lights. Millimetres of the paper's display, +y up, the floor at
+y = 0.
 """
 
 from __future__ import annotations
@@ -23,9 +24,6 @@ from lippmann.scene.values.description import (
     Mesh,
     SceneDescription,
 )
-from lippmann.scene.values.whitted_scene import ClassicScene
-from lippmann.scene.values.whitted_surfaces import Background, ClassicLight, ClassicMaterial
-from lippmann.scene.whitted.builder import ClassicSceneBuilder
 
 Array = NDArray[np.float64]
 
@@ -267,18 +265,6 @@ class Layout:
 LAYOUT = Layout()
 STAGE = Stage(target=(2.0, 24.0, 22.1), elevation=29.0)
 
-GLAZE = ClassicMaterial(
-    color=(0.76, 0.44, 0.26), ambient=0.08, diffuse=0.62, specular=0.28, phong=0.45, phong_size=22.0, phong_kind="metal"
-)
-LIGHT_TILE = ClassicMaterial(color=(0.92, 0.92, 0.90), ambient=0.08, diffuse=0.45, specular=0.5)
-DARK_TILE = ClassicMaterial(color=(0.10, 0.14, 0.25), ambient=0.08, diffuse=0.45, specular=0.5)
-LIGHTS = (
-    ClassicLight("point", (0.84, 0.81, 0.76), center=(-150.0, 210.0, 190.0)),
-    ClassicLight("point", (0.50, 0.53, 0.58), center=(190.0, 160.0, 90.0)),
-)
-SKY = Background(color=(0.08, 0.30, 0.62))
-RAY_DEPTH = 6
-
 
 def pot_from_newell() -> Matrix:
     """Carries the tessellation of :mod:`~lippmann.scene.bundled.teapot` into the scene."""
@@ -297,20 +283,6 @@ def tiles(*, light: bool) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
     positions = (corner[:, None, :] + around) * LAYOUT.tile + (0.0, 0.0, LAYOUT.floor_shift)
     faces = 4 * np.arange(len(corner))[:, None, None] + np.array([(0, 1, 2), (0, 2, 3)])
     return positions.reshape(-1, 3), faces.reshape(-1, 3).astype(np.uint32)
-
-
-def make() -> ClassicScene:
-    """Return the classic teapot: polished copper on half-mirroring tiles under two lights."""
-    builder = ClassicSceneBuilder(NAME, handedness="right")
-    for is_light, material in ((True, LIGHT_TILE), (False, DARK_TILE)):
-        corners, faces = tiles(light=is_light)
-        builder.mesh(corners, faces, builder.material(material))
-    pot, matrix = tessellate(LAYOUT.subdivisions), pot_from_newell()[:3, :3]
-    normals = pot.normals @ matrix.T / LAYOUT.unit
-    builder.mesh(pot.positions @ matrix.T, pot.faces, builder.material(GLAZE), normals=normals)
-    for light in LIGHTS:
-        builder.light(light)
-    return builder.build(background=SKY, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))
 
 
 def describe() -> SceneDescription:

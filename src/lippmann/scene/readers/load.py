@@ -16,7 +16,6 @@ from lippmann.options.outputs import AccessOptions
 from lippmann.options.scene import LoadKeywords, SceneOptions, Up
 from lippmann.options.texts import settings_of
 from lippmann.runtime.plugins import Plugin, function_of
-from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.dicom_files import DICOM, holds_dicom
 from lippmann.scene.parsing.files import NamedFiles, read_bytes
 from lippmann.scene.readers.registry import READERS, VTK, MovingScene, Reader, ReaderOption, suffixes_with
@@ -32,13 +31,13 @@ from lippmann.scene.values.description import (
     Matrix,
     SceneDescription,
 )
-from lippmann.scene.values.whitted_scene import ClassicScene
-from lippmann.scene.values.whitted_surfaces import Background
 from lippmann.scene.volumes.grid import moved as moved_volume
-from lippmann.scene.whitted.world_frame import world_camera
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
+
+    from lippmann.scene.mitsuba_source import MitsubaSource
+    from lippmann.scene.values.whitted_scene import ClassicScene
 
 #: Words in place of an environment file: the built-in studio, and no light but the scene's own.
 STUDIO, NO_ENVIRONMENT = "studio", "none"
@@ -169,6 +168,8 @@ def read_scene(
     scene = scene if color is None else replace(scene, has_chosen_background=True)
     studio = scene.studio and str(asked.environment) != NO_ENVIRONMENT
     if color is not None and scene.classic is not None:
+        from lippmann.scene.values.whitted_surfaces import Background
+
         scene = replace(scene, classic_form=replace(scene.classic, background=Background(color=color)))
     if scene.is_classic and sky is None and not asked.single_scattering:
         return replace(scene, studio=studio)
@@ -189,7 +190,7 @@ def _selected(scene: Scene, asked: SceneOptions) -> Scene:
 
 
 def _single_scattering(description: SceneDescription | MitsubaSource) -> SceneDescription:
-    if isinstance(description, MitsubaSource):
+    if not isinstance(description, SceneDescription):
         raise UsageError(
             "a scene of Mitsuba's has materials of its own",
             where=description.name,
@@ -251,14 +252,25 @@ def _from_name(source: str | Path, allow_outside: bool, asked: SceneOptions) -> 
     keywords = _keywords(reader, path, asked, allow_outside)
     with plugin.guarded(SceneError, path.name):
         description = function_of(reader.read)(path, **keywords)
-    if isinstance(description, ClassicScene):
-        return _classic(description, world_camera(description))
     if isinstance(description, SceneDescription):
         description = _upright(_with_remarks(check_description(description, path.name)), suffix, reader, asked.up)
-    elif not isinstance(description, MitsubaSource):
+        return Scene(description.name, description)
+    scene = _of_other_kind(description)
+    if scene is None:
         what = f"the plugin {plugin} made a {type(description).__name__} of it"
         raise SceneError(what, where=path.name, rule="a reader returns a SceneDescription")
-    return Scene(description.name, description)
+    return scene
+
+
+def _of_other_kind(content: object) -> Scene | None:
+    """The scene of a classic one or of one of Mitsuba's; None of all else."""
+    from lippmann.scene.mitsuba_source import MitsubaSource
+    from lippmann.scene.values.whitted_scene import ClassicScene
+    from lippmann.scene.whitted.world_frame import world_camera
+
+    if isinstance(content, ClassicScene):
+        return _classic(content, world_camera(content))
+    return Scene(content.name, content) if isinstance(content, MitsubaSource) else None
 
 
 def _keywords(reader: Reader, path: Path, asked: SceneOptions, allow_outside: bool) -> dict[str, object]:
@@ -431,7 +443,7 @@ def _from_library(name: str) -> Scene:
     from lippmann.scene import bundled
 
     content = bundled.make(name)
-    if isinstance(content, ClassicScene):
+    if not isinstance(content, SceneDescription):
         return replace(_classic(_with_paper_depth(content), bundled.stage_of(name).camera()), home_may_move=True)
     description = check_description(content, name)
     home = description.cameras[0].name if description.cameras else None
@@ -461,12 +473,13 @@ def _classic(scene: ClassicScene, camera: Camera) -> Scene:
 def _from_object(source: object) -> Scene:
     if isinstance(source, Scene):
         return source
-    if isinstance(source, ClassicScene):
-        return _classic(source, world_camera(source))
     if isinstance(source, SceneDescription):
         return Scene(source.name, check_description(source, source.name))
-    if isinstance(source, MitsubaSource):
-        return Scene(source.name, source)
+    scene = _of_other_kind(source)
+    if scene is not None:
+        return scene
+    from lippmann.scene.mitsuba_source import MitsubaSource
+
     if isinstance(source, Mapping):
         if source.get("type") != "scene":
             raise SceneError(f"a dictionary of type {source.get('type')!r}", rule="Mitsuba scenes have type 'scene'")
