@@ -191,7 +191,7 @@ def seeds(motion, frames, **options):
 
     display = load_display("seed-lenticular")
     where = find_stand(motion, display, PlacementOptions())
-    list(render_frames(motion, display, frames, where, RenderRequest(**options), Form(), lambda _: None))
+    list(render_frames(motion, display, frames, where, RenderRequest(spp=1, **options), Form(), lambda _: None))
     return asked
 
 

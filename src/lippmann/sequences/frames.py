@@ -25,6 +25,7 @@ from lippmann.scene.values.description import Camera, Matrix
 from lippmann.sequences.flicker import with_flicker
 from lippmann.sequences.forms import INTEGRAL, Form, QuiltForm, Shown
 from lippmann.sequences.kept_scene import KeptScene
+from lippmann.sequences.key_frames import KeyFrames, without_halves
 from lippmann.sequences.motion import Motion, open_motion
 
 if TYPE_CHECKING:
@@ -307,13 +308,22 @@ def render_frames(
     kept = KeptScene()
     request = hold_exposure(request, motion, display, where, kept.build)
 
+    def trace(frame: int, asked: RenderRequest, report: ProgressCallback) -> Shown:
+        return form.render(motion.scene(frame), display, replace(asked, placement=where(frame)), report, kept.build)
+
+    keys = KeyFrames(lambda number: trace(number, of_frame(request, number), silent).provenance)
+
     def render(position: int, frame: int) -> Shown:
-        report = _report_of_frame(progress, position, len(frames))
-        asked = replace(of_frame(request, frame), placement=where(frame))
-        image = form.render(motion.scene(frame), display, asked, report, kept.build)
+        asked, key = of_frame(request, frame), keys.before(frame, request)
+        if key is not None:
+            asked = without_halves(asked, frame, key)
+        image = trace(frame, asked, _report_of_frame(progress, position, len(frames)))
         made = image.provenance
+        keys.add(frame, made)
+        estimate = made.estimate if key is None else key.estimate
         # Noise that stands still has no flicker that the frames' own errors would tell.
-        estimate = made.estimate if request.fixed_noise else with_flicker(made.estimate)
+        if not request.fixed_noise:
+            estimate = with_flicker(estimate)
         return replace(image, provenance=replace(made, options={**made.options, "frame": frame}, estimate=estimate))
 
     for position, frame in enumerate(frames):

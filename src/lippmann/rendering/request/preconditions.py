@@ -88,7 +88,7 @@ def why_no_estimate(request: RenderRequest) -> str | None:
         return "no estimate of the error: one ray through each pixel's middle leaves nothing to chance"
     if request.spp == 1:
         return "no estimate of the error: one sample per pixel does not tell it, two or more do"
-    return None
+    return request.judged_by or None
 
 
 def _refuse(refusals: list[_Refusal], where: str = "") -> None:

@@ -131,6 +131,9 @@ class RenderRequest(MachineOptions, QualityOptions):
         Where the display stands in the scene: options, or a placement found before.
     fixed_noise:
         Whether all frames of a sequence have the same random numbers; refused for single pictures.
+    judged_by:
+        What tells the error of a picture without half-buffers, whose samples are of one stream and denoised together,
+        for its notes; empty: half-buffers of its own.
     plan:
         The plan that decided the values, with its reasons; None before :mod:`~lippmann.rendering.request.plan`.
     began:
@@ -149,6 +152,7 @@ class RenderRequest(MachineOptions, QualityOptions):
 
     placement: PlacementOptions | Placement = field(default_factory=PlacementOptions)
     fixed_noise: bool = False
+    judged_by: str = ""
     plan: RenderPlan | None = field(default=None, compare=False, repr=False)
     began: float | None = field(default=None, compare=False)
 

@@ -1,0 +1,89 @@
+"""Key frames: which frames have halves of their own, and that a frame is the same with and without its neighbours."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import lippmann
+from lippmann.display import load_display
+from lippmann.image import Provenance
+from lippmann.options.placement import PlacementOptions
+from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
+from lippmann.rendering.preview import Preview
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.sequences.frames import find_stand, render_frames, render_sequence
+from lippmann.sequences.key_frames import key_of
+from lippmann.sequences.turntable import open_turntable
+
+ESTIMATE = {"psnr": 40.0, "psnr_low": 38.0, "psnr_high": 43.0, "by_chance": 46.0}
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return open_turntable(lippmann.load_scene("teapot"), 48)
+
+
+@pytest.fixture(scope="module")
+def display():
+    return load_display("seed-lenticular").resized(32, 32)
+
+
+def asked_of(motion, display, frames, estimate=ESTIMATE, **options):
+    """``(seed, samples, whether it has halves)`` of all that is rendered, whose pictures took 8 samples."""
+    asked = []
+
+    class Form:
+        def render(self, scene, display, request, progress, build):
+            asked.append((request.seed, request.spp, not request.judged_by))
+            return Preview(np.zeros((2, 2, 3), np.float32), Provenance(method="pooled", spp=8, estimate=estimate))
+
+    where = find_stand(motion, display, PlacementOptions())
+    made = list(render_frames(motion, display, frames, where, RenderRequest(**options), Form(), lambda _: None))
+    assert [frame for frame, _ in made] == list(frames)
+    return asked
+
+
+def test_every_fourth_frame_is_a_key_frame():
+    assert [key_of(frame) for frame in range(9)] == [0, 0, 0, 0, 4, 4, 4, 4, 8]
+
+
+def test_frames_after_a_key_frame_take_its_samples_in_one_stream(motion, display):
+    asked = asked_of(motion, display, range(6))
+    assert [each[1:] for each in asked] == [(None, True), *[(8, False)] * 3, (None, True), (8, False)]
+    assert len({seed for seed, *_ in asked}) == 6
+
+
+def test_a_frame_without_its_key_frame_renders_that_first(motion, display):
+    every = asked_of(motion, display, range(8))
+    assert asked_of(motion, display, [6, 7]) == [every[4], every[6], every[7]]
+
+
+@pytest.mark.parametrize(
+    "options", [{"spp": 4}, {"quality": 40.0}, {"max_time": 1.0}, {"effort": "draft"}, {"fixed_noise": True}]
+)
+def test_frames_tell_their_own_error_where_that_may_matter(motion, display, options):
+    asked = asked_of(motion, display, [1, 2], **options)
+    assert len(asked) == 2
+    assert all(has_halves for *_, has_halves in asked)
+
+
+@pytest.mark.parametrize("estimate", [None, {"psnr": 40.0}])
+def test_without_the_estimate_of_a_denoised_key_frame_all_have_halves(motion, display, estimate):
+    asked = asked_of(motion, display, range(3), estimate)
+    assert [has_halves for *_, has_halves in asked] == [True] * 3
+
+
+def test_frames_are_denoised_once_and_are_the_same_alone(engine, motion, display, monkeypatch):
+    runs, denoise = [], GuidedDenoiser.__call__
+    monkeypatch.setattr(GuidedDenoiser, "__call__", lambda self, *args: runs.append(1) or denoise(self, *args))
+    images = [image for _, image in render_sequence(motion, display, [4, 5], integrator="path", device="cpu")]
+    assert len(runs) == 3
+    key, after = (image.provenance for image in images)
+    assert after.estimate == key.estimate
+    assert after.spp == key.spp
+    assert "the error are frame 4's" in " ".join(after.notes)
+    assert not any("frame 4's" in note for note in key.notes)
+    ((_, alone),) = render_sequence(motion, display, [5], integrator="path", device="cpu")
+    assert np.array_equal(alone.pixels, images[1].pixels)
+    assert alone.provenance.estimate == after.estimate
