@@ -122,11 +122,11 @@ def make_app(command: str = "") -> typer.Typer:
     app = _empty()
     for name in (command,) if command else COMMANDS:
         module, attribute, _ = COMMANDS[name]
-        found = getattr(importlib.import_module(f"lippmann.cli.commands.{module}"), attribute)
-        if isinstance(found, typer.Typer):
-            app.add_typer(found, name=name, rich_help_panel=_GROUP_OF[name])
+        function = getattr(importlib.import_module(f"lippmann.cli.commands.{module}"), attribute)
+        if isinstance(function, typer.Typer):
+            app.add_typer(function, name=name, rich_help_panel=_GROUP_OF[name])
         else:
-            app.command(name, cls=HelpfulCommand, rich_help_panel=_GROUP_OF[name])(found)
+            app.command(name, cls=HelpfulCommand, rich_help_panel=_GROUP_OF[name])(function)
     return app
 
 

@@ -39,14 +39,14 @@ def run(words: list[str], *, debug: bool = False) -> int:
             return stopped()
         if debug or not isinstance(error, Exception):
             raise
-        return _told(error)
+        return _report_error(error)
     # Typer makes an exit code of most Ctrl-C.
     if code == INTERRUPTED:
         return stopped()
     return code if isinstance(code, int) else 0
 
 
-def _told(error: Exception) -> int:
+def _report_error(error: Exception) -> int:
     """The exit code of an error, which is told in one line."""
     from lippmann.cli.shared.command_options import in_options
 

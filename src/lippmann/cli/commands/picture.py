@@ -236,13 +236,13 @@ def replay(
         rule = "a quilt is seen without lenses"
         raise UsageError("this is a quilt", where="--optics", rule=rule, fix="weave it for its display first")
 
-    def seen_by(place: tuple[float, float, float]) -> FloatArray:
+    def replay_from(place: tuple[float, float, float]) -> FloatArray:
         if quilt is not None:
             return framed(replay_quilt(quilt, target, place, size=pixels, linear=filter == "linear"))
         return framed(image.replay(place, size=pixels, filter=filter, optics=optics))
 
-    def seen_from(place: tuple[float, float, float]) -> FloatArray:
-        return seen_by(place) if stereo is None else stereo_pair(seen_by, place, *stereo)
+    def picture_from(place: tuple[float, float, float]) -> FloatArray:
+        return replay_from(place) if stereo is None else stereo_pair(replay_from, place, *stereo)
 
     result: dict[str, Any] = {"output": str(output), "eye": list(position), "filter": filter, "optics": optics}
     if stereo is not None:
@@ -250,16 +250,16 @@ def replay(
     by = "" if stereo is None else f" by two eyes {stereo[1]:g} mm apart"
     if not moves:
         if stereo is not None and output.suffix.lower() in PAIRS:
-            write_pair(seen_from(position), output, stereo[0], transfer)
+            write_pair(picture_from(position), output, stereo[0], transfer)
         else:
-            write_plain_picture(seen_from(position), output, bits=bits, transfer=transfer)
+            write_plain_picture(picture_from(position), output, bits=bits, transfer=transfer)
         console.result(result, f"{output}: seen{by} from {_position(position)}")
         return
     if places is None:
         reach = _field_width(target, position[2]) if width is None else width
         start, stop = ((position[0] + side * reach / 2, *position[1:]) for side in (-1, 1))
         places = path_of_eye(start, stop, frames)
-    write_animation((seen_from(place) for place in places), output, transfer=transfer, codec=film.codec)
+    write_animation((picture_from(place) for place in places), output, transfer=transfer, codec=film.codec)
     start, stop = places[0], places[-1]
     result |= {"frames": len(places), "start": list(start), "stop": list(stop)}
     console.result(result, f"{output}: {len(places)} frames, seen{by} from {_position(start)} to {_position(stop)}")

@@ -43,19 +43,19 @@ def plan(
     target = display_of(display, printed)
     request = RenderRequest.from_options(how, machine, placement=placement)
     source = SceneSource(scene, asked, light, access)
-    wanted = sequence.Wanted.part_of(turning)
+    spec = sequence.SequenceSpec.part_of(turning)
     with console.progress() as progress:
-        if wanted:
+        if spec:
             from lippmann.sequences.frames import find_stand
 
-            motion = sequence.open_moving(source, wanted, request)
+            motion = sequence.open_moving(source, spec, request)
             where = find_stand(motion, target, placement)
             loaded, frames = motion.scene(0), motion.count
             request = replace(request, placement=where(0))
         else:
             loaded, frames = source.load(), 1
-        found = forecast(loaded, target, request, progress, frames=frames)
-    for note in found.notes:
+        prediction = forecast(loaded, target, request, progress, frames=frames)
+    for note in prediction.notes:
         console.remark(note)
-    lines = [f"{name:<15}{text}" for name, text in found.in_words().items()]
-    console.result(found.to_dict(), "\n".join(lines))
+    lines = [f"{name:<15}{text}" for name, text in prediction.in_words().items()]
+    console.result(prediction.to_dict(), "\n".join(lines))

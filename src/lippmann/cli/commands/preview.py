@@ -83,23 +83,23 @@ def preview(
         loaded = source.load()
         load_seconds = time.perf_counter() - started
         if plain:
-            found = _plain(loaded, placement.camera, pixels, eye, request, progress)
+            image = _plain(loaded, placement.camera, pixels, eye, request, progress)
         else:
             from lippmann.rendering.live.eye_preview import render_eye_preview
             from lippmann.viewing.replay import default_eye
 
             at = default_eye(target) if eye is None else triple(eye, "--eye")
             most = None if pixels is None else parse.size(pixels, "--pixels")
-            found = render_eye_preview(loaded, target, at, request, most, progress)
+            image = render_eye_preview(loaded, target, at, request, most, progress)
         writing = time.perf_counter()
-        provenance = add_seconds(found.provenance, load=load_seconds)
-        write_plain_picture(found.pixels, output, bits=bits, transfer=provenance.transfer)
+        provenance = add_seconds(image.provenance, load=load_seconds)
+        write_plain_picture(image.pixels, output, bits=bits, transfer=provenance.transfer)
         provenance = add_seconds(provenance, write=time.perf_counter() - writing)
     if not plain:
         console.remark(depth_line(provenance))
     for note in provenance.notes:
         console.remark(note)
-    height, width = found.pixels.shape[:2]
+    height, width = image.pixels.shape[:2]
     before = "" if plain else f" as {target.name} will show it"
     console.result(
         report(output, (width, height), provenance),

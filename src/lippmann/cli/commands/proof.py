@@ -31,8 +31,8 @@ def proof(
     target = load_display(display)
     if output is not None:
         check_proof_page(output)
-    found = prove(target)
+    measurements = prove(target)
     if output is not None:
-        write_proof_page(found, target, output)
-    lines = [f"{name:<13}{text}" for name, text in found.in_words().items()]
-    console.result({**found.to_dict(), "output": None if output is None else str(output)}, "\n".join(lines))
+        write_proof_page(measurements, target, output)
+    lines = [f"{name:<13}{text}" for name, text in measurements.in_words().items()]
+    console.result({**measurements.to_dict(), "output": None if output is None else str(output)}, "\n".join(lines))

@@ -116,15 +116,15 @@ def render(
     console = Console(quiet, as_json)
     target = load_display(display)
     grid = None if views is None else parse.size(views, "--views", rule="columns x rows, such as 8x6")
-    wanted = quilt_of_display(target, grid, None if size is None else parse.size(size, "--size"))
-    moving = sequence.Wanted.part_of(in_frames)
+    quilt = quilt_of_display(target, grid, None if size is None else parse.size(size, "--size"))
+    moving = sequence.SequenceSpec.part_of(in_frames)
     path = output or Path(f"{Path(scene).stem}{'' if moving else '.png'}")
     moving, file = sequence.with_film(moving, path)
     shows_all = moving.eye is None and moving.shows == "eye"
-    if moving.video is not None and shows_all and (file != path or wanted.pair):
-        moving = replace(moving, video=_named(moving.video, wanted.ending))
+    if moving.video is not None and shows_all and (file != path or quilt.pair):
+        moving = replace(moving, video=_named(moving.video, quilt.ending))
     if file == path and (not moving or (path.suffix and not path.is_dir())):
-        file = _named(path, wanted.ending)
+        file = _named(path, quilt.ending)
     if not moving:
         if resume:
             raise UsageError("a quilt is rendered in one piece", where="--resume", fix="leave it out")
@@ -135,15 +135,15 @@ def render(
         from lippmann.sequences.forms import QuiltForm
 
         files = sequence.Files(file, bits, None, resume)
-        sequence.render_frames(source, target, request, moving, files, console, form=QuiltForm(wanted))
+        sequence.render_frames(source, target, request, moving, files, console, form=QuiltForm(quilt))
         return
     with console.progress() as progress:
         started = time.perf_counter()
         loaded = source.load()
         load_seconds = time.perf_counter() - started
-        layout = wanted.layout
+        layout = quilt.layout
         frame = render_quilt(
-            loaded, target, (layout.columns, layout.rows), (wanted.width, wanted.height), request, progress
+            loaded, target, (layout.columns, layout.rows), (quilt.width, quilt.height), request, progress
         )
         made = Quilt(frame.pixels, layout, provenance=frame.provenance, display=target)
         progress(Progress("write", 0, 1))
@@ -156,8 +156,8 @@ def render(
     if spent.estimate is not None:
         console.remark(f"estimated PSNR {estimate_in_words(spent.estimate, 'view')}")
     seconds = spent.seconds["total"]
-    values: dict[str, Any] = report(file, (wanted.width, wanted.height), spent)
-    console.result(values | {"display": target.name, "views": wanted.layout.views}, _sentence(file, made, seconds))
+    values: dict[str, Any] = report(file, (quilt.width, quilt.height), spent)
+    console.result(values | {"display": target.name, "views": quilt.layout.views}, _sentence(file, made, seconds))
 
 
 @quilt.command("pack", cls=HelpfulCommand)
@@ -205,14 +205,14 @@ def unpack(
 
     console = Console(quiet, as_json)
     check_folder_writable(output)
-    found = read_quilt(picture, layout_of(layout, aspect))
-    for note in found.notes:
+    quilt = read_quilt(picture, layout_of(layout, aspect))
+    for note in quilt.notes:
         console.remark(note)
     with console.progress() as progress:
-        write_views(found, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
-    width, height = found.view_size
-    result = {"output": str(output), "size": [width, height], "views": found.layout.views}
-    console.result(result, f"{output}: {found.layout.views} views of {width}x{height} pixels")
+        write_views(quilt, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
+    width, height = quilt.view_size
+    result = {"output": str(output), "size": [width, height], "views": quilt.layout.views}
+    console.result(result, f"{output}: {quilt.layout.views} views of {width}x{height} pixels")
 
 
 @quilt.command("sizes", cls=HelpfulCommand)

@@ -89,16 +89,16 @@ def render(
 
     console = Console(quiet, as_json)
     target = display_of(display, printed)
-    wanted = sequence.Wanted.part_of(moving)
-    target, finish = sheet_of(target, finishing, in_frames=bool(wanted))
-    wanted, output = sequence.with_film(wanted, output_of(output, scene, "-frames" if wanted else ".png"))
-    if opens and wanted and wanted.video is None:
+    spec = sequence.SequenceSpec.part_of(moving)
+    target, finish = sheet_of(target, finishing, in_frames=bool(spec))
+    spec, output = sequence.with_film(spec, output_of(output, scene, "-frames" if spec else ".png"))
+    if opens and spec and spec.video is None:
         raise UsageError("shows a picture or a film", where="--open", fix="add --video film.mp4")
     request = RenderRequest.from_options(
         *(how, machine),
         placement=placement,
         tone_map=tone_map_of(how.tone_map, output),
-        began=None if wanted else standard_streams.command_began(),
+        began=None if spec else standard_streams.command_began(),
     )
     source = SceneSource(scene, asked, light, access)
     on_cluster = clusters.Cluster(on)
@@ -107,17 +107,17 @@ def render(
     if correct == "lens":
         from lippmann.corrected import finer_display, render_corrected
 
-        if wanted or maps is not None:
-            _refuse_correction("frames" if wanted else "--maps", "leave one of them out")
+        if spec or maps is not None:
+            _refuse_correction("frames" if spec else "--maps", "leave one of them out")
         rendered, traced = render_corrected, finer_display(target)
-    if wanted:
+    if spec:
         files = sequence.Files(output, bits, maps, resume)
         with on_cluster.runner(console, machine.threads) as runner:
-            sequence.render_frames(source, target, request, wanted, files, console, runner=runner)
-        if opens and wanted.video is not None:
+            sequence.render_frames(source, target, request, spec, files, console, runner=runner)
+        if opens and spec.video is not None:
             from lippmann.cli.commands.view import open_file
 
-            open_file(wanted.video)
+            open_file(spec.video)
         return
     name, stored = format_for(output, bits)
     _check_layers(how.layers, name, output)
@@ -263,9 +263,9 @@ def _render_tiled(
     width, height = rendered.size
     values = report(output, rendered.size, made)
     values["tiles"] = {"made": rendered.tiles - rendered.resumed, "found": rendered.resumed}
-    found = f", {rendered.resumed} of {rendered.tiles} tiles found" if rendered.resumed else ""
+    resumed = f", {rendered.resumed} of {rendered.tiles} tiles found" if rendered.resumed else ""
     console.result(
         values,
-        f"{output}: {width}x{height} pixels for {display.name}, {samples_in_words(made.spp)}{found}, "
+        f"{output}: {width}x{height} pixels for {display.name}, {samples_in_words(made.spp)}{resumed}, "
         f"{sum(made.rays.values()) / 1e6:.1f} M rays, {time.perf_counter() - started:.1f} s",
     )

@@ -34,8 +34,8 @@ _NUMERAL = re.compile(r"\([^()]*\)|[\d.]+")
 _FOLDER_PATTERN = "frame_%04d"
 
 
-class Wanted(SequenceOptions):
-    """What is asked for of frames; true if there is anything, else a picture at rest is wanted."""
+class SequenceSpec(SequenceOptions):
+    """What is asked for of frames; true if there is anything, else a picture at rest is."""
 
     @property
     def turns(self) -> bool:
@@ -43,7 +43,7 @@ class Wanted(SequenceOptions):
         return self.turntable is not None or self.swing is not None
 
     def __bool__(self) -> bool:
-        """Whether a sequence is wanted.
+        """Whether a sequence is asked for.
 
         Raises
         ------
@@ -70,7 +70,7 @@ class Wanted(SequenceOptions):
         return False
 
 
-def with_film(wanted: Wanted, output: Path) -> tuple[Wanted, Path]:
+def with_film(spec: SequenceSpec, output: Path) -> tuple[SequenceSpec, Path]:
     """Where ``output`` is a film, it becomes the film of frames in a folder beside it, ``NAME-frames``.
 
     Raises
@@ -79,13 +79,13 @@ def with_film(wanted: Wanted, output: Path) -> tuple[Wanted, Path]:
         There are no frames, or ``--video`` names another film.
     """
     if output.suffix.lower() not in _FILMS or output.is_dir():
-        return wanted, output
-    if not wanted:
+        return spec, output
+    if not spec:
         raise UsageError("a film needs frames", where=str(output), fix="add --turntable 48, or --frames 0:48")
-    if wanted.video is not None:
+    if spec.video is not None:
         raise UsageError("the output is a film already", where="--video", fix="leave one of them out")
     # A dot would make the folder's name that of a file.
-    return replace(wanted, video=output), output.with_name(f"{output.stem.replace('.', '-')}-frames")
+    return replace(spec, video=output), output.with_name(f"{output.stem.replace('.', '-')}-frames")
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def render_frames(
     source: SceneSource,
     display: Display,
     request: RenderRequest,
-    wanted: Wanted,
+    spec: SequenceSpec,
     files: Files,
     console: Console,
     *,
@@ -118,35 +118,35 @@ def render_frames(
     from lippmann.viewing.hololuminescent import RATES
     from lippmann.viewing.video_file import check_animation_path, write_codes
 
-    if (wanted.camera_path is not None or wanted.turns) and wanted.fps is not None and wanted.video is None:
-        what = "a turn" if wanted.turns else "a camera path"
+    if (spec.camera_path is not None or spec.turns) and spec.fps is not None and spec.video is None:
+        what = "a turn" if spec.turns else "a camera path"
         raise UsageError(f"{what} has one pose a frame", where="--fps", fix="leave it out, or add --video")
-    if wanted.fps is not None and not 0.001 <= wanted.fps <= 1000:
-        raise UsageError(f"{wanted.fps:g} frames per second", where="--fps", rule="0.001 to 1000")
-    if wanted.eye is not None and wanted.video is None:
+    if spec.fps is not None and not 0.001 <= spec.fps <= 1000:
+        raise UsageError(f"{spec.fps:g} frames per second", where="--fps", rule="0.001 to 1000")
+    if spec.eye is not None and spec.video is None:
         raise UsageError("nobody looks", where="--eye", fix="add --video FILE.mp4, or leave it out")
-    if wanted.video is not None:
-        check_animation_path(wanted.video, wanted.codec)
+    if spec.video is not None:
+        check_animation_path(spec.video, spec.codec)
     else:
-        for option, given in (("--codec", wanted.codec is not None), ("--shows", wanted.shows != "eye")):
+        for option, given in (("--codec", spec.codec is not None), ("--shows", spec.shows != "eye")):
             if given:
                 raise UsageError("there is no film", where=option, fix="add --video FILE.mp4, or leave it out")
-    if wanted.shows == "hololuminescent" and wanted.fps not in RATES:
+    if spec.shows == "hololuminescent" and spec.fps not in RATES:
         raise UsageError(
-            f"{wanted.fps or FRAMES_PER_SECOND:g} frames per second",
+            f"{spec.fps or FRAMES_PER_SECOND:g} frames per second",
             where="--fps",
             rule="the player of Hololuminescent displays takes 30 or 60",
             fix="add --fps 30",
         )
-    request = replace(request, fixed_noise=wanted.fixed_noise)
-    chosen = frame_range(wanted.frames or ":")
+    request = replace(request, fixed_noise=spec.fixed_noise)
+    chosen = frame_range(spec.frames or ":")
     output = files.output
-    motion = open_moving(source, wanted, request)
+    motion = open_moving(source, spec, request)
     frames = chosen.of(motion)
     ending = form.quilt.ending if isinstance(form, QuiltForm) else ""
     path_of = numbered(output, len(frames), ending)
     name, _ = format_for(path_of(frames[0]), files.bits)
-    filming = _filming(wanted, motion, display, request, form, len(frames))
+    filming = _filming(spec, motion, display, request, form, len(frames))
     if files.maps is not None:
         raise UsageError("a sequence writes no pictures of its maps", where="--maps", fix="leave it out")
     if request.layers and name != "exr":
@@ -175,7 +175,7 @@ def render_frames(
         return frame
 
     with (
-        _places(output, path_of(frames[0]), wanted.video),
+        _places(output, path_of(frames[0]), spec.video),
         console.progress() as progress,
         saved_sequence(
             motion,
@@ -192,14 +192,14 @@ def render_frames(
         ) as saved,
     ):
         noted_frames = map(noted, saved)
-        if filming is None or wanted.video is None:
+        if filming is None or spec.video is None:
             deque(noted_frames, maxlen=0)
         else:
-            sweep_beside(wanted.video)
+            sweep_beside(spec.video)
             write_codes(
                 map(filming.codes, noted_frames),
-                wanted.video,
-                frames_per_second=wanted.fps or FRAMES_PER_SECOND,
+                spec.video,
+                frames_per_second=spec.fps or FRAMES_PER_SECOND,
                 codec=filming.codec,
                 quilt=filming.quilt,
             )
@@ -209,18 +209,18 @@ def render_frames(
         console.remark(f"{alike[where]}{' and the like' if len(set(alike.values())) > 1 else ''}{only}")
     if (line := film_in_words([one["estimate"] for one in done])) is not None:
         console.remark(line)
-    film = "" if wanted.video is None else f", {wanted.video}"
-    seconds, found = sum(one["seconds"] for one in done), sum(one["found"] for one in done)
-    before = f", {found} of them found" if found else ""
+    film = "" if spec.video is None else f", {spec.video}"
+    seconds, resumed = sum(one["seconds"] for one in done), sum(one["found"] for one in done)
+    before = f", {resumed} of them found" if resumed else ""
     console.result(
-        {"output": str(output), "frames": done, "video": None if wanted.video is None else str(wanted.video)},
+        {"output": str(output), "frames": done, "video": None if spec.video is None else str(spec.video)},
         f"{done[0]['output']} to {Path(done[-1]['output']).name}{film}: {len(done)} frames{before}, {seconds:.1f} s",
     )
 
 
-def open_moving(source: SceneSource, wanted: Wanted, request: RenderRequest) -> Motion:
+def open_moving(source: SceneSource, spec: SequenceSpec, request: RenderRequest) -> Motion:
     """What moves."""
-    if wanted.turns:
+    if spec.turns:
         from lippmann.options.placement import PlacementOptions
         from lippmann.runtime import engine
         from lippmann.sequences.turntable import open_turntable
@@ -230,8 +230,8 @@ def open_moving(source: SceneSource, wanted: Wanted, request: RenderRequest) -> 
         placement = request.placement if isinstance(request.placement, PlacementOptions) else None
         return open_turntable(
             source.load(),
-            wanted.turntable,
-            swing=wanted.swing,
+            spec.turntable,
+            swing=spec.swing,
             placement=placement,
             classic=request.integrator == "classic",
         )
@@ -239,9 +239,9 @@ def open_moving(source: SceneSource, wanted: Wanted, request: RenderRequest) -> 
 
     return open_motion(
         source.name,
-        fps=None if wanted.camera_path is not None else wanted.fps,
-        animation=wanted.animation,
-        camera_path=wanted.camera_path,
+        fps=None if spec.camera_path is not None else spec.fps,
+        animation=spec.animation,
+        camera_path=spec.camera_path,
         asked=source.asked,
         light=source.light,
         allow_outside=source.access.allow_outside,
@@ -249,18 +249,18 @@ def open_moving(source: SceneSource, wanted: Wanted, request: RenderRequest) -> 
 
 
 def _filming(
-    wanted: Wanted, motion: Motion, display: Display, request: RenderRequest, form: Form[Any] | None, count: int
+    spec: SequenceSpec, motion: Motion, display: Display, request: RenderRequest, form: Form[Any] | None, count: int
 ) -> Filming | None:
     """What the film shows of each frame."""
-    if wanted.video is None:
+    if spec.video is None:
         return None
     from lippmann.sequences.films import film_of_pictures, film_of_quilts
     from lippmann.sequences.forms import QuiltForm
 
     if isinstance(form, QuiltForm):
-        return film_of_quilts(wanted.video, display, form, _eye(wanted.eye), count, wanted.shows, wanted.codec)
-    eye = None if wanted.eye is None else triple(wanted.eye, "--eye")
-    return film_of_pictures(wanted.video, motion, display, request, eye, wanted.shows, wanted.codec)
+        return film_of_quilts(spec.video, display, form, _eye(spec.eye), count, spec.shows, spec.codec)
+    eye = None if spec.eye is None else triple(spec.eye, "--eye")
+    return film_of_pictures(spec.video, motion, display, request, eye, spec.shows, spec.codec)
 
 
 def _eye(text: str | None) -> FilmEye:

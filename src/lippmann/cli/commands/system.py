@@ -94,10 +94,10 @@ def displays(as_json: options.Json = False) -> None:
     """List the bundled displays."""
     from lippmann.display import list_displays
 
-    found = list_displays()
-    table = [display.in_words() for display in found]
+    presets = list_displays()
+    table = [display.in_words() for display in presets]
     columns = [[name, *(row[name] for row in table)] for name in table[0]]
     padded = [[text.ljust(max(map(len, column))) for text in column] for column in columns]
     lines = ["  ".join(row).rstrip() for row in zip(*padded, strict=True)]
-    result = {"displays": [display.summary() for display in found]}
+    result = {"displays": [display.summary() for display in presets]}
     Console(as_json=as_json).result(result, "\n".join(lines))

@@ -60,11 +60,11 @@ def view(
                 raise UsageError("does not apply to --export", where=name, fix="leave it out")
     with scratch_folder("lippmann-view-") as folder:
         asked, target = layout_of(layout, aspect), parse.display(display)
-        shown = [_panel_picture(path, target, asked, Path(folder) / str(k)) for k, path in enumerate(paths)]
+        pictures = [_panel_picture(path, target, asked, Path(folder) / str(k)) for k, path in enumerate(paths)]
         if export is not None:
-            _export(shown, target, export, paths, console)
+            _export(pictures, target, export, paths, console)
             return
-        _serve_pictures(shown, target, paths, console, host=host, port=port, browser=not no_browser)
+        _serve_pictures(pictures, target, paths, console, host=host, port=port, browser=not no_browser)
 
 
 def _panel_picture(path: Path, display: Display | None, layout: QuiltLayout | None, folder: Path) -> Path:
@@ -84,7 +84,7 @@ def _panel_picture(path: Path, display: Display | None, layout: QuiltLayout | No
 
 
 def _serve_pictures(
-    shown: list[Path],
+    pictures: list[Path],
     target: Display | None,
     paths: list[Path],
     console: Console,
@@ -98,7 +98,7 @@ def _serve_pictures(
 
     # Uncompressed tiles are fastest on one machine, PNG through a tunnel.
     tile_format: TileFormat = "png" if is_remote() else "rgb"
-    files = [PictureFile(path, target, tile_format) for path in shown]
+    files = [PictureFile(path, target, tile_format) for path in pictures]
     serve(
         ViewerSite(files),
         " and ".join(str(path) for path in paths),

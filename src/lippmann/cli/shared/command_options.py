@@ -116,7 +116,7 @@ def _parameter(each: Field[Any], its: Option, refused: tuple[str, ...]) -> inspe
     flag = its.flag_of(each.name)
     if bool in kinds_of(kind) and default is None:
         flag = f"{flag}/--no-{flag[2:]}"
-    shown = typer.Option(
+    parameter = typer.Option(
         flag,
         help=help_text,
         metavar=metavar,
@@ -124,7 +124,7 @@ def _parameter(each: Field[Any], its: Option, refused: tuple[str, ...]) -> inspe
         show_default=default is not None and default is not False,
     )
     return inspect.Parameter(
-        each.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, shown]
+        each.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, parameter]
     )
 
 

@@ -29,8 +29,8 @@ def _files(incomplete: str, endings: tuple[str, ...]) -> list[str]:
     given = Path(incomplete)
     folder = given if incomplete.endswith("/") else given.parent
     try:
-        found = sorted(path for path in folder.iterdir() if str(path).startswith(str(given) if incomplete else ""))
+        paths = sorted(path for path in folder.iterdir() if str(path).startswith(str(given) if incomplete else ""))
     except OSError:
         return []
-    folders = [f"{path}/" for path in found if path.is_dir()]
-    return [*(str(path) for path in found if path.suffix.lower() in endings), *folders]
+    folders = [f"{path}/" for path in paths if path.is_dir()]
+    return [*(str(path) for path in paths if path.suffix.lower() in endings), *folders]

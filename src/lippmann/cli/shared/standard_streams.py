@@ -20,10 +20,10 @@ from lippmann.runtime.atomic_write import reason_and_fix
 class _Stream(io.RawIOBase):
     """A standard stream whose first failure is told, if at all, and which takes everything from then on."""
 
-    def __init__(self, raw: io.RawIOBase, *, is_told: bool) -> None:
+    def __init__(self, raw: io.RawIOBase, *, reports_failure: bool) -> None:
         super().__init__()
         self._raw = raw
-        self._is_told = is_told
+        self._reports_failure = reports_failure
         self._failed = False
 
     def writable(self) -> bool:
@@ -43,7 +43,7 @@ class _Stream(io.RawIOBase):
             return self._raw.write(data)  # type: ignore[arg-type]
         except OSError as error:
             self._failed = True
-            if not self._is_told:
+            if not self._reports_failure:
                 return size
             if error.errno == errno.EPIPE:  # its reader has read enough
                 raise
@@ -65,11 +65,11 @@ def complete() -> None:
             os.open(os.devnull, os.O_WRONLY if descriptor == 2 else os.O_RDONLY)
     if sys.stdin is None:
         sys.stdin = open(0, encoding="utf-8", closefd=False)  # noqa: SIM115  # for the whole process
-    sys.stdout = _standing(sys.stdout, 1, is_told=True)
-    sys.stderr = _standing(sys.stderr, 2, is_told=False)
+    sys.stdout = _standing(sys.stdout, 1, reports_failure=True)
+    sys.stderr = _standing(sys.stderr, 2, reports_failure=False)
 
 
-def _standing(stream: TextIO | None, descriptor: int, *, is_told: bool) -> TextIO:
+def _standing(stream: TextIO | None, descriptor: int, *, reports_failure: bool) -> TextIO:
     if stream is None:
         raw: io.RawIOBase = io.FileIO(descriptor, "w", closefd=False)
         encoding, errors, is_terminal = "utf-8", "backslashreplace", False
@@ -78,8 +78,8 @@ def _standing(stream: TextIO | None, descriptor: int, *, is_told: bool) -> TextI
             stream.flush()
         raw = cast("io.RawIOBase", getattr(stream.buffer, "raw", stream.buffer))
         encoding, errors, is_terminal = stream.encoding, stream.errors or "strict", stream.isatty()
-    buffer = io.BufferedWriter(_Stream(raw, is_told=is_told))
-    return io.TextIOWrapper(buffer, encoding, errors, line_buffering=is_terminal or not is_told)
+    buffer = io.BufferedWriter(_Stream(raw, reports_failure=reports_failure))
+    return io.TextIOWrapper(buffer, encoding, errors, line_buffering=is_terminal or not reports_failure)
 
 
 _began: list[float] = []
