@@ -122,12 +122,26 @@ def test_single_strong_hits_are_no_worst_micro_image(seed):
     assert PictureEstimator(SHOWN).estimate(errors, 64).worst > calm.worst - 6
 
 
-def test_what_may_not_be_there_widens_the_interval_of_the_whole_to_the_better_side_only():
+def test_what_may_not_be_there_widens_both_intervals_to_the_better_side_only():
     errors, _ = made(1, noise=0.005)
     calm = PictureEstimator(SHOWN).estimate(errors, 64)
     told = PictureEstimator(SHOWN).estimate(replace(errors, blur=np.float32(0.5) * errors.values), 64)
     assert told.psnr_high > calm.psnr_high + 2
-    assert (told.psnr, told.psnr_low, told.worst) == (calm.psnr, calm.psnr_low, calm.worst)
+    assert told.worst_high > calm.worst_high + 2
+    for name in ("psnr", "psnr_low", "worst", "worst_low", "worst_lens"):
+        assert getattr(told, name) == getattr(calm, name)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_micro_image_that_only_blur_makes_the_worst_may_be_as_good_as_the_others(seed):
+    """The blur of caustics is an upper bound, and it lies under one lens."""
+    errors, true = made(seed, noise=0.005, spread=0.1)
+    blur = np.zeros_like(errors.values)
+    blur[16:24, 40:48] = 10 * true.mean()
+    found = PictureEstimator(SHOWN).estimate(replace(errors, values=errors.values + blur, blur=blur), 64)
+    assert found.worst_lens == (5, 2)
+    assert found.worst < truth_of(true)[1] - 3
+    assert found.worst_low < truth_of(true)[1] < found.worst_high
 
 
 def test_micro_images_of_few_pixels_may_be_worse_than_expected():

@@ -57,6 +57,8 @@ def test_the_mean_may_be_less_by_a_share_that_is_bounded(errors):
     less = float(errors.blur.mean())
     assert sums.share_less(10 * less) == pytest.approx(0.1, rel=1e-5)
     assert sums.share_less(less) == MOST_LESS
+    means = np.array([1e3, 2, 0.5, 1]) * sums.blur / sums.pixels
+    np.testing.assert_allclose(sums.shares_less(means), [1e-3, 0.5, MOST_LESS, MOST_LESS])
     sums.blur[:] *= -1
     assert sums.share_less(less) == 0
 

@@ -107,16 +107,22 @@ def estimate_denoised(errors: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     worse, better = likely.quantiles(np.array([0.975, 0.025])) * (model, often_better / model)
 
     parts = _parts(errors, samples.squares, index, grid, middle)
-    drawn = _draw_worst(parts, likely.quantiles((np.arange(TUNING.draws) + 0.5) / TUNING.draws) / middle)
-    worst = np.quantile(drawn, (0.5, 0.975, 0.025)) * (1, 1, TUNING.often_better**2)
+    common = likely.quantiles((np.arange(TUNING.draws) + 0.5) / TUNING.draws) / middle
+    largest, without_blur = _draw_worst(parts, common)
+    worst = *np.quantile(largest, (0.5, 0.975)), np.quantile(without_blur, 0.025) * TUNING.often_better**2
     return make_estimate((middle, worse, better, *worst, by_chance), int(index[np.argmax(parts.expected)]), grid)
 
 
-def _draw_worst(parts: PartErrors, common: Real) -> Real:
-    """Random draws of the worst part's squared error, ``(draws,)``; ``common`` are factors that all parts share."""
+def _draw_worst(parts: PartErrors, common: Real) -> tuple[Real, Real]:
+    """Random draws of the worst part's squared error, with and without blur, ``(draws,)`` each.
+
+    ``common`` are factors that all parts share.
+    """
     random = np.random.default_rng(2)
     model = np.exp(TUNING.model_uncertainty * random.standard_normal(len(common)))
-    return np.asarray(parts.draws().max(axis=0) * common[random.permutation(len(common))] * model)
+    factors = common[random.permutation(len(common))] * model
+    largest, without_blur = parts.draw_largest()
+    return largest * factors, without_blur * factors
 
 
 def _parts(
@@ -146,7 +152,8 @@ def _parts(
     expected = np.maximum(around + trust * (measured - around), 0.2 * around)
     # A part of few pixels, in a corner of the panel, has a larger variance.
     fewer = TUNING.prior_pixels * np.maximum(1 / count - 1 / np.median(count), 0)
-    return PartErrors(index, expected, expected, np.log1p(trust * noise / np.square(expected)) + np.log1p(fewer))
+    variance = np.log1p(trust * noise / np.square(expected)) + np.log1p(fewer)
+    return PartErrors(index, expected, expected, variance, errors.shares_less(expected))
 
 
 @dataclass(frozen=True, eq=False)

@@ -96,9 +96,9 @@ class ErrorSums:
         """Largest share by which blur may overstate the ``mean`` error of all pixels."""
         return float(_share_less(self.blur.sum() / self.pixels.sum(), mean))
 
-    def shares_less(self) -> Real:
-        """``(parts,)``: the same share for each part."""
-        return np.asarray(_share_less(self.blur, np.maximum(self.values, self.blur + 1e-30)))
+    def shares_less(self, means: Real) -> Real:
+        """The same share for each part, whose mean errors are ``means``, ``(parts,)`` each."""
+        return np.asarray(_share_less(self.blur / self.pixels, means))
 
     def _sum(self, owner: NDArray[np.integer], values: Real) -> Real:
         return np.asarray(np.bincount(owner, weights=values, minlength=len(self.pixels)), dtype=np.float64)

@@ -158,12 +158,11 @@ def estimate_plain(sums: ErrorSums, grid: tuple[int, int]) -> Estimate:
     expected, trust = shrink(mean, np.maximum(around, 1e-3 * average), noise)
     doubted = expected + TUNING.outlier_doubt * np.clip(outliers, 0, expected)
     variance, fluctuation = (np.log1p(each / np.square(expected)) for each in (trust * noise, noise))
-    parts = PartErrors(index, expected, doubted, variance + fluctuation)
-    draws = parts.draws()
-    less = draws * (1 - sums.shares_less()[parts.candidates, None])
+    parts = PartErrors(index, expected, doubted, variance + fluctuation, sums.shares_less(expected))
+    largest, without_blur = parts.draw_largest()
     model = math.exp(TUNING.model_uncertainty)
     # Shrinkage raises the estimates beside a bad part, so the lower quantile is 0.01, not 0.025.
-    worst = *np.quantile(draws.max(axis=0), (0.5, 0.975)) * (1, model), np.quantile(less.max(axis=0), 0.01) / model
+    worst = *np.quantile(largest, (0.5, 0.975)) * (1, model), np.quantile(without_blur, 0.01) / model
     return make_estimate((average, *ends, *worst, average), int(index[np.argmax(expected)]), grid)
 
 
@@ -180,13 +179,14 @@ class PartErrors:
     """Posterior squared errors of the parts with pixels, ``(parts,)`` each.
 
     ``index``: their numbers in the grid; ``expected``: the mean; ``doubted``: an upper mean, where outliers may have
-    been missed; ``variance``: of the logarithm.
+    been missed; ``variance``: of the logarithm; ``less``: the share by which blur may overstate the error.
     """
 
     index: NDArray[np.intp]
     expected: Real
     doubted: Real
     variance: Real
+    less: Real
 
     @cached_property
     def candidates(self) -> NDArray[np.intp]:
@@ -194,8 +194,8 @@ class PartErrors:
         reach = np.log(self.doubted) + 2.5 * np.sqrt(self.variance)
         return np.argsort(-reach)[:1024]  # bounds the memory of the draws
 
-    def draws(self) -> Real:
-        """Random draws from the posteriors of the :attr:`candidates`, ``(candidates, draws)`` squared errors."""
+    def draw_largest(self) -> tuple[Real, Real]:
+        """Random draws of the largest squared error of a part, and of the largest without blur, ``(draws,)`` each."""
         best = self.candidates
         random = np.random.default_rng(1)
         shape = (len(best), TUNING.draws)
@@ -204,7 +204,8 @@ class PartErrors:
         middle = np.log(self.expected)[best][:, None] - 0.5 * np.square(spread)
         doubt = (np.log(self.doubted) - np.log(self.expected))[best][:, None]
         chance = np.square(random.random(TUNING.draws))
-        return np.asarray(np.exp(middle + spread * random.standard_normal(shape) + doubt * chance))
+        draws = np.exp(middle + spread * random.standard_normal(shape) + doubt * chance)
+        return draws.max(axis=0), (draws * (1 - self.less[best])[:, None]).max(axis=0)
 
 
 def shrink(measured: Real, around: Real, noise: Real) -> tuple[Real, Real]:
