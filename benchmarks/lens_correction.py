@@ -24,11 +24,11 @@ from harness import RESULTS, machine, save
 from lippmann.display import load_display
 from lippmann.optics.correction import TOLERANCE, LensCorrection, parts_beside
 from lippmann.optics.pixel_shares import pixel_shares
-from lippmann.rendering.picture import choose_exposure, render_picture
+from lippmann.rendering.picture import choose_exposure
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.runtime import engine
 from lippmann.scene.bundled import names
 from lippmann.scene.readers.load import load_scene
+from part_rays import render
 
 SHEET = "print:lpi=60,ppi=720,size=10x5mm,thickness=26mil"
 CRESTS = {"best focus": "", "R + 20 %": ",radius=0.2877mm"}
@@ -36,38 +36,10 @@ CRESTS = {"best focus": "", "R + 20 %": ",radius=0.2877mm"}
 SAMPLES, TRUTH_SAMPLES = 16, 48
 
 
-def render(scene, display, part=None, samples=SAMPLES, seed=0):
-    request = RenderRequest(
-        integrator="direct",
-        spp=samples,
-        seed=seed,
-        denoise="none",
-        method="full",
-        threads=1,
-        exposure=EXPOSURE,
-        tone_map="none",
-    )
-    engine.start()
-    # What knows the class of rays is loaded before another takes its place.
-    from lippmann.rendering import methods  # noqa: F401
-    from lippmann.rendering.transport import ray_source
-
-    whole = ray_source.DisplayRays
-
-    class PartRays(whole):
-        """Rays of a part of each pixel: its number, and of how many."""
-
-        def light_rays(self, column, row, channel, jitter):
-            import mitsuba as mi
-
-            jitter = mi.Point2f((part[0] + jitter.x) / part[1], jitter.y)
-            return super().light_rays(column, row, channel, jitter)
-
-    ray_source.DisplayRays = PartRays if part else whole
-    try:
-        return render_picture(scene, display, request).pixels.clip(0.0, 1.0)
-    finally:
-        ray_source.DisplayRays = whole
+def picture(scene, display, part=0, parts=1, samples=SAMPLES, seed=0):
+    """Rays of a part of each pixel: its number, and of how many."""
+    beside = (part + 0.5) / parts - 0.5
+    return render(scene, display, EXPOSURE, samples, beside=beside, width=1.0 / parts, seed=seed)
 
 
 def shares_of(display):
@@ -121,12 +93,12 @@ for given in sys.argv[1:] or names():
         EXPOSURE = choose_exposure(scene, TRUE, RenderRequest(integrator="direct", threads=1))
         pinhole = replace(TRUE, distortion=None)
         simple = replace(pinhole, gap=TRUE.lens.thickness / TRUE.lens.index)
-        truth = {part: render(scene, TRUE, (part, 3), TRUTH_SAMPLES, seed=1) for part in (0, 2)}
-        parts = [render(scene, TRUE, (part, 2)) for part in range(len(parts_beside()))]
+        truth = {part: picture(scene, TRUE, part, 3, TRUTH_SAMPLES, seed=1) for part in (0, 2)}
+        parts = [picture(scene, TRUE, part, 2) for part in range(len(parts_beside()))]
         corrected = LensCorrection(TRUE).rows(parts)
         pictures = {
-            "t/n": render(scene, simple),
-            "gap": render(scene, pinhole),
+            "t/n": picture(scene, simple),
+            "gap": picture(scene, pinhole),
             "true": np.mean(parts, axis=0),
             "corrected": corrected,
             "bound": best(TRUE, truth, corrected),

@@ -10,7 +10,6 @@ peak memory of the whole process. Writes benchmarks/results/lens_correction_time
 from __future__ import annotations
 
 import resource
-import tempfile
 import time
 from pathlib import Path
 
@@ -19,22 +18,6 @@ import numpy as np
 from harness import machine, save
 from lippmann.display import load_display
 from lippmann.optics.correction import PARTS, LensCorrection
-
-PANEL = """
-viewing_distance = 600
-[panel]
-width = 3840
-height = 2160
-pixel_pitch = "282.4 dpi"
-subpixel_offsets = "rgb"
-[lens_array]
-layout = "lenticular"
-pitch = "45.5 lpi"
-slant = 9.46
-[lens]
-thickness = 1.4
-index = 1.49
-"""
 
 
 def measure(name: str, display, rows: int) -> dict[str, object]:
@@ -57,9 +40,7 @@ def measure(name: str, display, rows: int) -> dict[str, object]:
     return row
 
 
-with tempfile.TemporaryDirectory() as folder:
-    (Path(folder) / "panel.toml").write_text(PANEL, encoding="utf-8")
-    slanted = load_display(Path(folder) / "panel.toml")
+slanted = load_display(Path(__file__).parent / "slanted_panel.toml")
 sheet = load_display("print:lpi=60,ppi=720,size=8x10in,thickness=26mil")
 measured = [measure("8 x 10 inch print", sheet, 256), measure("4K panel, slanted lenses", slanted, 2160)]
 save("lens_correction_time", {"machine": machine(), "rows": measured}, show=False)

@@ -100,7 +100,7 @@ def test_it_tells_what_it_gains(solved):
     assert options["correction_gain_exact"] > max(
         options[f"correction_gain_{k}"] for k in ("radius", "thickness", "index")
     )
-    assert f"{options['correction_gain_exact']:+.1f} dB to an eye" in note
+    assert f"{options['correction_gain_exact']:+.1f} dB in the directions solved for" in note
 
 
 def test_light_beyond_white_is_white(solved):

@@ -3,31 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lippmann.display import NUMPY, load_display
+from lippmann.errors import DisplayError
 from lippmann.image import IntegralImage
 from lippmann.optics.correction import LensCorrection, parts_beside
 from lippmann.viewing.optical_replay import replay_optics
 
-#: A part of a 15.6-inch 4K panel behind an acrylic sheet.
-PANEL = """
-viewing_distance = 600
-[panel]
-width = 120
-height = 60
-pixel_pitch = "282.4 dpi"
-subpixel_offsets = "rgb"
-[lens_array]
-layout = "lenticular"
-pitch = "45.5 lpi"
-slant = 9.46
-[lens]
-thickness = 1.4
-index = 1.49
-"""
+#: A 4K panel behind an acrylic sheet.
+PANEL = Path(__file__).parents[2] / "benchmarks" / "slanted_panel.toml"
 
 EYES = (-171.0, -83.0, 13.0, 158.0)
 
@@ -94,10 +82,13 @@ def decibels(display, pixels, rows=6):
 
 
 @pytest.fixture(scope="module")
-def solved(tmp_path_factory):
-    path = tmp_path_factory.mktemp("panel") / "slanted.toml"
-    path.write_text(PANEL)
-    display = load_display(path)
+def panel():
+    return load_display(PANEL).resized(120, 60)
+
+
+@pytest.fixture(scope="module")
+def solved(panel):
+    display = panel
     parts = [meant(display, beside) for beside in parts_beside()]
     correction = LensCorrection(display, subpixels=True)
     return display, correction, parts, meant(display, 0.0), correction.rows(parts)
@@ -108,6 +99,20 @@ def test_eyes_see_what_is_meant_better(solved, rows):
     display, _, _, plain, corrected = solved
     gain = decibels(display, corrected, rows) - decibels(display, plain, rows)
     assert gain > 1.0
+
+
+@pytest.mark.parametrize("slant", [14.04, pytest.param(-14.04, marks=pytest.mark.long)])
+def test_lenses_that_cross_a_pixel_in_other_rows_gain_too(panel, slant):
+    display = replace(panel, lens_array=replace(panel.lens_array, slant=slant))
+    corrected = LensCorrection(display, subpixels=True).rows([meant(display, beside) for beside in parts_beside()])
+    plain = meant(display, 0.0)
+    assert min(decibels(display, corrected, rows) - decibels(display, plain, rows) for rows in (6, 10)) > 0.4
+
+
+def test_hardly_slanted_lenses_are_refused(panel):
+    display = replace(panel, lens_array=replace(panel.lens_array, slant=2.0))
+    with pytest.raises(DisplayError, match="within 16 rows"):
+        LensCorrection(display, subpixels=True)
 
 
 @pytest.mark.parametrize(

@@ -209,7 +209,7 @@ def test_views_are_woven_for_the_lens_that_is_there():
     options = corrected.provenance.options
     assert options["correct"] == "lens"
     assert options["correction_gain_exact"] > 0.3
-    assert "dB to an eye" in corrected.provenance.notes[0]
+    assert "dB in the directions solved for" in corrected.provenance.notes[0]
     assert 0.005 < np.abs(plain.pixels - corrected.pixels).mean() < 0.1
     with pytest.raises(DisplayError, match="gives no lens"):
         weave(solid([0, 1], 2, 1), SHEETS[0], correct="lens")

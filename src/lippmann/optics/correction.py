@@ -19,7 +19,7 @@ from lippmann.display.lens_profile import INDICES, LensProfile
 from lippmann.errors import DisplayError
 from lippmann.optics.lens import Lens
 from lippmann.optics.pixel_shares import PixelShares, pixel_shares
-from lippmann.optics.slanted_correction import SlantedRows
+from lippmann.optics.slanted_correction import MOST_ROWS, SlantedRows, pixel_crossing
 from lippmann.runtime.engine_lock import cached_property
 from lippmann.runtime.machine import usable_cores
 from lippmann.runtime.row_threads import Bands
@@ -61,7 +61,7 @@ class LensCorrection:
     Raises
     ------
     DisplayError
-        If the display gives no lens, has other lenses, or several kinds of pixels.
+        If the display gives no lens, has other lenses or hardly slanted ones, or several kinds of pixels.
     """
 
     display: Display
@@ -71,8 +71,12 @@ class LensCorrection:
         Lens.of(self.display)
         if self.display.lens_array.layout != "lenticular" or self.display.panel.subpixel_cells is not None:
             rule = "pictures are corrected for cylinders before pixels that are all alike"
-            fix = "leave the correction out: its rays follow the true directions of the lens all the same"
-            raise DisplayError("cannot be corrected for its lens", where=self.display.name, rule=rule, fix=fix)
+        elif not self.display.lattice.rows_are_alike and pixel_crossing(self.display) > MOST_ROWS:
+            rule = f"pictures are corrected for cylinders that are upright or cross a pixel within {MOST_ROWS} rows"
+        else:
+            return
+        fix = "leave the correction out: its rays follow the true directions of the lens all the same"
+        raise DisplayError("cannot be corrected for its lens", where=self.display.name, rule=rule, fix=fix)
 
     @property
     def margin(self) -> int:
@@ -106,13 +110,14 @@ class LensCorrection:
         options |= {f"correction_gain_{name}": gain for name, gain in gains.items()}
         worst = min(("radius", "thickness", "index"), key=lambda name: gains[name])
         return options, (
-            f"corrected for its lens: {gains['exact']:+.1f} dB to an eye, {gains[worst]:+.1f} dB where the lens's "
-            f"{worst} is {TOLERANCE:.0%} off; {limited:.0%} of the values at black or white"
+            f"corrected for its lens: {gains['exact']:+.1f} dB in the directions solved for, {gains[worst]:+.1f} dB "
+            f"where the lens's {worst} is {TOLERANCE:.0%} off; {limited:.0%} of the values at black or white"
         )
 
     def gains(self, pixels: Floats, parts: Sequence[Floats], first: int = 0) -> dict[str, float]:
-        """Decibels by which an eye sees corrected ``pixels`` nearer to what is meant, by the lens that is there.
+        """Decibels by which corrected ``pixels`` send light nearer to ``parts`` than the mean of these does.
 
+        They are a bound from above: those of the very directions that were solved for, with their noise.
         Keys: ``exact``, and ``radius``, ``thickness`` and ``index``, each the worse of 3 % more and less.
         """
         before = np.mean(_clipped(parts), axis=0)

@@ -1,15 +1,17 @@
-"""Least squares of pictures under slanted cylinders, as an eye sees them: a lens by as many rows as it is wide.
+"""Least squares of pictures under slanted cylinders, as an eye sees them: by as many rows as a lens crosses a pixel in.
 
 Beside the sub-pixels of one row lie gaps under a slanted lens, which the rows about it fill: an eye takes them
-together. So rows are not independent; but the shares of a pixel depend on its place under the lens alone. With ``W``
-the shares of a row's pixels in the light of each lens and direction, ``T`` the light that is meant of them, and ``G``
-the mean over a window of rows, all windows together are solved for: ``|G (W P - T)|`` is least. ``W'G'GW`` and
+together. As many rows as a lens takes to move by a pixel fill them all: a white panel is even in windows so high, and
+uneven in others. So rows are not independent; but the shares of a pixel depend on its place under the lens alone. With
+``W`` the shares of a row's pixels in the light of each lens and direction, ``T`` the light that is meant of them, and
+``G`` the mean over a window of rows, all windows together are solved for: ``|G (W P - T)|`` is least. ``W'G'GW`` and
 ``W'G'G`` of the meant light are stencils, known by the place under the lens.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,8 +39,16 @@ _LEAST = 2e-3
 #: Steps of FISTA: 10 are within 0.1 dB of 100.
 _STEPS = 10
 
+#: Rows in which cylinders may cross a pixel: where they take more, eyes of fewer rows would see a worse picture.
+MOST_ROWS = 16
+
 #: Of the directions, and of the windows of rows, one of so many is judged.
 _JUDGED = 3
+
+
+def pixel_crossing(display: Display) -> float:
+    """Rows in which slanted cylinders move by a pixel, at least 1."""
+    return max(1.0, 1.0 / math.tan(math.radians(abs(display.lens_array.slant))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +81,14 @@ class SlantedRows:
     parts: tuple[float, ...]
 
     @property
-    def window(self) -> int:
+    def window(self) -> float:
         """Rows that an eye sees together."""
-        return max(1, round(self.display.lens_array.pitch / self.display.panel.pixel_pitch))
+        return pixel_crossing(self.display)
 
     @property
     def margin(self) -> int:
         """Rows beyond which others have no say in a row."""
-        return 2 * self.window
+        return 2 * math.ceil(self.window)
 
     def solve(self, meant: Floats, channel: int, first: int) -> Floats:
         """Pixels ``(rows, width)`` of the meant light ``(parts, rows, width)`` of the rows from ``first`` on."""
@@ -104,11 +114,12 @@ class SlantedRows:
     def squared_error(self, pixels: Floats, meant: Floats, first: int, there: Display) -> float:
         """Mean squared error of what eyes see of pixels ``(rows, width, 3)``, against ``(parts, rows, width, 3)``.
 
-        ``there`` is the display with the lens that is there.
+        Light is that over the light of a white panel, whose unevenness no picture can take away. ``there`` is the
+        display with the lens that is there.
         """
         from lippmann.optics.eye_light_kernel import gather_light
 
-        display, n = self.display, self.window
+        display, n = self.display, len(self._row_shares)
         count = np.arange(0, len(pixels) - n + 1, _JUDGED)
         lens = np.arange(display.lens_grid.columns, dtype=np.float64)
         axis, place = (each[:, ::_JUDGED] for each in self._directions(lens))
@@ -118,32 +129,39 @@ class SlantedRows:
         shape = (len(count), place.size)
         numbers = np.broadcast_to(number.ravel(), shape)
         places = np.broadcast_to(middle.reshape(-1, 2), (*shape, 2))
-        lines = np.broadcast_to((count[:, None] + np.array([0.0, n]))[:, None], (*shape, 2)) + float(first)
+        lines = np.broadcast_to((count[:, None] + np.array([0.0, self.window]))[:, None], (*shape, 2)) + float(first)
         tables = light.weights.reshape(-1, *light.weights.shape[2:])
         cells = np.array(((self.offsets,),), dtype=np.float64)
-        seen = np.zeros((*shape, 3), dtype=np.float32)
-        Bands(usable_cores()).lines(
-            gather_light,
-            len(count),
-            pixels,
-            first,
-            panel_frame(display),
-            cells,
-            tables,
-            light.step,
-            numbers,
-            places,
-            lines,
-            seen,
-        )
+        seen, white = (np.zeros((*shape, 3), dtype=np.float32) for _ in range(2))
+        for values, light_seen in ((pixels, seen), (np.ones_like(pixels), white)):
+            Bands(usable_cores()).lines(
+                gather_light,
+                len(count),
+                values,
+                first,
+                panel_frame(display),
+                cells,
+                tables,
+                light.step,
+                numbers,
+                places,
+                lines,
+                light_seen,
+            )
+        seen = np.divide(seen, white, out=np.zeros_like(seen), where=white > 0.0)
         squares = []
         for channel in range(3):
             goal, is_there = self._meant(meant[..., channel], channel, first, axis, place)
-            sums = np.concatenate([np.zeros((1, place.size)), np.cumsum(goal, axis=0)])
-            windows = (sums[count + n] - sums[count]) / n
+            windows = np.array([self._row_shares @ goal[k : k + n] for k in count])
             inside = np.array([is_there[k : k + n].all(axis=0) for k in count])
             squares.append(np.mean((seen[..., channel] - windows)[inside] ** 2))
         return float(np.mean(squares))
+
+    @property
+    def _row_shares(self) -> Real:
+        """Share of each row in a window, which covers its last row in part."""
+        shares: Real = np.minimum(self.window - np.arange(math.ceil(self.window)), 1.0) / self.window
+        return shares
 
     def _directions(self, lens: Real) -> tuple[Real, Real]:
         """``(lenses, directions)``: axis in mm across, and place of each direction relative to it."""
@@ -185,7 +203,7 @@ class SlantedRows:
     def _meant(
         self, meant: Floats, channel: int, first: int, axis: Real, place: Real
     ) -> tuple[Real, NDArray[np.bool_]]:
-        """Light ``(rows, lenses x directions)`` that is meant, between the parts beside it of the same lens and row.
+        """Light ``(rows, lenses x directions)`` that is meant, by cubics through parts of the same lens and row.
 
         And whether the row has the lens.
         """
@@ -204,13 +222,17 @@ class SlantedRows:
             )
             low, high = np.ceil(middle - half), np.floor(middle + half)
             is_there[row] = (low >= 0) & (high < len(parts))
-            result[row] = np.interp(np.clip(at, low, high), parts, line[row])
+            inside = np.clip(at, low, high)
+            result[row] = sum(
+                weight * line[row][np.clip(near, 0, len(parts) - 1).astype(np.int64)]
+                for near, weight in _cubic(inside, low, high)
+            )
         return result, is_there
 
     @cached_property
     def _stencils(self) -> tuple[_Stencil, _Stencil]:
         """Those of ``W'G'GW`` and of ``W'G'G`` of the meant light."""
-        display, n, places = self.display, self.window, self._places
+        display, places, shares = self.display, self._places, self._row_shares
         light = _even_light(display, display)
         slant = math.radians(display.lens_array.slant)
         right, down = (display.panel.pixel_pitch * each for each in (math.cos(slant), math.sin(slant)))
@@ -244,8 +266,7 @@ class SlantedRows:
             is_lit = share(number[0, k], away) > 0.0
             b, k, own, away = b[is_lit], k[is_lit], own[is_lit], away[is_lit]
             at, numbers, value = zone * places + b, number[0, k], share(number[0, k], away)
-            for rows in range(1 - n, n):
-                windows = (n - abs(rows)) / n**2
+            for rows, windows in enumerate(np.correlate(shares, shares, mode="full"), start=1 - len(shares)):
                 nearest, beyond = -rows * down / right, 2.0 * reach / right
                 for column in range(math.floor(nearest - beyond), math.ceil(nearest + beyond) + 1):
                     other = share(numbers, away + rows * down + column * right)
@@ -256,10 +277,9 @@ class SlantedRows:
                 edge = 0.5 * pitch - pitch / places
                 low, high = np.ceil((-edge - start) / finer), np.floor((edge - start) / finer)
                 part = np.clip((place[0, k] - aside - start) / finer, low, high)
-                before = np.floor(part)
-                for step, weight in ((0, 1.0 - part + before), (1, part - before)):
-                    for each in np.unique(before + step):
-                        chosen = before + step == each
+                for near, weight in _cubic(part, low, high):
+                    for each in np.unique(near):
+                        chosen = near == each
                         right_of, which = divmod(int(each), len(self.parts))
                         add(of_meant, (which, rows, right_of), at[chosen], (windows * value * weight)[chosen])
         return _pruned(normal), _pruned(of_meant)
@@ -273,6 +293,21 @@ def _even_light(display: Display, there: Display) -> EyeLight:
     light = eye_light(there, (-reach, reach), (-1e-3, 1e-3))
     room = display.panel.pixel_pitch * math.cos(math.radians(display.lens_array.slant)) / light.step
     return replace(light, weights=light.weights * (room / light.weights.sum(axis=3, keepdims=True)))
+
+
+def _cubic(at: Real, low: Real, high: Real) -> Iterator[tuple[Real, Real]]:
+    """The four whole numbers about ``at`` and their weights in Lagrange's cubic; none beyond ``low`` and ``high``."""
+    first = np.floor(at)
+    t = at - first
+    before, here, after, beyond = t + 1.0, t, t - 1.0, t - 2.0
+    weights = (
+        -here * after * beyond / 6.0,
+        before * after * beyond / 2.0,
+        -before * here * beyond / 2.0,
+        before * here * after / 6.0,
+    )
+    for step, weight in enumerate(weights, start=-1):
+        yield np.clip(first + step, low, high), weight
 
 
 def _pruned(entries: dict[Offset, Real]) -> _Stencil:
