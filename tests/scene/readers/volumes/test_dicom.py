@@ -273,6 +273,22 @@ def test_files_without_places_are_taken_in_the_order_of_their_numbers(tmp_path):
     assert any("size of pixels is not told" in note for note in notes)
 
 
+def test_a_named_file_that_shows_nothing_is_not_replaced_by_its_neighbours(tmp_path):
+    save_series(tmp_path, [0, 3], SeriesInstanceUID="1.1")
+    tiles = {"NumberOfFrames": 3, "TotalPixelMatrixColumns": 15, "TotalPixelMatrixRows": 4}
+    save_slice(tmp_path / "slide.dcm", np.zeros((3, 4, 5)), SeriesInstanceUID="1.2", **tiles)
+    with pytest.raises(
+        SceneError, match=r"slide\.dcm: holds tiles of a microscope's slide, which is no volume; series"
+    ):
+        load_scene(tmp_path / "slide.dcm")
+    color = {"SamplesPerPixel": 3, "PhotometricInterpretation": "RGB", "PlanarConfiguration": 0}
+    save_slice(tmp_path / "colour.dcm", np.zeros((4, 5)), SeriesInstanceUID="1.3", **color)
+    with pytest.raises(SceneError, match=r"colour\.dcm: holds colour pictures alone"):
+        load_scene(tmp_path / "colour.dcm")
+    assert load_scene(tmp_path / "colour.dcm", series="1.1").description.volume.size[2] == 2
+    assert load_scene(tmp_path).description.volume.size[2] == 2
+
+
 def test_what_shows_nothing_is_refused_in_one_line(tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(SceneError, match="is a folder, not a scene file"):

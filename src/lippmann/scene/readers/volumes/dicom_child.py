@@ -31,7 +31,7 @@ _TAGS = [
     *("SpacingBetweenSlices", "NumberOfFrames", "RescaleSlope", "RescaleIntercept", "PhotometricInterpretation"),
     *("SharedFunctionalGroupsSequence", "PerFrameFunctionalGroupsSequence", "BitsAllocated"),
     *("GridFrameOffsetVector", "DoseGridScaling", "DetectorInformationSequence", "SliceVector", "ImagerPixelSpacing"),
-    *("NominalScannedPixelSpacing", "PixelAspectRatio", "FrameIncrementPointer"),
+    *("NominalScannedPixelSpacing", "PixelAspectRatio", "FrameIncrementPointer", "TotalPixelMatrixColumns"),
 ]
 #: Planes whose normal has so much of the patient's length are axial.
 _AXIAL = 0.9999
@@ -163,6 +163,7 @@ def _frames(name: str, header: pydicom.Dataset) -> Iterator[Frame]:
             shows_low_bright=str(header.get("PhotometricInterpretation", "")).strip() == "MONOCHROME1",
             is_moment=header.get("FrameIncrementPointer") in _TIMES,
             is_palette=str(header.get("PhotometricInterpretation", "")).startswith("PALETTE"),
+            is_tile="TotalPixelMatrixColumns" in header,
             position=position,
             orientation=orientation,
             spacing=_numbers(spacing, 2) or _other_spacing(header),

@@ -35,7 +35,7 @@ class Frame:
 
     ``position`` is that of the middle of the first pixel, ``orientation`` the direction along a row, then down a
     column, ``spacing`` the distance of rows, then of columns; None where the header lacks it.
-    ``is_moment`` says that frames of a file follow each other in time.
+    ``is_moment`` says that frames of a file follow each other in time, ``is_tile`` that they lie side by side.
     """
 
     file: str
@@ -50,6 +50,7 @@ class Frame:
     shows_low_bright: bool = False
     is_moment: bool = False
     is_palette: bool = False
+    is_tile: bool = False
     position: tuple[float, ...] | None = None
     orientation: tuple[float, ...] | None = None
     spacing: tuple[float, ...] | None = None
@@ -83,13 +84,16 @@ def choose_series(frames: list[Frame], wanted: str | None, own: str | None) -> t
     Raises
     ------
     SeriesError
-        There is none, or none of that name.
+        There is none, none of that name, or ``own`` holds nothing that is shown.
     """
-    shown = [frame for frame in frames if frame.channels == 1 and not frame.is_palette]
-    if not shown:
-        what = "colour pictures alone" if frames else "no pictures"
-        raise SeriesError(error=f"holds {what}", rule="series of one number a pixel are shown")
+    shown = [frame for frame in frames if frame.channels == 1 and not frame.is_palette and not frame.is_tile]
     counts = Counter(frame.series for frame in shown)
+    if not shown or (own and wanted is None and own not in counts):
+        asked = [frame for frame in frames if not own or frame.series == own]
+        what = "colour pictures alone" if asked else "no pictures"
+        if any(frame.is_tile for frame in asked):
+            what = "tiles of a microscope's slide, which is no volume"
+        raise SeriesError(error=f"holds {what}", rule="series of slices with one number a pixel are shown")
     order = list(counts)
     names = {frame.series: frame.description for frame in reversed(shown)}
     listed = [f"{place} '{names[uid][:40]}' ({counts[uid]})" for place, uid in enumerate(order[:_NAMED], 1)]

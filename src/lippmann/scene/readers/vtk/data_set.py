@@ -66,7 +66,8 @@ def surface_of(source: pyvista.DataSet | pyvista.MultiBlock) -> Surface:
         surface, faces, owners = _triangles(surface)
     positions = np.asarray(surface.points, np.float64)
     if len(faces) == 0:
-        raise SceneError("the PyVista data set has no surface", rule="there must be at least one face")
+        fix = "give lines a thickness, in PyVista by: mesh.tube(radius=0.1)"
+        raise SceneError("the PyVista data set has no surface", rule="there must be at least one face", fix=fix)
     normals, uvs = surface.point_data.active_normals, surface.active_texture_coordinates
     colors = None
     scalars = surface.active_scalars
