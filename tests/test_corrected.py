@@ -38,6 +38,15 @@ def test_parts_are_means_of_what_lies_within_a_pixel():
 
 
 @pytest.mark.slow
+def test_four_samples_are_not_called_one(engine):
+    image = lippmann.render("teapot", PRINT, correct="lens", spp=4, denoise="none")
+    assert image.provenance.spp == 4
+    remarks = [note for note in image.provenance.notes if "no estimate" in note]
+    assert len(remarks) == 1
+    assert "one sample" not in remarks[0]
+
+
+@pytest.mark.slow
 def test_an_eye_sees_the_corrected_picture_nearer_to_what_rays_meet(engine, monkeypatch):
     built, build = [], session._build
     monkeypatch.setattr(session, "_build", lambda *parts: built.append(parts) or build(*parts))

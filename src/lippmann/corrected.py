@@ -16,6 +16,7 @@ from lippmann.options.choices import PROPERTIES
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.picture import render_picture
 from lippmann.rendering.request.plan import resolve
+from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.scene import Scene
@@ -51,10 +52,13 @@ def render_corrected(
     pixels = correction.rows(parts)
     told = rows_told(display.panel.height)
     options, note = correction.told(pixels[told], [part[told] for part in parts], told.start)
+    # A sample of each finer pixel is several of a pixel: why those have no estimate is not why this one has none.
+    of_finer = why_no_estimate(replace(asked, spp=finer.provenance.spp))
+    why = "no estimate of the error: pixels are solved for, so that the error of samples is not theirs"
     provenance = replace(
         finer.provenance,
         options={**finer.provenance.options, **options},
-        notes=(*finer.provenance.notes, note),
+        notes=(*(each for each in finer.provenance.notes if each != of_finer), why, note),
         spp=PARTS**2 * (finer.provenance.spp or 0),
         estimate=None,
     )

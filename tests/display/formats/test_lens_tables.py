@@ -111,6 +111,19 @@ def test_nonsense_is_refused_in_one_line(load, text, said):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("layout", ["lenticular", "square", "hexagonal"])
+@pytest.mark.parametrize("value", ["nan", "-1", "'thick'", "inf"])
+@pytest.mark.parametrize(
+    ("table", "key"), [("lens", "thickness"), ("lens", "radius"), ("pixel", "width"), ("pixel", "blur")]
+)
+def test_lengths_that_are_none_are_refused_under_all_lenses(load, layout, value, table, key):
+    tables = {"lens": {"thickness": 0.66}, "pixel": {}}
+    tables[table][key] = value
+    text = "".join(f"\n[{name}]\n" + "\n".join(f"{k} = {v}" for k, v in keys.items()) for name, keys in tables.items())
+    with pytest.raises(DisplayError, match=rf"own.toml:\d+: .*(length|{key} is)"):
+        load(SHEET.replace("lenticular", layout) + text)
+
+
 def test_infinite_numbers_of_a_lens_are_refused(load):
     for key in ("thickness", "radius", "index", "conic", "diameter", "field"):
         values = {"thickness": 0.66, key: math.inf}

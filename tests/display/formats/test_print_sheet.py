@@ -128,6 +128,8 @@ def test_lengths_have_units():
         ({"thickness": "0.66", "field": "20"}, "field", "field is 20 degrees; crests on 0.66 mm of index 1.57 have"),
         ({"thickness": "0.66", "radius": "0.2"}, "radius", "radius is 0.2 mm; lenses 0.4233 mm wide need more than"),
         ({"thickness": "0.15"}, "thickness", "thickness is 0.15 mm; the crest alone is 0.1532 mm high"),
+        ({"thickness": "0.05"}, "thickness", "thickness is 0.05 mm; the crest alone is 0.1532 mm high"),
+        ({"thickness": "0.05", "radius": "2"}, "thickness", "a field of view of 5 to 150 degrees; look at its unit"),
         ({"radius": "0.3"}, "radius", "radius is given without a thickness; it means nothing alone"),
         ({"conic": "-0.4"}, "conic", "conic is given without a thickness"),
         ({"thickness": "0.66", "conic": "99"}, "conic", "conic is 99; it must lie between -10 and 10"),

@@ -198,6 +198,9 @@ class Print:
         field, index = 0.0, check_index(DEFAULT_INDEX if self.index is None else self.index, "index")
         if finite(thickness, "thickness") > 0:
             field = math.degrees(2 * math.atan(validation.INCH / self._stated_lpi / 2 * index / thickness))
+        if field > _FIELDS[1]:
+            # A sheet thinner than its own crest is refused for that.
+            _ = self._lens_and_gap
         if not _FIELDS[0] <= field <= _FIELDS[1]:
             rule = f"such lenses must have a field of view of {_FIELDS[0]:g} to {_FIELDS[1]:g} degrees"
             fix = "look at its unit"
