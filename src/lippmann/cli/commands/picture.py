@@ -412,6 +412,8 @@ def _quilt_values(path: Path, quilt: Quilt) -> dict[str, Any]:
 
 
 def _quilt_lines(path: Path, quilt: Quilt) -> list[str]:
+    from lippmann.image import Provenance
+
     (width, height), (view_width, view_height) = quilt.size, quilt.view_size
     aspect = "" if quilt.layout.aspect is None else f", aspect {quilt.layout.aspect:g}"
     lines = [f"{path}: quilt, {width}x{height}, {quilt.stored}"]
