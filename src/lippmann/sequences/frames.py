@@ -20,6 +20,7 @@ from lippmann.options.placement import Mode, PlacementOptions
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Build
+from lippmann.runtime.heap import return_freed_memory
 from lippmann.scene.placement import Placement, options_of_sequence, place, stand
 from lippmann.scene.values.description import Camera, Matrix
 from lippmann.sequences.flicker import with_flicker
@@ -328,6 +329,7 @@ def render_frames(
 
     for position, frame in enumerate(frames):
         yield frame, render(position, frame)  # which no variable holds while the next is rendered
+        return_freed_memory()  # else the next begins with the holes that the last one left
 
 
 def render_tiled_frames(
