@@ -478,6 +478,12 @@ class TestDisplayFrame:
         assert "reaches 100 mm in front of the lens plane; recorded rays begin at 20 mm" in cut
         assert "from -100 to 100 mm; the display resolves -50 to 50 mm" in blurred
 
+    def test_what_strains_eyes_says_how_flat_it_would_be_comfortable(self):
+        monitor, deep = load_display("odyssey-3d"), box(10, 10, 260)
+        (warning,) = place(deep, monitor, options=options(place="display")).warnings
+        assert "from -120 to 85.8 mm it is comfortable to look at: flatten it to 66 %, or shift it" in warning
+        assert place(deep, monitor, options=options(place="display", depth_scale=0.65)).warnings == ()
+
 
 @pytest.mark.parametrize(
     ("fields", "message"),

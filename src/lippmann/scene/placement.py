@@ -284,7 +284,7 @@ def _find_warnings(corners: Bounds, display: Display) -> list[str]:
     elif display.stereo is not None and (high[2] > near + 1e-6 or low[2] < far - 1e-6):
         warnings.append(
             f"the scene reaches from {low[2]:.3g} to {high[2]:.3g} mm; from {far:.3g} to {near:.3g} mm it is "
-            "comfortable to look at"
+            f"comfortable to look at: flatten it to {100 / max(low[2] / far, high[2] / near):.2g} %, or shift it"
         )
     if display.stereo is None and (high[2] > near + 1e-6 or low[2] < far - 1e-6):
         warnings.append(
