@@ -145,14 +145,14 @@ def export_image(
     True
     """
     check_target(layout, path)
-    plugin, found = _plugin(layout), _layout(layout)
-    if distance is not None and "distance" not in found.write_options:
+    plugin, target = _plugin(layout), _layout(layout)
+    if distance is not None and "distance" not in target.write_options:
         raise UsageError(f"does not apply to {layout}", parameter="distance", fix="leave it out")
     light_field = light_field_of(image, stored_in(layout, image.stored, bits))
     values = {"distance": distance, "progress": progress}
-    chosen = {name: value for name, value in values.items() if name in found.write_options}
+    chosen = {name: value for name, value in values.items() if name in target.write_options}
     with plugin.guarded(OutputError, str(path)):
-        function_of(found.write)(light_field, image.display, path, **chosen)
+        function_of(target.write)(light_field, image.display, path, **chosen)
     return Exported(light_field.stored, light_field.shape, tuple(_notes(image, layout)))
 
 
@@ -222,8 +222,8 @@ def recognize(path: Path) -> str:
         raise PictureError("not found", where=str(path))
     ending = path.suffix.lower() or None  # of folders none
     own = [name for name in LAYOUTS if _layout(name).ending == ending]
-    if found := own or [name for name in _names() if _layout(name).ending == ending]:
-        return found[0]
+    if matches := own or [name for name in _names() if _layout(name).ending == ending]:
+        return matches[0]
     if ending in _LYTRO:
         fix = "decode them with the Light Field Toolbox or PlenoptiCam, and import the .mat file or the folder of views"
         raise PictureError("raw light fields are not read", where=str(path), fix=fix)
@@ -231,10 +231,10 @@ def recognize(path: Path) -> str:
 
 
 def _plugin(name: str) -> Plugin[Export]:
-    found = EXPORTS.find(name)
-    if found is None or not isinstance(found.value, Layout):
+    matches = EXPORTS.find(name)
+    if matches is None or not isinstance(matches.value, Layout):
         raise UsageError.unknown("layout", name, _names(), parameter="layout", fix=EXPORTS.problems)
-    return found
+    return matches
 
 
 def _names() -> list[str]:
@@ -261,11 +261,11 @@ def _read(path: Path, name: str, display: Display | None, progress: ProgressCall
     values = {"grid": None if shape is None else (shape[1], shape[0]), "progress": progress}
     chosen = {option: value for option, value in values.items() if option in layout.read_options}
     with plugin.guarded(PictureError, str(path)):
-        found = function_of(layout.read)(path, **chosen)
-    if not isinstance(found, LightField):
-        what = f"the plugin {plugin} made a {type(found).__name__} of it"
+        result = function_of(layout.read)(path, **chosen)
+    if not isinstance(result, LightField):
+        what = f"the plugin {plugin} made a {type(result).__name__} of it"
         raise PictureError(what, where=str(path), rule="a layout is read as a LightField")
-    return found
+    return result
 
 
 def _notes(image: IntegralImage, name: str) -> list[str]:

@@ -205,12 +205,12 @@ def _read_version_5(path: Path) -> tuple[NDArray[Any], str]:
     try:
         check_input(path.stat().st_size, "the file", where=str(path))
         variables = {variable.name: variable for variable in read_variables(path.read_bytes())}
-        found = variables.get(_VARIABLE)
-        _check_variable(() if found is None else found.shape, sorted(variables), path)
-        assert found is not None
-        if not found.is_numeric:  # cells, structures, objects or functions
-            raise _not_numeric(_VARIABLE, f"the class {found.kind}", path)
-        values: NDArray[Any] = found.values(str(path))
+        array = variables.get(_VARIABLE)
+        _check_variable(() if array is None else array.shape, sorted(variables), path)
+        assert array is not None
+        if not array.is_numeric:  # cells, structures, objects or functions
+            raise _not_numeric(_VARIABLE, f"the class {array.kind}", path)
+        values: NDArray[Any] = array.values(str(path))
     except (Matlab5Error, OSError) as error:
         raise _damaged(path, error) from error
     return values, ""

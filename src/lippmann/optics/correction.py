@@ -127,11 +127,11 @@ class LensCorrection:
             return 10.0 * float(np.log10(max(worse, 1e-12) / max(better, 1e-12)))
 
         lens = Lens.of(self.display).profile
-        told = {"exact": gain(None)}
+        gains = {"exact": gain(None)}
         for name, limits in (("radius", _NO_LIMITS), ("thickness", _NO_LIMITS), ("index", INDICES)):
             changed = np.clip([getattr(lens, name) * (1.0 + e) for e in (-TOLERANCE, TOLERANCE)], *limits)
-            told[name] = min(gain(replace(lens, **{name: float(value)})) for value in changed)
-        return told
+            gains[name] = min(gain(replace(lens, **{name: float(value)})) for value in changed)
+        return gains
 
     @cached_property
     def _rows(self) -> _UprightRows | SlantedRows:
@@ -178,9 +178,9 @@ class _UprightRows:
         for channel in range(3):
             is_own = there is self.display
             shares = self._systems[channel][0] if is_own else self._shares(there, channel)
-            seen = shares.gather(pixels[..., channel].astype(np.float64))
-            goal = np.moveaxis(meant[..., channel], 0, -1).reshape(len(seen), -1)
-            squares.append(np.mean((seen - goal) ** 2))
+            light = shares.gather(pixels[..., channel].astype(np.float64))
+            goal = np.moveaxis(meant[..., channel], 0, -1).reshape(len(light), -1)
+            squares.append(np.mean((light - goal) ** 2))
         return float(np.mean(squares))
 
     @cached_property

@@ -18,12 +18,12 @@ _LANES = 32
 
 def fista_momenta(steps: int) -> Floats:
     """The share of the last change that is added after each of so many steps of FISTA (Beck and Teboulle 2009)."""
-    found, t = np.empty(steps, dtype=np.float32), 1.0
+    factors, t = np.empty(steps, dtype=np.float32), 1.0
     for number in range(steps):
         following = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * t * t))
-        found[number] = (t - 1.0) / following
+        factors[number] = (t - 1.0) / following
         t = following
-    return found
+    return factors
 
 
 @uncounted

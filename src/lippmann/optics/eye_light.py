@@ -167,8 +167,8 @@ def _about(lines: Real, middle: float, reach: int) -> Real:
     is_there = (index >= 0) & (index < len(lines))
     values = lines[np.where(is_there, index, 0)] * is_there[:, None]
     part = middle - first
-    found: Real = values[:-1] * (1.0 - part) + values[1:] * part
-    return found
+    interpolated: Real = values[:-1] * (1.0 - part) + values[1:] * part
+    return interpolated
 
 
 def _convolved(values: Real, shape: Real, axis: int) -> Real:
@@ -177,8 +177,8 @@ def _convolved(values: Real, shape: Real, axis: int) -> Real:
 
     reach = len(shape) // 2
     pads = [(reach, reach) if each == axis else (0, 0) for each in range(values.ndim)]
-    found: Real = convolve1d(np.pad(values, pads), shape, axis=axis, mode="constant")
-    return found
+    convolved: Real = convolve1d(np.pad(values, pads), shape, axis=axis, mode="constant")
+    return convolved
 
 
 def _disc(width: float, step: float) -> Real:

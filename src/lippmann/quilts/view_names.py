@@ -53,18 +53,18 @@ def places_of_views(paths: Sequence[Path]) -> dict[Place, Path]:
     if all(_STANFORD.search(stem) for stem in stems):
         return _by_place(paths, _stanford_places(stems))
     numbers = [tuple(int(number) for number in _NUMBER.findall(stem)) for stem in stems]
-    for path, found in zip(paths, numbers, strict=True):
-        if not found:
+    for path, parts in zip(paths, numbers, strict=True):
+        if not parts:
             rule = "views are numbered, or named by row and column"
             raise PictureError("the name has no number", where=str(path), rule=rule)
-    if len({len(found) for found in numbers}) > 1:
-        return _by_place(paths, [found[-1:] for found in numbers])
+    if len({len(parts) for parts in numbers}) > 1:
+        return _by_place(paths, [parts[-1:] for parts in numbers])
     columns = list(zip(*numbers, strict=True))
     varying = [index for index, column in enumerate(columns) if len(set(column)) > 1] or [len(columns) - 1]
     last = varying[-1]
     repeating = [index for index in varying if len(set(columns[index])) < len(paths)]
     pair = (last - 1, last) if {last - 1, last} <= {*repeating} else (last,)
-    return _by_place(paths, [tuple(found[index] for index in pair) for found in numbers])
+    return _by_place(paths, [tuple(parts[index] for index in pair) for parts in numbers])
 
 
 def _by_place(paths: Iterable[Path], places: Iterable[Place]) -> dict[Place, Path]:
@@ -84,7 +84,7 @@ def _stanford_places(stems: Sequence[str]) -> list[Place]:
         numbers = places[:, axis]
         first, last = int(numbers.min()), int(numbers.max())
         ends = [
-            fmean(float(found[2 + axis]) for found, number in zip(fields, numbers, strict=True) if number == end)
+            fmean(float(parts[2 + axis]) for parts, number in zip(fields, numbers, strict=True) if number == end)
             for end in (first, last)
         ]
         if ends[0] > ends[1]:

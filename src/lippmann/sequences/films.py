@@ -134,7 +134,7 @@ def film_of_pictures(
         image = INTEGRAL.read(frame.path)
         return quantize(projection(image), 8, image.provenance.transfer)
 
-    return _seen(video, see, size if layout is None else (WIDEST_QUILT, WIDEST_QUILT), shows, codec, layout)
+    return _film_of(video, see, size if layout is None else (WIDEST_QUILT, WIDEST_QUILT), shows, codec, layout)
 
 
 def film_of_quilts(
@@ -182,22 +182,22 @@ def film_of_quilts(
         rule = "quilts have neither native pixels nor depth"
         raise UsageError(f"'{shows}' of quilts", parameter="shows", rule=rule, fix="use lippmann render")
     middle = view_toward(display, views, None if eye == "sweep" else eye)
-    shown = 0
+    position = 0
 
     def see(frame: SavedFrame) -> Pixels:
-        nonlocal shown
+        nonlocal position
         number = middle
         if eye == "sweep":
-            number = math.floor((1.0 + math.sin(2.0 * math.pi * shown / count)) / 2.0 * views)
+            number = math.floor((1.0 + math.sin(2.0 * math.pi * position / count)) / 2.0 * views)
             number = min(number, views - 1)
-        shown += 1
+        position += 1
         quilt = form.read(frame.path)
         return quantize(view_of_quilt(quilt, number), 8, quilt.provenance.transfer)
 
-    return _seen(video, see, default_size(display), shows, codec)
+    return _film_of(video, see, default_size(display), shows, codec)
 
 
-def _seen(
+def _film_of(
     video: Path,
     see: Callable[[SavedFrame], Pixels],
     size: tuple[int, int],

@@ -110,7 +110,7 @@ class Turntable(Motion):
             notes.append("the light sources of a Mitsuba scene turn with it")
         swept = self.swept()
         if options.place not in (None, "fit") or options.camera is not None:
-            found = place(
+            placement = place(
                 _box_of(swept),
                 display,
                 cameras=scene.cameras,
@@ -119,7 +119,7 @@ class Turntable(Motion):
                 is_unbounded=scene.is_unbounded,
                 probe=partial(_depth_of, swept),
             )
-            return replace(found, warnings=(*notes, *found.warnings))
+            return replace(placement, warnings=(*notes, *placement.warnings))
         options = face_viewer(scene.bounds, replace(options, place="fit"), notes)
         yaw, pitch, roll = options.turn
         # About the same axis, the yaw is but another beginning of the turn; fitted after it, the box is the least.
@@ -127,7 +127,7 @@ class Turntable(Motion):
         if abs(self._axis[1]) == 1.0:
             options = replace(options, turn=(0.0, pitch, roll))
         turned = transform_points(turn, swept)
-        found = place(
+        placement = place(
             _box_of(turned),
             display,
             options=options,
@@ -135,9 +135,9 @@ class Turntable(Motion):
             extreme_points=lambda: turned,
         )
         return replace(
-            found,
-            world_from_display=inverse(turn) @ found.world_from_display,
-            warnings=(*notes, *found.warnings),
+            placement,
+            world_from_display=inverse(turn) @ placement.world_from_display,
+            warnings=(*notes, *placement.warnings),
         )
 
     def _turn(self, degrees: float) -> Matrix:

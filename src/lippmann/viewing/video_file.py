@@ -25,7 +25,7 @@ from lippmann.runtime.plugins import Plugin, function_of
 from lippmann.viewing.mp4_film import Codec, check_film, codec_for
 
 #: Seconds after which a thread that waits for the film's writer looks whether it has failed.
-_LOOK = 0.1
+_PLAYBACK = 0.1
 
 
 def check_animation_path(path: Path, codec: Codec | None = None) -> None:
@@ -146,7 +146,7 @@ def _beside(write: Callable[[Iterator[Pixels]], None], frames: Iterable[Pixels])
         def hand_over(frame: Pixels | None) -> None:
             while not writing.done():
                 with suppress(Full):
-                    waiting.put(frame, timeout=_LOOK)
+                    waiting.put(frame, timeout=_PLAYBACK)
                     return
 
         try:

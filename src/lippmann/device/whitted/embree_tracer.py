@@ -90,8 +90,8 @@ class EngineTracer:
         if self._all is None:
             return t, mi.UInt32(dr.full(mi.UInt32, _NONE)), mi.Point2f(0)
         if self._clips:
-            distance, found, at = self._closest_kept(o, d, t, active)
-            return distance, found, at
+            distance, index, at = self._closest_kept(o, d, t, active)
+            return distance, index, at
         ray = mi.Ray3f(mi.Point3f(o), mi.Vector3f(d), t, 0, [])
         pi = self._all.ray_intersect_preliminary(ray, coherent=coherent, active=active)
         hit = pi.is_valid()

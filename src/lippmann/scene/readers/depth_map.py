@@ -224,33 +224,33 @@ def embedded_depth(data: bytes, where: str, turn: int = 1) -> DepthMap | None:
     SceneError
         Its values mean nothing, or its picture is damaged.
     """
-    found: dict[bytes, bytes] = {}
+    entries: dict[bytes, bytes] = {}
     xmp = _xmp(data)
     for prefix in dict.fromkeys((b"GDepth", *_GDEPTH.findall(xmp))):
-        found = _properties(xmp, re.escape(prefix), b"Format|Near|Far|Data|DepthURI") | found
-    behind = None if b"Data" in found else _item_of_depth(data, xmp, found.get(b"DepthURI"))
-    if b"Data" not in found and behind is None:
+        entries = _properties(xmp, re.escape(prefix), b"Format|Near|Far|Data|DepthURI") | entries
+    behind = None if b"Data" in entries else _item_of_depth(data, xmp, entries.get(b"DepthURI"))
+    if b"Data" not in entries and behind is None:
         return None
     try:
-        near, far = float(found.get(b"Near", b"nan")), float(found.get(b"Far", b"nan"))
-        encoded = base64.b64decode(found[b"Data"]) if behind is None else behind
+        near, far = float(entries.get(b"Near", b"nan")), float(entries.get(b"Far", b"nan"))
+        encoded = base64.b64decode(entries[b"Data"]) if behind is None else behind
     except (ValueError, binascii.Error) as error:
         raise SceneError(f"has depth that is not readable ({error})", where=where, rule="GDepth in XMP") from None
     if not 0.0 < near < far < np.inf:
         raise SceneError(f"has depth from {near:g} to {far:g}", where=where, rule="near is above 0, far beyond it")
     values, is_wide = _gray(encoded, where, turn)
     share = values.astype(np.float32) / np.float32(65535.0) if is_wide else without_stairs(values) / np.float32(255.0)
-    if found.get(b"Format") == b"RangeLinear":
+    if entries.get(b"Format") == b"RangeLinear":
         return of_depth((near + share * (far - near)).astype(np.float32))
     return DepthMap((1.0 / near + share * (1.0 / far - 1.0 / near)).astype(np.float32))
 
 
 def _properties(xmp: bytes, prefix: bytes, names: bytes) -> dict[bytes, bytes]:
     """Values of the properties of these names, of each the first."""
-    found: dict[bytes, bytes] = {}
+    entries: dict[bytes, bytes] = {}
     for name, _, attribute, element in re.findall(_PROPERTY % (prefix, names), xmp, re.DOTALL):
-        found.setdefault(name, attribute or element.strip())
-    return found
+        entries.setdefault(name, attribute or element.strip())
+    return entries
 
 
 def _item_of_depth(data: bytes, xmp: bytes, uri: bytes | None) -> bytes | None:

@@ -81,10 +81,10 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
             rule = "pictures are read as photographs with depth: 'lippmann weave' takes quilts, 'lippmann view' our own"
             raise SceneError("needs a depth map", where=path.name, rule=rule, fix=fix)
         notes = (*notes, f"depth from {depth_map.name}, which lies beside it")
-    found = read_depth_map(depth_map) if depth_map is not None else own
-    assert found is not None
+    chosen = read_depth_map(depth_map) if depth_map is not None else own
+    assert chosen is not None
     height, width = image.pixels.shape[:2]
-    rows, columns = found.inverse.shape
+    rows, columns = chosen.inverse.shape
     if not _alike((width, height), (columns, rows)):
         fix = f"turn the map as the picture's EXIF orientation {turn} turns it" if lies(turn) else "turn one of them"
         raise SceneError(
@@ -96,7 +96,7 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
     step = math.ceil(math.sqrt(rows * columns / _MOST_POINTS))
     check_input(_BYTES_PER_POINT * (rows // step) * (columns // step), "its height field", where=path.name)
     places = np.arange(step // 2, rows, step), np.arange(step // 2, columns, step)
-    inverse = found.inverse[np.ix_(*places)]
+    inverse = chosen.inverse[np.ix_(*places)]
     if min(inverse.shape) < 2:
         raise SceneError(f"the depth map has {columns}x{rows} pixels", where=path.name, rule="2 x 2 and more are read")
     v, u = ((place + 0.5) / count for place, count in zip(places, (rows, columns), strict=True))

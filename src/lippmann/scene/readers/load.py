@@ -342,12 +342,12 @@ def _reader_of(path: Path, suffix: str) -> Plugin[Reader]:
         return named
     if named is not None and path.is_file():
         _refuse_others(path, suffix)
-    found = named if beginning is None else READERS.find(beginning)
-    if found is None or (named is None and suffix in _ELSEWHERE):  # Collada is XML, too
+    detected = named if beginning is None else READERS.find(beginning)
+    if detected is None or (named is None and suffix in _ELSEWHERE):  # Collada is XML, too
         raise _unknown_kind(path)
-    if named not in (None, found):
+    if named not in (None, detected):
         raise SceneError(f"is no {suffix} file", where=path.name, rule=f"it begins like a {beginning} file")
-    return found
+    return detected
 
 
 def _refuse_others(path: Path, suffix: str) -> None:

@@ -355,11 +355,11 @@ def _read_libraries(libraries: Lines, file: str, named: NamedFiles) -> tuple[dic
     records: dict[str, MtlRecord] = {}
     notes: list[str] = []
     looked_for = 0
-    seen: set[str] = set()
+    bodies: set[str] = set()
     for body, number in zip(libraries.bodies, libraries.numbers, strict=True):
-        if not body or body in seen:
+        if not body or body in bodies:
             continue
-        seen.add(body)
+        bodies.add(body)
         where = f"{file}:{number}"
         # One name with spaces, or several names: only the folder can tell.
         plain = uncommented(body)

@@ -31,7 +31,7 @@ _COLOR_NAMES = (
     ("r", "g", "b", "a"),
 )
 #: Properties of vertices that are shown.
-_SHOWN = {"x", "y", "z", "nx", "ny", "nz"}.union(*_UV_NAMES, *_COLOR_NAMES)
+_KNOWN = {"x", "y", "z", "nx", "ny", "nz"}.union(*_UV_NAMES, *_COLOR_NAMES)
 
 #: Elements that are shown.
 _ELEMENTS = ("vertex", "face", "tristrips")
@@ -61,7 +61,7 @@ def read_ply(path: Path, *, files: NamedFiles | None = None) -> SceneDescription
         raise SceneError("holds no vertices with x, y and z", where=where)
     notes = [*header.notes]
     elements = {element.name: element for element in header.elements}
-    unread = sorted({each.name for each in elements["vertex"].properties} - _SHOWN)
+    unread = sorted({each.name for each in elements["vertex"].properties} - _KNOWN)
     if unread:
         notes.append(f"of vertices not shown: {', '.join(name[:40] for name in unread[:20])}")
     stepped_over = [each.name[:40] for each in header.elements if each.count and each.name not in _ELEMENTS]

@@ -68,13 +68,13 @@ def blender_version(program: str) -> tuple[int, int] | None:
         status = Path(program).stat()
     except OSError:
         return None
-    return _told_version(program, status.st_mtime_ns)
+    return _version_from_process(program, status.st_mtime_ns)
 
 
 @lru_cache(maxsize=32)
-def _told_version(program: str, _: int) -> tuple[int, int] | None:
+def _version_from_process(program: str, _: int) -> tuple[int, int] | None:
     try:
-        told = subprocess.run(
+        output = subprocess.run(
             [program, "--version"],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -83,8 +83,8 @@ def _told_version(program: str, _: int) -> tuple[int, int] | None:
         ).stdout
     except (OSError, subprocess.TimeoutExpired):
         return None
-    found = _VERSION.search(told[:4096].decode(errors="replace"))
-    return None if found is None else (int(found[1]), int(found[2]))
+    match = _VERSION.search(output[:4096].decode(errors="replace"))
+    return None if match is None else (int(match[1]), int(match[2]))
 
 
 def _candidates() -> Iterator[str]:

@@ -216,11 +216,11 @@ def _variant(root: Fields, variants: Mapping[str, str]) -> int | None:
     names = variant_names(root)
     (key, choice), *more = variants.items()
     if key != MATERIALS or more or choice not in names:
-        told = f"the material variants are {', '.join(names)}" if names else "there are no material variants"
+        listing = f"the material variants are {', '.join(names)}" if names else "there are no material variants"
         what = (
             choice if key == MATERIALS and not more else ", ".join(f"{key}={value}" for key, value in variants.items())
         )
-        raise UsageError(f"'{what}'", where=root.file, parameter="variants", rule=told)
+        raise UsageError(f"'{what}'", where=root.file, parameter="variants", rule=listing)
     return names.index(choice)
 
 
@@ -322,8 +322,8 @@ def check_extensions(document: Document) -> None:
     for name in document.root.texts("extensionsUsed"):
         if name == VARIANTS and document.variant is None:
             names = [name for name in variant_names(document.root) if name]
-            told = f"; there are {', '.join(names[:_NAMED])}" if names else ""
-            document.notes.add(f"of the material variants the default one is shown{told}")
+            listing = f"; there are {', '.join(names[:_NAMED])}" if names else ""
+            document.notes.add(f"of the material variants the default one is shown{listing}")
         if not _is_understood(name) and name not in _SILENT:
             document.notes.add(_remark(name))
 

@@ -68,10 +68,10 @@ class DracoMeshes:
             self._check_count(primitive, accessor, len(values))
         return elements
 
-    def _check_count(self, primitive: Fields, accessor: int, found: int) -> None:
+    def _check_count(self, primitive: Fields, accessor: int, decoded: int) -> None:
         count = self.document.all("accessors")[accessor].integer("count")
-        if found != count:
-            raise self._error(primitive, f"holds {found} elements for accessor {accessor}, which has {count}")
+        if decoded != count:
+            raise self._error(primitive, f"holds {decoded} elements for accessor {accessor}, which has {count}")
 
     def _decode_all(self) -> dict[str, NDArray[np.generic]]:
         views = {
@@ -89,8 +89,8 @@ class DracoMeshes:
             raise self._failure(f"takes more than {_MOST_SECONDS} s") from None
         if done.returncode != 0:
             raise self._failure(f"ended with the exit status {done.returncode}")
-        with np.load(io.BytesIO(done.stdout), allow_pickle=False) as found:
-            return dict(found)
+        with np.load(io.BytesIO(done.stdout), allow_pickle=False) as arrays:
+            return dict(arrays)
 
     def _failure(self, what: str) -> SceneError:
         return self.document.error(f"the decoder of Draco {what}", rule="the data may be damaged", fix=DECOMPRESS)

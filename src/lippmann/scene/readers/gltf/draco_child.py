@@ -22,19 +22,19 @@ def main() -> None:
     _limit_memory(int(sys.argv[1]))
     import DracoPy  # type: ignore[import-not-found, unused-ignore]  # it has no types
 
-    found: dict[str, NDArray[np.generic]] = {}
+    arrays: dict[str, NDArray[np.generic]] = {}
     given = sys.stdin.buffer
     while header := given.read(HEADER.size):
         number, length = HEADER.unpack(header)
         try:
             mesh = DracoPy.decode(given.read(length))
-            found[f"{number}/faces"] = np.asarray(mesh.faces, np.uint32)
+            arrays[f"{number}/faces"] = np.asarray(mesh.faces, np.uint32)
             for attribute in mesh.attributes:
-                found[f"{number}/{attribute['unique_id']}"] = np.atleast_2d(attribute["data"])
+                arrays[f"{number}/{attribute['unique_id']}"] = np.atleast_2d(attribute["data"])
         except (RuntimeError, ValueError, TypeError, MemoryError, DracoPy.FileTypeException) as error:
-            found[f"{number}/error"] = np.array(" ".join(str(error).split())[:200] or type(error).__name__)
+            arrays[f"{number}/error"] = np.array(" ".join(str(error).split())[:200] or type(error).__name__)
     written = io.BytesIO()
-    np.savez(written, **found)  # type: ignore[arg-type]  # names are free
+    np.savez(written, **arrays)  # type: ignore[arg-type]  # names are free
     sys.stdout.buffer.write(written.getvalue())
 
 

@@ -125,10 +125,10 @@ def _summed(codes: Bytes, previous: Bytes, channel: int) -> Bytes:
     if kind == 2:
         turn = channel >> 4
         turned = words if turn == 0 else (words >> np.uint32(turn)) | (words << np.uint32(32 - turn))
-        found = np.bitwise_xor.accumulate(np.concatenate([before, turned], axis=1), axis=1)[:, 1:]
+        sums = np.bitwise_xor.accumulate(np.concatenate([before, turned], axis=1), axis=1)[:, 1:]
     else:
-        found = before + np.cumsum((words >> 1) ^ -(words & 1), axis=1, dtype=words.dtype)
-    return np.concatenate([np.ascontiguousarray(each).view(np.uint8).reshape(-1, width) for each in found], axis=1)
+        sums = before + np.cumsum((words >> 1) ^ -(words & 1), axis=1, dtype=words.dtype)
+    return np.concatenate([np.ascontiguousarray(each).view(np.uint8).reshape(-1, width) for each in sums], axis=1)
 
 
 def _data_block(data: bytes, position: int, end: int, groups: int, kinds: tuple[int, ...]) -> tuple[bytearray, int]:

@@ -79,9 +79,9 @@ class SplatClouds:
             if packed is not None:
                 view = self.document.required_reference(packed, "bufferView", "bufferViews")
                 data, _ = self.accessors.buffers.view(view)
-                found, notes, _ = decode_spz(data, where=self.document.file)
+                decoded, notes, _ = decode_spz(data, where=self.document.file)
                 self._note(notes, primitive)
-                return found
+                return decoded
         attributes = primitive.child("attributes")
         if attributes is None:
             raise primitive.error("attributes", "it is required")

@@ -100,12 +100,12 @@ def _first_residues(chain: gemmi.Chain) -> Iterator[gemmi.Residue]:
 
     Gemmi's own ``first_conformer()`` leaves out whatever shares a number: ligands, and waters of simulations.
     """
-    shown = None
+    first = None
     for residue in chain:
-        shares = shown is not None and residue.seqid == shown.seqid
+        shares = first is not None and residue.seqid == first.seqid
         if shares and any(atom.altloc != "\0" for atom in residue):
             continue
-        shown = residue
+        first = residue
         yield residue
 
 
@@ -125,8 +125,8 @@ def _of_crystal(crystal: gemmi.SmallStructure, notes: list[str]) -> tuple[NDArra
     symmetry = len(crystal.symops) or (len(crystal.spacegroup.operations()) if crystal.spacegroup else 1)
     if symmetry > 1:
         notes.append(f"the file's own atoms are shown: the symmetry of its crystal has {symmetry} copies of them")
-    shown = [sites[row] for row in _first_of_disorder([site.disorder_group for site in sites], notes)]
-    return _arrays([site.element for site in shown], [crystal.cell.orthogonalize(site.fract) for site in shown])
+    chosen = [sites[row] for row in _first_of_disorder([site.disorder_group for site in sites], notes)]
+    return _arrays([site.element for site in chosen], [crystal.cell.orthogonalize(site.fract) for site in chosen])
 
 
 def _of_cartesian(block: gemmi.cif.Block, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -134,19 +134,19 @@ def _of_cartesian(block: gemmi.cif.Block, notes: list[str]) -> tuple[NDArray[np.
     tags = ["label", "Cartn_x", "Cartn_y", "Cartn_z", "?type_symbol", "?disorder_group"]
     rows = list(block.find("_atom_site_", tags))[: MOST_ATOMS + 1]
     groups = [gemmi.cif.as_int(row[5], 0) if row.has(5) else 0 for row in rows]
-    shown = [rows[number] for number in _first_of_disorder(groups, notes)]
-    names = [gemmi.cif.as_string(row[4] if row.has(4) else row[0]) for row in shown]
+    chosen = [rows[number] for number in _first_of_disorder(groups, notes)]
+    names = [gemmi.cif.as_string(row[4] if row.has(4) else row[0]) for row in chosen]
     symbols = ["".join(itertools.takewhile(str.isalpha, name)) for name in names]
-    places = [gemmi.Position(*(gemmi.cif.as_number(row[axis]) for axis in (1, 2, 3))) for row in shown]
+    places = [gemmi.Position(*(gemmi.cif.as_number(row[axis]) for axis in (1, 2, 3))) for row in chosen]
     return _arrays([gemmi.Element(symbol) for symbol in symbols], places)
 
 
 def _first_of_disorder(groups: list[int], notes: list[str]) -> list[int]:
     """Rows of the atoms that are ordered (0), lie about a special position (< 0), or belong to the first group."""
     first = min((group for group in groups if group > 0), default=0)
-    shown = [row for row, group in enumerate(groups) if group <= 0 or group == first]
-    _note_alternatives(len(groups) - len(shown), notes)
-    return shown
+    chosen = [row for row, group in enumerate(groups) if group <= 0 or group == first]
+    _note_alternatives(len(groups) - len(chosen), notes)
+    return chosen
 
 
 def _note_alternatives(count: int, notes: list[str]) -> None:

@@ -75,13 +75,13 @@ def read_molecule(path: Path) -> SceneDescription:
         fix = "install it: pip install 'lippmann[molecules]'"
         raise SceneError("molecules need the library gemmi", where=path.name, fix=fix)
     try:
-        found = _process.ask_arrays(path)
+        arrays = _process.ask_arrays(path)
     except HelperEndedError as error:
         raise SceneError(f"gemmi breaks down at the file ({error})", where=path.name, fix="is it whole?") from None
-    if "error" in found:
-        raise SceneError(f"is no molecule that is understood ({found['error']})", where=path.name)
-    elements, positions = found["elements"].astype(np.int64), found["positions"].astype(np.float64)
-    notes = found["notes"].tolist()
+    if "error" in arrays:
+        raise SceneError(f"is no molecule that is understood ({arrays['error']})", where=path.name)
+    elements, positions = arrays["elements"].astype(np.int64), arrays["positions"].astype(np.float64)
+    notes = arrays["notes"].tolist()
     fit = np.isfinite(positions).all(axis=1) & (np.abs(positions) < 1e6).all(axis=1)
     elements, positions = elements[fit], positions[fit]
     if not 0 < len(elements) <= _MOST_ATOMS:

@@ -188,10 +188,10 @@ def _read(bundle: _Files, name: str) -> SceneDescription:
     ask_memory(count, coefficients, where=bundle.where)
 
     def pixels(part: _Meta, number: int, files: int) -> Bytes:
-        found = bundle.pixels(part.files(files)[number], count)
-        if len(found) < count:
-            raise bundle.error(f"{part.place}: {len(found)} pixels for {count} splats", "each splat has one")
-        return found
+        texels = bundle.pixels(part.files(files)[number], count)
+        if len(texels) < count:
+            raise bundle.error(f"{part.place}: {len(texels)} pixels for {count} splats", "each splat has one")
+        return texels
 
     means, scales, quats, sh0 = (meta.child(key) for key in ("means", "scales", "quats", "sh0"))
     steps = pixels(means, 1, 2)[:, :3].astype(np.float32) * 256.0 + pixels(means, 0, 2)[:, :3]

@@ -205,12 +205,12 @@ def _extensions(records: bytes, where: str) -> tuple[NDArray[np.float64] | None,
 def _unpacked(stream: zlib._Decompress, data: bytes | memoryview, size: int, where: str) -> bytes:
     """The next ``size`` bytes of a stream, and no more than those."""
     try:
-        found = stream.decompress(data, size) if size else b""
+        unpacked = stream.decompress(data, size) if size else b""
     except zlib.error as error:
         raise SceneError(f"is damaged ({error})", where=where) from None
-    if len(found) < size:
-        raise SceneError(f"is cut short: {len(found)} of {size} bytes", where=where, fix="copy it anew")
-    return found
+    if len(unpacked) < size:
+        raise SceneError(f"is cut short: {len(unpacked)} of {size} bytes", where=where, fix="copy it anew")
+    return unpacked
 
 
 def _fixed_point(places: Bytes, fraction: int) -> FloatArray:

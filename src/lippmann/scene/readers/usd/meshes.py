@@ -93,8 +93,8 @@ class MeshReader:
         corners = np.arange(len(polygons.indices))
         hole = np.isin(np.flatnonzero(wide), self._integers(record, "holes"))
         triangles, owners = triangulate(polygons.points, polygons.indices, polygons.counts)
-        shown = ~hole[polygons.faces[owners]]
-        triangles, owners = triangles[shown], owners[shown]
+        solid = ~hole[polygons.faces[owners]]
+        triangles, owners = triangles[solid], owners[solid]
         if record["left_handed"]:
             triangles = triangles[:, ::-1]
         stage_faces = np.flatnonzero(wide)[polygons.faces]
@@ -259,12 +259,12 @@ class MeshReader:
                 normals = np.einsum("cij,cj->ci", turns[polygons.indices], normals).astype(np.float32)
         uvs = []
         for uv_name in self._surface(material).uv_names:
-            found = record["uvs"].get(uv_name)
-            if found is None:
+            entry = record["uvs"].get(uv_name)
+            if entry is None:
                 self._note_no_uvs(record, uv_name)
                 uvs.append(np.zeros((len(polygons.indices), 2), np.float32))
                 continue
-            values = self._values(sampler, found, name, f"texture coordinates '{uv_name}'")
+            values = self._values(sampler, entry, name, f"texture coordinates '{uv_name}'")
             # A stage's v points up the picture.
             uvs.append((values * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32))
         colors = self._colors(record, material, lambda primvar, what: self._values(sampler, primvar, name, what))

@@ -78,7 +78,7 @@ def _turned(parts: list[NDArray[np.float64]], normals: list[NDArray[np.float64]]
     """Profiles ``(k, 2)`` of radius and z, from below, turned about z; normals likewise."""
     angles = np.arange(_AROUND) * (2.0 * np.pi / _AROUND)
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    points, indices, found, offset = [], [], [], 0
+    points, indices, turned_normals, offset = [], [], [], 0
     for profile, normal in zip(parts, normals, strict=True):
         around = np.arange(_AROUND)
         beside = (around + 1) % _AROUND
@@ -86,11 +86,11 @@ def _turned(parts: list[NDArray[np.float64]], normals: list[NDArray[np.float64]]
         quads = np.stack([rows + around, rows + beside, rows + beside + _AROUND, rows + around + _AROUND], axis=-1)
         quads = quads.reshape(-1, 4)
         points.append(_swept(profile, ring))
-        found.append(_swept(normal, ring)[quads.ravel()])
+        turned_normals.append(_swept(normal, ring)[quads.ravel()])
         indices.append(quads.ravel() + offset)
         offset += len(profile) * _AROUND
     corners = np.concatenate(indices)
-    return Polygons(np.concatenate(points), np.full(len(corners) // 4, 4), corners, np.concatenate(found))
+    return Polygons(np.concatenate(points), np.full(len(corners) // 4, 4), corners, np.concatenate(turned_normals))
 
 
 def _swept(profile: NDArray[np.float64], ring: NDArray[np.float64]) -> NDArray[np.float64]:

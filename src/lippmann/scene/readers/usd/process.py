@@ -63,6 +63,6 @@ def ask_stage(
         raise SceneError(f"USD breaks down at the file ({error})", where=path.name, fix="is it whole?") from None
     tree, arrays = unpack(answer)
     if "error" in tree:
-        found = tree["error"]
-        raise SceneError(found["what"], where=path.name, rule=found["rule"], fix=found["fix"])
+        fault = tree["error"]
+        raise SceneError(fault["what"], where=path.name, rule=fault["rule"], fix=fault["fix"])
     return tree, arrays

@@ -44,24 +44,24 @@ def check_layers(path: str, folder: str | None) -> list[str]:
         if layer is None:
             continue
         for name in sorted(filter(None, layer.GetCompositionAssetDependencies())):
-            found = layer.ComputeAbsolutePath(name)
-            if found in known:
+            layer_path = layer.ComputeAbsolutePath(name)
+            if layer_path in known:
                 continue
-            known.add(found)
+            known.add(layer_path)
             if len(known) > _MOST_LAYERS:
                 raise StageError(f"is made of more than {_MOST_LAYERS} layers")
-            if home is not None and not _lies_in(found, home):
+            if home is not None and not _lies_in(layer_path, home):
                 raise StageError(
                     f"layer '{name}' lies outside the scene's folder",
                     rule="a scene file may name only files in its own folder and below",
                     fix="move it there, or trust the scene file with allow_outside=True",
                 )
-            if not os.path.isfile(_outer(found)):
+            if not os.path.isfile(_outer(layer_path)):
                 notes.append(f"layer '{name}' not found: the scene lacks what it holds")
-            elif Sdf.FileFormat.FindByExtension(found) is None:  # MaterialX and others whose plugin is not installed
+            elif Sdf.FileFormat.FindByExtension(layer_path) is None:  # MaterialX and others without a plugin
                 notes.append(f"layer '{name}' is of a format that the installed USD does not read: left out")
             else:
-                waiting.append(found)
+                waiting.append(layer_path)
     return notes
 
 
@@ -118,5 +118,5 @@ def _known_variants(stage: Usd.Stage) -> str:
     for prim in stage.TraverseAll():
         for name in prim.GetVariantSets().GetNames():
             known.setdefault(name, set()).update(prim.GetVariantSet(name).GetVariantNames())
-    told = [f"{name}={'|'.join(sorted(choices))}" for name, choices in sorted(known.items())]
-    return "known are " + ", ".join(told[:20]) if told else "the stage has no variants"
+    listing = [f"{name}={'|'.join(sorted(choices))}" for name, choices in sorted(known.items())]
+    return "known are " + ", ".join(listing[:20]) if listing else "the stage has no variants"

@@ -48,8 +48,8 @@ def light_record(prim: Usd.Prim, world: NDArray[np.float64], time: Usd.TimeCode,
         return {"kind": None}
 
     def value(name: str, default: Any) -> Any:
-        found = prim.GetAttribute(name).Get(time) if prim.HasAttribute(name) else None
-        return default if found is None else found
+        stored = prim.GetAttribute(name).Get(time) if prim.HasAttribute(name) else None
+        return default if stored is None else stored
 
     color = Gf.Vec3f(value("inputs:color", Gf.Vec3f(1.0)))
     if value("inputs:enableColorTemperature", False):

@@ -45,7 +45,7 @@ def mesh_record(
         points = skinned_points(skin, prim, points, time)
     crease_lengths = np.asarray(mesh.GetCreaseLengthsAttr().Get(time) or [], np.int64)
     return {
-        **_shown(prim, time, arrays),
+        **_visible(prim, time, arrays),
         "points": arrays.add(_floats(points, 3)),
         "counts": integers(mesh.GetFaceVertexCountsAttr()),
         "indices": integers(mesh.GetFaceVertexIndicesAttr()),
@@ -68,10 +68,10 @@ def primitive_record(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Reco
     kind = str(prim.GetTypeName())
     values = {name: prim.GetAttribute(name).Get(time) for name in PRIMITIVES[kind]}
     numbers = {name: str(value) if name == "axis" else float(value) for name, value in values.items()}
-    return {**_shown(prim, time, arrays), "primitive": kind, "numbers": numbers}
+    return {**_visible(prim, time, arrays), "primitive": kind, "numbers": numbers}
 
 
-def _shown(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Record:
+def _visible(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Record:
     gprim = UsdGeom.Gprim(prim)
     primvars = UsdGeom.PrimvarsAPI(prim)
     return {
@@ -91,13 +91,13 @@ def _normals(mesh: UsdGeom.Mesh, time: Usd.TimeCode, arrays: Arrays) -> Record |
 
 
 def _uv_sets(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Record:
-    found: Record = {}
+    sets: Record = {}
     for primvar in UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance():
-        if str(primvar.GetTypeName()) in _UV_TYPES and len(found) < _MOST_UV_SETS:
+        if str(primvar.GetTypeName()) in _UV_TYPES and len(sets) < _MOST_UV_SETS:
             record = _primvar(primvar, 2, time, arrays)
             if record is not None:
-                found[str(primvar.GetPrimvarName())] = record
-    return found
+                sets[str(primvar.GetPrimvarName())] = record
+    return sets
 
 
 def _primvar(primvar: UsdGeom.Primvar, width: int, time: Usd.TimeCode, arrays: Arrays) -> Record | None:
@@ -112,11 +112,11 @@ def _primvar(primvar: UsdGeom.Primvar, width: int, time: Usd.TimeCode, arrays: A
 
 def _subsets(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays, materials: MaterialTable) -> list[Record]:
     """Faces that have a material of their own."""
-    found = []
+    subsets = []
     for subset in UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets():
         faces = np.asarray(subset.GetIndicesAttr().Get(time) or [], np.int64).ravel()
-        found.append({"faces": arrays.add(faces), "material": materials.bound(subset.GetPrim())})
-    return found
+        subsets.append({"faces": arrays.add(faces), "material": materials.bound(subset.GetPrim())})
+    return subsets
 
 
 def _floats(values: Any, width: int) -> np.ndarray:

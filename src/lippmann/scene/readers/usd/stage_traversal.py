@@ -166,15 +166,15 @@ class Traversal:
         targets = instancer.GetPrototypesRel().GetForwardedTargets()
         kinds = np.asarray(instancer.GetProtoIndicesAttr().Get(self._time) or [], np.int64)
         places = _instance_matrices(instancer, self._time)
-        shown = np.asarray(instancer.ComputeMaskAtTime(self._time) or [True] * len(kinds), bool)
-        if len(places) != len(kinds) or len(shown) != len(kinds):
+        visible = np.asarray(instancer.ComputeMaskAtTime(self._time) or [True] * len(kinds), bool)
+        if len(places) != len(kinds) or len(visible) != len(kinds):
             raise StageError(f"{name} has {len(places)} places for {len(kinds)} copies", rule="one each")
         if len(kinds) and not 0 <= kinds.min() <= kinds.max() < len(targets):
             raise StageError(f"{name} has {len(targets)} prototypes, counted from 0, and names {kinds.max()}")
         if UsdGeom.PrimvarsAPI(instancer.GetPrim()).HasPrimvar("displayColor"):
             self.notes["colours of a point instancer's copies are not read: they have those of its prototypes"] = None
         for number, target in enumerate(targets):
-            own = places[(kinds == number) & shown]
+            own = places[(kinds == number) & visible]
             prim = self._stage.GetPrimAtPath(target)
             if not len(own):
                 continue

@@ -151,9 +151,9 @@ class _Topology:
         self.sharpness = np.where(faces_at_edge == 2, 0.0, np.inf)
         if len(cage.edges):
             creases = np.sort(cage.edges, axis=1)
-            wanted = creases[:, 0] * cage.points + creases[:, 1]
-            places = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-            known = keys[places] == wanted
+            edges = creases[:, 0] * cage.points + creases[:, 1]
+            places = np.minimum(np.searchsorted(keys, edges), len(keys) - 1)
+            known = keys[places] == edges
             np.maximum.at(self.sharpness, places[known], cage.sharpness[known])
 
     def matrix(self, rows: Integers, columns: Integers, values: Floats | float, shape: tuple[int, int]) -> Sparse:

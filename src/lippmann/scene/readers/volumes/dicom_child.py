@@ -200,8 +200,8 @@ def _frame_position(
 def _other_spacing(header: pydicom.Dataset) -> tuple[float, ...] | None:
     """Distances of rows and columns without PixelSpacing: in the detector, on the film, or their ratio alone."""
     for name in ("ImagerPixelSpacing", "NominalScannedPixelSpacing"):
-        if found := _numbers(header.get(name), 2):
-            return found
+        if spacing := _numbers(header.get(name), 2):
+            return spacing
     ratio = _numbers(header.get("PixelAspectRatio"), 2)
     return (ratio[0] / ratio[1], 1.0) if ratio is not None and min(ratio) > 0.0 else None
 
@@ -214,8 +214,8 @@ def _first(dataset: pydicom.Dataset, sequence: str) -> pydicom.Dataset | None:
 def _numbers(values: Any, count: int) -> tuple[float, ...] | None:
     if values is None or isinstance(values, str) or len(values) != count:
         return None
-    found = tuple(float(value) for value in values)
-    return found if np.isfinite(found).all() else None
+    numbers = tuple(float(value) for value in values)
+    return numbers if np.isfinite(numbers).all() else None
 
 
 def _fill(frames: list[Frame], lost: dict[str, list[str]], memory: int) -> tuple[dict[str, Any], bytes]:

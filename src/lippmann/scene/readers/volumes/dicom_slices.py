@@ -73,12 +73,12 @@ class Stack:
     places: Numbers | None = None
 
 
-def choose_series(frames: list[Frame], wanted: str | None, own: str | None) -> tuple[list[Frame], list[str]]:
+def choose_series(frames: list[Frame], series: str | None, own: str | None) -> tuple[list[Frame], list[str]]:
     """The slices of one series that fit together, and remarks on the others.
 
     Parameters
     ----------
-    wanted:
+    series:
         Number, description or UID; None for the series ``own``, or without one that with the most slices.
 
     Raises
@@ -86,32 +86,32 @@ def choose_series(frames: list[Frame], wanted: str | None, own: str | None) -> t
     SeriesError
         There is none, none of that name, or ``own`` holds nothing that is shown.
     """
-    shown = [frame for frame in frames if frame.channels == 1 and not frame.is_palette and not frame.is_tile]
-    counts = Counter(frame.series for frame in shown)
-    if not shown or (own and wanted is None and own not in counts):
+    candidates = [frame for frame in frames if frame.channels == 1 and not frame.is_palette and not frame.is_tile]
+    counts = Counter(frame.series for frame in candidates)
+    if not candidates or (own and series is None and own not in counts):
         asked = [frame for frame in frames if not own or frame.series == own]
         what = "colour pictures alone" if asked else "no pictures"
         if any(frame.is_tile for frame in asked):
             what = "tiles of a microscope's slide, which is no volume"
         raise SeriesError(error=f"holds {what}", rule="series of slices with one number a pixel are shown")
     order = list(counts)
-    names = {frame.series: frame.description for frame in reversed(shown)}
+    names = {frame.series: frame.description for frame in reversed(candidates)}
     listed = [f"{place} '{names[uid][:40]}' ({counts[uid]})" for place, uid in enumerate(order[:_NAMED], 1)]
     list_of = ", ".join(listed) + (f" and {len(order) - _NAMED} more" if len(order) > _NAMED else "")
-    if wanted is not None:
-        fits = [uid for place, uid in enumerate(order, 1) if wanted in (str(place), uid)]
-        fits = fits or [uid for uid in order if names[uid].casefold() == wanted.casefold()]
+    if series is not None:
+        fits = [uid for place, uid in enumerate(order, 1) if series in (str(place), uid)]
+        fits = fits or [uid for uid in order if names[uid].casefold() == series.casefold()]
         if not fits:
             raise SeriesError(usage=f"series (and their slices) are {list_of}")
         chosen = fits[0]
     else:
         chosen = own if own is not None and own in counts else max(order, key=lambda uid: counts[uid])
     notes = []
-    if len(order) > 1 and wanted is None and chosen != own:
+    if len(order) > 1 and series is None and chosen != own:
         place = order.index(chosen) + 1
         notes.append(f"series {place} of {len(order)} is shown; series (and their slices) are {list_of}")
     kinds: dict[object, list[Frame]] = {}
-    for frame in shown:
+    for frame in candidates:
         if frame.series == chosen:
             turned = None if frame.orientation is None else tuple(np.round(frame.orientation, _DECIMALS).tolist())
             kinds.setdefault((frame.shape, turned, frame.spacing), []).append(frame)

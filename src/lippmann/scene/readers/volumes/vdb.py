@@ -52,17 +52,17 @@ def read_vdb(path: Path, *, series: str | None = None) -> SceneDescription:
             fix="install one, or save an array by its copyToArray as .npy",
         )
     try:
-        found = _process.ask_arrays(path, series=series)
+        arrays = _process.ask_arrays(path, series=series)
     except HelperEndedError as error:
         fix = "is it whole, and was the module built for this NumPy?"
         raise SceneError(f"OpenVDB breaks down at the file ({error})", where=where, fix=fix) from None
-    if "usage" in found:
-        raise UsageError(f"'{series}'", where=where, parameter="series", rule=str(found["usage"]))
-    if "refused" in found:
-        raise SceneError(str(found["refused"]), where=where)
-    if "error" in found:
-        raise SceneError(f"cannot be read ({found['error']})", where=where, rule="an OpenVDB file")
-    grid, matrix, notes = found["grid"], found["matrix"].astype(np.float64), found["notes"].tolist()
+    if "usage" in arrays:
+        raise UsageError(f"'{series}'", where=where, parameter="series", rule=str(arrays["usage"]))
+    if "refused" in arrays:
+        raise SceneError(str(arrays["refused"]), where=where)
+    if "error" in arrays:
+        raise SceneError(f"cannot be read ({arrays['error']})", where=where, rule="an OpenVDB file")
+    grid, matrix, notes = arrays["grid"], arrays["matrix"].astype(np.float64), arrays["notes"].tolist()
     check_input(2 * grid.nbytes, "the grid", where=where)
     if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) == 0.0:
         raise SceneError("its voxels have no extent", where=where)

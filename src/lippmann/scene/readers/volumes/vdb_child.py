@@ -35,16 +35,16 @@ def _load() -> Any:
 
 def _read(path: str, series: str | None, memory: int) -> dict[str, NDArray[np.generic]]:
     openvdb = _load()
-    told = openvdb.readAllGridMetadata(path)
-    names = [str(each.name) for each in told]
-    scalar = [number for number, each in enumerate(told) if str(each.valueTypeName) in _SCALAR]
+    grids = openvdb.readAllGridMetadata(path)
+    names = [str(each.name) for each in grids]
+    scalar = [number for number, each in enumerate(grids) if str(each.valueTypeName) in _SCALAR]
     if series is not None and series not in (names[number] for number in scalar):
         known = ", ".join(names[number] for number in scalar[:20]) or "no grid of one number a voxel"
         raise RefusedFileError("usage", f"the file has {known}")
     if not scalar:
         raise RefusedFileError("refused", f"its grids ({', '.join(names[:20]) or 'none'}) hold no single numbers")
-    wanted = series if series is not None else _USUAL
-    name = names[next((number for number in scalar if names[number] == wanted), scalar[0])]
+    preferred = series if series is not None else _USUAL
+    name = names[next((number for number in scalar if names[number] == preferred), scalar[0])]
     grid = openvdb.read(path, name)
     if str(grid.gridClass) == _LEVEL_SET:
         raise RefusedFileError(

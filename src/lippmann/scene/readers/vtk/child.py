@@ -29,7 +29,7 @@ def _read(path: str, series: str | None) -> dict[str, NDArray[np.generic]]:
             remarks.append(f"the scalars '{data.active_scalars_name}'")
             return {"grid": grid, "matrix": matrix, "notes": np.array(remarks)}
     surface = surface_of(data)
-    found: dict[str, NDArray[np.generic]] = {
+    arrays: dict[str, NDArray[np.generic]] = {
         "positions": surface.positions,
         "faces": surface.faces,
         "notes": np.array([*remarks, *surface.notes], dtype=np.str_),
@@ -37,8 +37,8 @@ def _read(path: str, series: str | None) -> dict[str, NDArray[np.generic]]:
     for name in ("normals", "colors"):
         values = getattr(surface, name)
         if values is not None:
-            found[name] = values
-    return found
+            arrays[name] = values
+    return arrays
 
 
 def _choose(data: pyvista.DataSet, series: str | None) -> list[str]:

@@ -86,15 +86,15 @@ def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
             notes += [f"'{block.name[:40]}': {note}" for note in surface.notes]
             if actor.prop.GetInterpolation() == _FLAT:
                 surface = replace(surface, normals=None)
-            shown = [mesh_of(surface, block.name, len(materials))]
+            drawn = [mesh_of(surface, block.name, len(materials))]
             material = _material(actor.prop, block, texture, is_mapped=is_mapped)
             if surface.faces.shape[1] == 1:
-                shown, width = draw_cloud(shown)
+                drawn, width = draw_cloud(drawn)
                 material = replace(material, unlit=True)
                 notes.append(f"'{block.name[:40]}': {width.note}")
             materials.append(material)
-            instances += [Instance(len(meshes) + number, _matrix(actor.GetMatrix())) for number in range(len(shown))]
-            meshes += shown
+            instances += [Instance(len(meshes) + number, _matrix(actor.GetMatrix())) for number in range(len(drawn))]
+            meshes += drawn
     if ignored:
         notes.append(f"{ignored} annotations and hidden objects of the plotter are not shown")
     if len(volumes) > 1:
@@ -118,25 +118,25 @@ def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
 
 def _left_out(actor: Any, mapper: Any) -> list[str]:
     """What changes an actor's picture in the plotter and is not shown."""
-    found = []
+    features = []
     if mapper.GetClippingPlanes() is not None and mapper.GetClippingPlanes().GetNumberOfItems():
-        found.append("clipping planes")
+        features.append("clipping planes")
     if actor.IsA("vtkVolume"):
         if mapper.GetCropping():
-            found.append("cropping")
+            features.append("cropping")
         if mapper.GetBlendMode() != _COMPOSITE:
-            found.append("its way of blending")
-        return found
-    look = actor.prop
-    if look.GetRepresentation() != _SURFACE and not is_points(mapper.dataset):
-        found.append("lines or points in place of the surface")
-    elif look.GetEdgeVisibility():
-        found.append("edges")
-    if look.GetBackfaceCulling() or look.GetFrontfaceCulling():
-        found.append("culling")
+            features.append("its way of blending")
+        return features
+    prop = actor.prop
+    if prop.GetRepresentation() != _SURFACE and not is_points(mapper.dataset):
+        features.append("lines or points in place of the surface")
+    elif prop.GetEdgeVisibility():
+        features.append("edges")
+    if prop.GetBackfaceCulling() or prop.GetFrontfaceCulling():
+        features.append("culling")
     if actor.GetBackfaceProperty() is not None:
-        found.append("the look of its back")
-    return found
+        features.append("the look of its back")
+    return features
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,18 +178,18 @@ def _blocks(mapper: Any, source: Any, name: str) -> Iterator[_Block]:
 
 def _surface(mapper: Any, block: _Block, actor: Any) -> tuple[Surface, Texture | None, bool]:
     """The surface of an actor's data, its texture, and whether its colours are those of scalars."""
-    shown = block.data.copy(deep=False)
+    data = block.data.copy(deep=False)
     texture = None
     if mapper.GetScalarVisibility() and block.color is None:
-        texture = _map_scalars(mapper, shown)
+        texture = _map_scalars(mapper, data)
     else:
-        shown.set_active_scalars(None)
-    surface = surface_of(shown)
+        data.set_active_scalars(None)
+    surface = surface_of(data)
     is_mapped = texture is not None or surface.colors is not None
     return surface, texture if is_mapped else _texture(actor.GetTexture()), is_mapped
 
 
-def _map_scalars(mapper: Any, shown: Any) -> Texture | None:
+def _map_scalars(mapper: Any, data: Any) -> Texture | None:
     """Give data the colours that VTK's own mapper has for their scalars, or coordinates in the texture returned.
 
     Numbers at points are looked up in each pixel, by a texture of the colour map, with a row for what is no number.
@@ -197,16 +197,16 @@ def _map_scalars(mapper: Any, shown: Any) -> Texture | None:
     of_cells = mapper.scalar_map_mode == "cell"
     name = getattr(mapper, "array_name", None)
     if name:
-        shown.set_active_scalars(name, preference="cell" if of_cells else "point")
+        data.set_active_scalars(name, preference="cell" if of_cells else "point")
     mapper.Modified()  # else it may return the colours of other data
-    mapped = mapper.MapScalars(shown, 1.0)
+    mapped = mapper.MapScalars(data, 1.0)
     coordinates, picture = mapper.GetColorCoordinates(), mapper.GetColorTextureMap()
-    shown.set_active_scalars(None)
+    data.set_active_scalars(None)
     if mapped is not None:
-        (shown.cell_data if of_cells else shown.point_data)[_COLORS] = _values(mapped)
-        shown.set_active_scalars(_COLORS, preference="cell" if of_cells else "point")
+        (data.cell_data if of_cells else data.point_data)[_COLORS] = _values(mapped)
+        data.set_active_scalars(_COLORS, preference="cell" if of_cells else "point")
     elif coordinates is not None and picture is not None:
-        shown.point_data.active_texture_coordinates = _values(coordinates)
+        data.point_data.active_texture_coordinates = _values(coordinates)
         return Texture(_texels(picture), srgb=True, wrap_u="clamp", wrap_v="clamp", filter="nearest")
     return None
 
@@ -233,10 +233,10 @@ def _values(array: Any) -> NDArray[np.generic]:
     return np.array(vtk_to_numpy(array))
 
 
-def _material(look: Any, block: _Block, texture: Texture | None, *, is_mapped: bool) -> Material:
-    opacity = float(look.opacity) if block.opacity is None else block.opacity
-    is_physical = look.GetInterpolation() == _PBR
-    color = _linear(look.color.float_rgb if block.color is None else block.color)
+def _material(prop: Any, block: _Block, texture: Texture | None, *, is_mapped: bool) -> Material:
+    opacity = float(prop.opacity) if block.opacity is None else block.opacity
+    is_physical = prop.GetInterpolation() == _PBR
+    color = _linear(prop.color.float_rgb if block.color is None else block.color)
     # With colours of its own a surface may let light through where they say so.
     blends = opacity < 1.0 or is_mapped or texture is not None
     return Material(
@@ -245,10 +245,10 @@ def _material(look: Any, block: _Block, texture: Texture | None, *, is_mapped: b
         base_color_texture=texture,
         alpha=opacity,
         alpha_mode="blend" if blends else "opaque",
-        metallic=float(look.metallic) if is_physical else 0.0,
-        roughness=float(look.roughness) if is_physical else COLORED.roughness,
+        metallic=float(prop.metallic) if is_physical else 0.0,
+        roughness=float(prop.roughness) if is_physical else COLORED.roughness,
         double_sided=True,
-        unlit=not look.lighting,
+        unlit=not prop.lighting,
     )
 
 
@@ -259,8 +259,8 @@ def _volume(actor: Any, source: Any, name: str) -> Volume:
         raise SceneError(f"the volume '{name[:40]}' is no image of numbers", rule="images with one scalar are shown")
     grid, matrix = image
     stored, _ = storable(grid)
-    look = actor.prop
-    color, opacity = look.GetRGBTransferFunction(), look.GetScalarOpacity()
+    prop = actor.prop
+    color, opacity = prop.GetRGBTransferFunction(), prop.GetScalarOpacity()
     low, high = color.GetRange()
     if not high > low:
         low, high = float(stored.min()), float(stored.min()) + 1.0
@@ -268,8 +268,8 @@ def _volume(actor: Any, source: Any, name: str) -> Volume:
     codes = np.array([color.GetColor(value) for value in values])
     alphas = np.clip([opacity.GetValue(value) for value in values], 0.0, 1.0)
     # VTK's opacities count over a length of their own.
-    per_unit = 1.0 - (1.0 - np.minimum(alphas, 1.0 - 1e-6)) ** (1.0 / max(look.GetScalarOpacityUnitDistance(), 1e-9))
-    shading = 1.0 if look.GetShade() else 0.0
+    per_unit = 1.0 - (1.0 - np.minimum(alphas, 1.0 - 1e-6)) ** (1.0 / max(prop.GetScalarOpacityUnitDistance(), 1e-9))
+    shading = 1.0 if prop.GetShade() else 0.0
     transfer = TransferFunction(values, decode_srgb(codes), per_unit, "mm", shading, name)
     return Volume(stored, _matrix(actor.GetMatrix()) @ matrix, transfer)
 

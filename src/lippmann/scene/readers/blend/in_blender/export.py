@@ -69,15 +69,15 @@ def export_scene(folder: Path, *, is_animated: bool = False) -> Exported:
     unit = float(scene.unit_settings.scale_length) if scene.unit_settings.system != "NONE" else 1.0
     with as_rendered(scene, view_layer):
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        for look in (remark_objects, remark_materials, remark_lights):
-            look(depsgraph, remark)
+        for remark_on in (remark_objects, remark_materials, remark_lights):
+            remark_on(depsgraph, remark)
         lights = describe_lights(depsgraph, remark)
         focus, frames = focus_distances(scene), camera_frames(scene)
         unseen = unseen_objects(depsgraph, view_layer, remark)
         remark_scene(scene, view_layer, remark)
-        shown = set(view_layer.objects)
-        aside = {item.name for item in scene.objects if item not in shown}
-        instancers = {item.name for item in shown if item.instance_type == "COLLECTION"}
+        layer_objects = set(view_layer.objects)
+        aside = {item.name for item in scene.objects if item not in layer_objects}
+        instancers = {item.name for item in layer_objects if item.instance_type == "COLLECTION"}
         with plain_values(remark):
             bpy.ops.export_scene.gltf(filepath=str(path), **_options(is_animated=is_animated))
     if not is_animated and any(item.animation_data and item.animation_data.action for item in scene.objects):

@@ -116,19 +116,19 @@ def _light_of(image: Any) -> Any:
             bpy.data.images.remove(loaded)
 
 
-def _uses(node: Any, seen: set[str]) -> set[str]:
+def _uses(node: Any, visited: set[str]) -> set[str]:
     """What a node's colour is taken for: ``color``, ``number``, both or nothing."""
-    seen.add(node.name)
-    found: set[str] = set()
+    visited.add(node.name)
+    uses: set[str] = set()
     for link in (link for output in node.outputs if output.name != "Alpha" for link in output.links):
         target = link.to_node
         if target.type in _NUMBER_NODES:
-            found.add("number")
+            uses.add("number")
         elif any(output.type == "SHADER" for output in target.outputs) or target.type == "GROUP":
-            found.add("color" if link.to_socket.type == "RGBA" else "number")
-        elif target.name not in seen:
-            found |= _uses(target, seen)
-    return found
+            uses.add("color" if link.to_socket.type == "RGBA" else "number")
+        elif target.name not in visited:
+            uses |= _uses(target, visited)
+    return uses
 
 
 # Blender's Python has nothing of the program's own.

@@ -45,8 +45,8 @@ def vertex_colors_to_rec709(glb: Glb) -> None:
         start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
         colors = np.frombuffer(glb.data, kind, count * width, start).reshape(count, width)
         most = 1.0 if kind == "<f4" else float(np.iinfo(kind).max)
-        found = np.clip(colors[:, :3] / most @ matrix, 0.0, 1.0) * most
-        colors[:, :3] = found if kind == "<f4" else np.rint(found)
+        converted = np.clip(colors[:, :3] / most @ matrix, 0.0, 1.0) * most
+        colors[:, :3] = converted if kind == "<f4" else np.rint(converted)
 
 
 def materials_to_rec709(glb: Glb) -> None:
