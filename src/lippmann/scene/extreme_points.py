@@ -67,9 +67,9 @@ def farthest_points(points: Bounds) -> Bounds:
     best = np.full(len(directions), -np.inf, np.float32)
     index = np.zeros(len(directions), np.intp)
     for start in range(0, len(points), _VERTICES_AT_A_TIME):
-        reach = centered[start : start + _VERTICES_AT_A_TIME] @ directions.T
-        first = reach.argmax(axis=0)
-        farthest = reach[first, np.arange(len(directions))]
+        reach = directions @ centered[start : start + _VERTICES_AT_A_TIME].T  # along rows, where argmax is fast
+        first = reach.argmax(axis=1)
+        farthest = reach[np.arange(len(directions)), first]
         index = np.where(farthest > best, start + first, index)
         best = np.maximum(farthest, best)
     return points[np.flatnonzero(np.bincount(index))]

@@ -100,15 +100,16 @@ def gloss_albedo_table(columns: int = 64, rows: int = GLOSS_ROWS, steps: int = 3
     Needs a running engine.
     """
     import drjit as dr
-    import mitsuba as mi
 
     wi, alpha, sample = _grid(columns, rows, steps)
     h = sample_visible_normal(wi, alpha, sample)
     cosine = dr.dot(wi, h)
     weight = _reflection_weight(wi, h, alpha)
     grazing = weight * schlick_weight(cosine)
-    idle = dr.zeros(mi.Float, dr.width(weight))
-    return np.stack([_means(part, rows, columns) for part in (weight - grazing, grazing, idle)], axis=-1)
+    head_on = weight - grazing
+    dr.eval(head_on, grazing)  # in one kernel: each sum alone would sample all microfacets again
+    means = [_means(part, rows, columns) for part in (head_on, grazing)]
+    return np.stack([*means, np.zeros_like(means[0])], axis=-1)
 
 
 def _grid(columns: int, rows: int, steps: int) -> tuple[Vector3f, Point2f, Point2f]:
