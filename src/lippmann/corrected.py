@@ -11,7 +11,7 @@ from lippmann.display import Display
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
 from lippmann.image.stored_values import FloatArray
-from lippmann.optics.correction import PARTS, LensCorrection, rows_told
+from lippmann.optics.correction import PARTS, LensCorrection, report_rows
 from lippmann.options.choices import PROPERTIES
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.picture import render_picture
@@ -50,8 +50,8 @@ def render_corrected(
     finer = render_picture(scene, finer_display(display), asked, progress, stands_as=display)
     parts = parts_of(finer.pixels)
     pixels = correction.rows(parts)
-    told = rows_told(display.panel.height)
-    options, note = correction.told(pixels[told], [part[told] for part in parts], told.start)
+    middle = report_rows(display.panel.height)
+    options, note = correction.describe(pixels[middle], [part[middle] for part in parts], middle.start)
     # A sample of each finer pixel is several of a pixel: why those have no estimate is not why this one has none.
     of_finer = why_no_estimate(replace(asked, spp=finer.provenance.spp))
     why = "no estimate of the error: pixels are solved for, so that the error of samples is not theirs"

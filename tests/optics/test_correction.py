@@ -96,7 +96,7 @@ def test_a_lens_that_is_three_percent_off_loses_little(solved, changed):
 
 def test_it_tells_what_it_gains(solved):
     _, correction, parts, pixels = solved
-    options, note = correction.told(pixels, parts)
+    options, note = correction.describe(pixels, parts)
     assert options["correction_gain_exact"] > max(
         options[f"correction_gain_{k}"] for k in ("radius", "thickness", "index")
     )

@@ -140,5 +140,5 @@ def test_rows_with_others_about_them_are_those_of_the_whole_picture(solved):
 
 def test_it_tells_what_it_gains(solved):
     _, correction, parts, _, corrected = solved
-    options, _ = correction.told(corrected[5:60], [part[5:60] for part in parts], 5)
+    options, _ = correction.describe(corrected[5:60], [part[5:60] for part in parts], 5)
     assert options["correction_gain_exact"] > 0.8

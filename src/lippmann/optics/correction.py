@@ -37,7 +37,7 @@ TOLERANCE = 0.03
 
 
 #: Rows about the middle of a picture by which its correction is judged.
-_ROWS_TOLD = 64
+_REPORT_ROWS = 64
 
 
 def parts_beside() -> tuple[float, ...]:
@@ -45,10 +45,10 @@ def parts_beside() -> tuple[float, ...]:
     return tuple((part + 0.5) / PARTS - 0.5 for part in range(PARTS))
 
 
-def rows_told(height: int) -> slice:
+def report_rows(height: int) -> slice:
     """The rows of a picture by which its correction is judged."""
-    first = max(0, (height - _ROWS_TOLD) // 2)
-    return slice(first, min(height, first + _ROWS_TOLD))
+    first = max(0, (height - _REPORT_ROWS) // 2)
+    return slice(first, min(height, first + _REPORT_ROWS))
 
 
 _NO_LIMITS = (0.0, np.inf)
@@ -102,7 +102,7 @@ class LensCorrection:
         there = self.display if profile is None else replace(self.display, lens=profile)
         return self._rows.squared_error(pixels, _clipped(parts), first, there)
 
-    def told(self, pixels: Floats, parts: Sequence[Floats], first: int = 0) -> tuple[dict[str, object], str]:
+    def describe(self, pixels: Floats, parts: Sequence[Floats], first: int = 0) -> tuple[dict[str, object], str]:
         """What a file says of corrected ``pixels``, and a line for people."""
         gains = self.gains(pixels, parts, first)
         limited = float(np.mean((pixels <= 0.0) | (pixels >= 1.0)))

@@ -191,11 +191,11 @@ class Weaving:
         """What a file says of the correction, and lines for people: of the rows about the middle."""
         if self._correction is None:
             return {}, ()
-        from lippmann.optics.correction import rows_told
+        from lippmann.optics.correction import report_rows
 
-        rows = rows_told(self.display.panel.height)
+        rows = report_rows(self.display.panel.height)
         parts = self._parts(rows.start, rows.stop)
-        options, note = self._correction.told(self._correction.rows(parts, rows.start), parts, rows.start)
+        options, note = self._correction.describe(self._correction.rows(parts, rows.start), parts, rows.start)
         return options, (note,)
 
     def _parts(self, first: int, last: int) -> list[FloatArray]:
