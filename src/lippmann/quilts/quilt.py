@@ -34,7 +34,9 @@ _NOTEBOOK_WIDTH = 768
 
 #: As players find it: anywhere in the name, the last of several, so that ``_qs8x6a0.75 (1)`` is known. Without an
 #: aspect the name ends there.
-QUILT_NAME = re.compile(r".*qs(\d{1,4})x(\d{1,4})(?:a(\d{0,4}(?:\.\d{1,17})?)(?<=\d)(?![\d.]*\d)|$)", re.IGNORECASE)
+QUILT_NAME = re.compile(
+    r"\A.*qs(\d{1,4})x(\d{1,4})(?:a(\d{0,4}(?:\.\d{1,17})?)(?<=\d)(?![\d.]*\d)|$)", re.IGNORECASE | re.DOTALL
+)
 _PAIR = re.compile(r"_(?:half_)?2x1$")
 _CONVENTION = "a quilt's name ends in columns x rows and aspect ratio, such as _qs8x6a0.75.png"
 
