@@ -19,6 +19,12 @@ def lines(text: str) -> str:
     return _UNSAFE_BUT_BREAKS.sub(_spelt, text)
 
 
+def shorten(value: object) -> str:
+    """``value`` in an error message: as Python writes it, cut to 60 characters."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
 def json_text(text: str) -> str:
     """JSON whose strings hold none of these characters raw."""
     return _UNSAFE.sub(lambda match: f"\\u{ord(match[0]):04x}", text)

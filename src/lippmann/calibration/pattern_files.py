@@ -24,25 +24,9 @@ _BLOCK = 1 << 20
 
 
 def draw_labelled(pattern: Pattern, monitor: Monitor, window: PixelWindow) -> FloatArray:
-    """Draw a test pattern with labels of its fields, white on black.
+    """Draw a test pattern with labels of its fields, white on black; parameters, result and errors as of :func:`draw`.
 
-    Parameters
-    ----------
-    pattern:
-        The pattern.
-    monitor:
-        The monitor with its calibration values.
-    window:
-        The part of the panel to draw. Pixels do not depend on the window.
-
-    Returns
-    -------
-    ``(height, width, 3)`` float32, 0 to 1.
-
-    Raises
-    ------
-    UsageError
-        If a field has values that no monitor can have, or there are more fields than pixels.
+    Values lie between 0 and 1.
     """
     pixels = draw(pattern, monitor, window)
     if pattern.name == "stripes":

@@ -154,23 +154,12 @@ def encode_values(
 
     Parameters
     ----------
-    path:
-        The file; for Zarr a folder, absent or empty.
     layers:
         Layer ``""`` is the RGB, ``(H, W, 3)`` as stored. OpenEXR alone keeps the others.
     transfer:
         Coding of integer values, marked in PNG files.
-    text:
-        JSON of the metadata; empty without.
-    pixel_pitch:
-        Millimetres; becomes the resolution.
-    icc:
-        ICC profile of integer values in PNG and TIFF; empty without.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
+    path, text, pixel_pitch, icc:
+        As of :func:`encode_tiles`, and its error; PNG has a resolution and a profile, too.
     """
     values = cast("Values", layers[""])
     size = values.shape[1], values.shape[0]

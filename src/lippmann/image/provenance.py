@@ -9,6 +9,7 @@ from typing import Any, get_args
 
 from lippmann.color.transfer import Transfer
 from lippmann.errors import PictureError
+from lippmann.printable import shorten
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ class Provenance:
 
     def _require(self, name: str, well: bool, rule: str) -> None:
         if not well:
-            what = f"{name} is {_shorten(getattr(self, name))}"
+            what = f"{name} is {shorten(getattr(self, name))}"
             raise PictureError(what, where="provenance", rule=f"it must be {rule}")
 
     def _keep(self, name: str, fits: Callable[[object], bool], convert: Callable[[Any], object], rule: str) -> None:
@@ -125,15 +126,9 @@ class Provenance:
             If ``plain`` is no mapping, or a value has the wrong type or range.
         """
         if not isinstance(plain, Mapping):
-            raise PictureError(f"the provenance is {_shorten(plain)}", rule="it must be a mapping of names to values")
+            raise PictureError(f"the provenance is {shorten(plain)}", rule="it must be a mapping of names to values")
         known = {part.name for part in fields(cls)}
         return cls(**{name: value for name, value in plain.items() if name in known})
-
-
-def _shorten(value: object) -> str:
-    """``value`` for an error message, cut where it is long."""
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _is_count(value: object) -> bool:

@@ -190,18 +190,7 @@ def read_picture(path: str | Path, *, display: Display | str | PathLike[str] | N
 def read_metadata(path: str | Path, *, display: Display | str | PathLike[str] | None = None) -> Metadata:
     """Display, placement and provenance of a picture file, without its pixels.
 
-    Parameters
-    ----------
-    path:
-        The file.
-    display:
-        Display of the picture, or what :func:`lippmann.display.load_display` takes, instead of the one in the file;
-        required for files of other programs.
-
-    Raises
-    ------
-    PictureError
-        If the file is missing, empty, foreign or cut short, has no display, or a size other than the display's.
+    Parameters and errors are those of :func:`read_picture`; damage to the pixels goes unnoticed.
     """
     return open_file(path).metadata_for(display)
 

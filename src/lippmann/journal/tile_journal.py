@@ -15,7 +15,7 @@ import json
 import os
 import re
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, NamedTuple
@@ -240,7 +240,7 @@ def read_job(output: Path) -> Job | None:
     """
     folder = journal_of(output)
     try:
-        with _reported(folder, read=True):
+        with _reported(folder, "read"):
             if not os.path.lexists(folder):
                 return None
             if folder.is_symlink() or not folder.is_dir():
@@ -249,13 +249,13 @@ def read_job(output: Path) -> Job | None:
                 if foreign := foreign_names(folder, no_tile):
                     raise _no_journal(folder, f"it holds {foreign[0]!r} and no {JOB}")
                 return None  # of a run that ended before it wrote its job
-        with _reported(folder, read=True), (folder / JOB).open("rb") as file:
+        with _reported(folder, "read"), (folder / JOB).open("rb") as file:
             job = json.loads(file.read(_MOST_JOB))
     except (ValueError, RecursionError) as error:
         raise _no_journal(folder, f"it has no readable {JOB}") from error
     if not isinstance(job, dict) or _KEY not in job:
         raise _no_journal(folder, f"its {JOB} is none of ours")
-    with _reported(folder, read=True):
+    with _reported(folder, "read"):
         if not holds_tiles(folder):
             return None
     if job[_KEY] != _VERSION:
@@ -367,17 +367,10 @@ def _is_whole(path: Path, most: int) -> bool:
         return False
 
 
-class _reported:  # noqa: N801 - reads as a statement
+@contextmanager
+def _reported(folder: Path, done: str = "written") -> Iterator[None]:
     """Turn an :class:`OSError` about the journal into an :class:`OutputError`."""
-
-    def __init__(self, folder: Path, *, read: bool = False) -> None:
-        self._folder = folder
-        self._done = "read" if read else "written"
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, OSError):
-            reason = error.strerror or str(error)
-            raise OutputError(f"cannot be {self._done}: {reason}", where=str(self._folder)) from error
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"cannot be {done}: {error.strerror or error}", where=str(folder)) from error

@@ -15,6 +15,7 @@ from typing import Any, Literal, get_args, get_origin
 
 from lippmann.errors import UsageError
 from lippmann.options.option import Options, default_of, kinds_of, options_of
+from lippmann.printable import shorten
 
 
 def to_plain(value: object) -> object:
@@ -102,12 +103,7 @@ def _from_plain(kind: Any, value: object) -> object:
         return dict(value)
     elif origin is not None:
         rule = "a table of texts"
-    raise UsageError(_shorten(value), rule=rule)
-
-
-def _shorten(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    raise UsageError(shorten(value), rule=rule)
 
 
 _MEMORY_UNITS = {"": 1, "k": 2**10, "m": 2**20, "g": 2**30, "t": 2**40}

@@ -116,25 +116,14 @@ def weave_to_file(
 
     Parameters
     ----------
-    quilt:
-        The views, that of the leftmost camera first.
-    display:
-        A lenticular display, slanted or not.
+    quilt, display, choice, correct, scene, progress:
+        As for :func:`weave`, with its errors.
     path:
         The TIFF or Zarr file.
-    choice:
-        ``nearest`` takes the view nearest to a sub-pixel's direction; ``linear`` interpolates between the two nearest
-        views.
-    correct:
-        As for :func:`weave`.
-    scene:
-        Name of the scene, for the provenance.
     bits:
         Bits per value; None for the format's default.
     finish:
         What is done to the picture for its print.
-    progress:
-        Called after every block of rows.
 
     Returns
     -------
@@ -142,10 +131,6 @@ def weave_to_file(
 
     Raises
     ------
-    UsageError
-        If the choice is unknown.
-    PictureError
-        If the display is not lenticular, or the quilt has another aspect ratio than its panel.
     OutputError
         If the format is not TIFF or Zarr or has no such bits, or the file cannot be written.
     """

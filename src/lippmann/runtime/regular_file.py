@@ -41,6 +41,21 @@ def check_kind(path: Path, error: type[LippmannError]) -> None:
         raise error("is only a pointer of Git LFS", where=str(path), fix="fetch the file itself: git lfs pull")
 
 
+def read_small_text(path: Path, most: int, error: type[LippmannError], rule: str) -> str:
+    """The UTF-8 text of a file of at most ``most`` bytes; raises ``error`` with ``rule`` for any other."""
+    check_kind(path, error)
+    try:
+        with path.open("rb") as file:
+            content = file.read(most + 1)
+        if len(content) > most:
+            raise error("this file is too large", where=str(path), rule=rule)
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise error("this is not a text file", where=str(path), rule=rule) from None
+    except OSError as reason:
+        raise error(f"cannot be read: {reason.strerror}", where=str(path), rule=rule) from None
+
+
 def _is_lfs_pointer(path: Path) -> bool:
     try:
         if path.stat().st_size > _LFS_MOST:

@@ -23,7 +23,7 @@ from typing import Any
 from lippmann.errors import UsageError
 from lippmann.options.option import default_of, options_of
 from lippmann.options.texts import from_plain, toml_of
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.regular_file import read_small_text
 from lippmann.studio_app.state import FILES, StudioState
 
 if sys.version_info >= (3, 11):
@@ -46,17 +46,7 @@ def read_state(path: Path) -> StudioState:
     UsageError
         The file cannot be read, is no TOML, or holds a setting that is unknown or out of its range; with file and line.
     """
-    check_kind(path, UsageError)
-    try:
-        with path.open("rb") as file:
-            content = file.read(_MOST_BYTES + 1)
-        if len(content) > _MOST_BYTES:
-            raise UsageError("this file is too large", where=str(path), rule=_KIND)
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise UsageError("this is not a text file", where=str(path), rule=_KIND) from None
-    except OSError as error:
-        raise UsageError(f"cannot be read: {error.strerror}", where=str(path), rule=_KIND) from None
+    text = read_small_text(path, _MOST_BYTES, UsageError, _KIND)
     return state_of_text(text, where=str(path), folder=path.parent)
 
 

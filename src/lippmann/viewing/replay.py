@@ -110,13 +110,8 @@ def sweep(
         First and last position ``(x, y, z)`` of the eye in the display frame in mm, z > 0.
     frames:
         Number of pictures, at least 1.
-    size:
-        Width and height of a picture in pixels, 1 to 65535. None: the panel's, at most 2048 wide.
-    filter:
-        ``nearest`` takes the pixel at the panel point seen; ``linear`` interpolates between the surrounding pixels of
-        the same lens.
-    subpixels:
-        Whether red, green and blue have their own positions in the pixel. None: as the picture was rendered.
+    size, filter, subpixels:
+        As of :func:`replay`.
 
     Yields
     ------

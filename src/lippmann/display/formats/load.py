@@ -56,7 +56,7 @@ from lippmann.display.panel import stripe
 from lippmann.display.validation import MILLIMETRES, Arguments, length, positive
 from lippmann.errors import DisplayError
 from lippmann.runtime.plugins import Door, Extension, Target, function_of
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.regular_file import read_small_text
 
 #: Kinds of displays, before the colon.
 KINDS = ("print", "monitor")
@@ -310,7 +310,8 @@ def _from_preset(name: str, presets: Mapping[str, str]) -> Display:
 
 def _read_file(path: Path) -> Display:
     """The display of a TOML file, or of a Looking Glass's calibration."""
-    text, where = _read(path), os.fspath(path)
+    rule = "a display is a preset's name, a TOML file or a Looking Glass's visual.json"
+    text, where = read_small_text(path, _MAXIMUM_BYTES, DisplayError, rule), os.fspath(path)
     if text.lstrip("\ufeff \t\r\n").startswith("{"):  # JSON
         return display_of_calibration(text, where=where)
     return _from_toml(text, where=where, stem=path.stem)
@@ -335,21 +336,6 @@ def _device_called(name: str, presets: Mapping[str, str]) -> str | None:
 
 def _words(name: str) -> set[str]:
     return set(re.findall(r"[a-z0-9.]+", name.lower())) - {"inch", "in", "lkg"}
-
-
-def _read(path: Path) -> str:
-    rule = "a display is a preset's name, a TOML file or a Looking Glass's visual.json"
-    check_kind(path, DisplayError)
-    try:
-        with path.open("rb") as file:
-            content = file.read(_MAXIMUM_BYTES + 1)
-        if len(content) > _MAXIMUM_BYTES:
-            raise DisplayError("this file is too large", where=str(path), rule=rule)
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise DisplayError("this is not a text file", where=str(path), rule=rule) from None
-    except OSError as error:
-        raise DisplayError(f"cannot be read: {error.strerror}", where=str(path), rule=rule) from None
 
 
 def _from_toml(text: str, *, where: str, stem: str) -> Display:
