@@ -339,6 +339,26 @@ def test_narrow_lobes_first_show_the_same_light(build, parts, name, cosine):
     assert chances[1] > max(0.7, chances[0])
 
 
+@pytest.mark.parametrize("cosine", [0.9, -0.6])
+def test_samples_tell_whether_they_keep_images_sharp(build, parts, cosine):
+    """Whichever lobe was sampled: half vectors within 0.05 rad of the narrow lobe's normal, and all transmission."""
+    from mitsuba import BSDFFlags
+
+    from lippmann.device.pbr.gltf_bsdf import SHARP_EVENT, SHARP_FIRST
+
+    wi = at(cosine)
+    for name, asked in (("glaze", 0), ("veil", 0), ("varnish", SHARP_FIRST), ("cloudy glass", SHARP_FIRST)):
+        wo, _, _, kinds = draw(bsdf_of(build, parts, NARROW[name]), wi, 4000, seed=3, asked=asked)
+        half = (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
+        angle = np.arccos(np.clip(np.abs(half[:, 2]), -1, 1))
+        expected = ((wo[:, 2] * wi[2] < 0) | (angle < 0.05)) & (kinds & int(BSDFFlags.Null) == 0)
+        sure = np.abs(angle - 0.05) > 1e-3
+        assert 0.05 < expected.mean() < 0.99
+        assert np.array_equal((kinds & SHARP_EVENT != 0)[sure], expected[sure])
+    rough = draw(bsdf_of(build, parts, CASES["plastic"]), wi, 4000, seed=3)[3]
+    assert not (rough & SHARP_EVENT).any()
+
+
 def test_wide_lobes_are_drawn_as_ever(build, parts):
     from lippmann.device.pbr.gltf_bsdf import SHARP_FIRST
 

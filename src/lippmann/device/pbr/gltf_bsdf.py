@@ -40,6 +40,9 @@ from lippmann.device.types import (
 #: The attribute that tells the normal of a surface's narrow lobe, in the frame of the interaction and on the viewer's
 #: side: that of the clear coat, else of the body; 0 where neither is narrow.
 SHARP_LOBE = "sharp_lobe"
+#: Set in the sampled type of an event that keeps an image sharp, whichever lobe was sampled; see
+#: :func:`~lippmann.device.pbr.microfacet.is_sharp`.
+SHARP_EVENT = 1 << 29
 #: The attribute that tells the albedo of the light which a surface scatters alike in all directions, its opacity
 #: included; 0 for surfaces whose other layers dim it by direction (cloth), or whose normal is not the surface's own.
 LAMBERTIAN = "lambertian"
@@ -51,8 +54,8 @@ WIDE_LOBES = "wide_lobes"
 SHARP_FIRST = 1 << 30
 #: What is left of a wide lobe's chance then: without it, what narrow lobes hardly reach would be rare and bright.
 _WIDE_CHANCE = 0.1
-#: A lobe is narrow whose GGX widths are below the first, and wide if they are above the second.
-NARROW_ALPHA, WIDE_ALPHA = 0.02, 0.04
+#: A lobe is wide whose GGX widths are above this.
+WIDE_ALPHA = 0.04
 
 
 def surface_bsdf(model: SurfaceModel) -> BSDF:
@@ -104,7 +107,7 @@ def _bsdf_class(variant: str) -> type[BSDF]:
             signals = [model.roughness] if self._is_glossy else []
             if model.clearcoat_roughness is not None:
                 signals.append(model.clearcoat_roughness)
-            self._may_be_sharp = any(signal.may_be_below(math.sqrt(NARROW_ALPHA)) for signal in signals)
+            self._may_be_sharp = any(signal.may_be_below(math.sqrt(microfacet.NARROW_ALPHA)) for signal in signals)
 
         # ---- what integrators call ----
 
@@ -132,6 +135,9 @@ def _bsdf_class(variant: str) -> type[BSDF]:
             bs.wo, bs.pdf, bs.eta, bs.sampled_type = wo, pdf, eta, kind
             for index, flag in enumerate(self.kinds):
                 bs.sampled_component = dr.select(kind == flag, index, bs.sampled_component)
+            if self._may_be_sharp:
+                sharp = (kind != passing) & microfacet.is_sharp(si.wi, wo, self._sharp_normal(point))
+                bs.sampled_type |= dr.select(sharp, mi.UInt32(SHARP_EVENT), 0)
             return bs, weight & active
 
         def eval_pdf(
@@ -201,7 +207,7 @@ def _bsdf_class(variant: str) -> type[BSDF]:
         # ---- narrow lobes ----
 
         def _narrow(self, lobe: Lobe) -> Bool:
-            return lobe.alpha.x < NARROW_ALPHA
+            return lobe.alpha.x < microfacet.NARROW_ALPHA
 
         def _narrow_body(self, point: Point) -> Bool:
             return self._narrow(point.lobe) if self._is_glossy else mi.Bool(False)

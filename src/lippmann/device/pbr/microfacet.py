@@ -15,10 +15,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.types import Float, Point2f, Vector3f
+from lippmann.device.types import Bool, Float, Point2f, Vector3f
 
 #: Smallest ``alpha``: below it single precision cannot resolve the lobe, and it looks like a mirror anyway.
 MIN_ALPHA = 1e-3
+#: A lobe is narrow whose ``alpha`` is below this.
+NARROW_ALPHA = 0.02
+#: Radians between half vector and normal up to which a narrow lobe's reflection is sharp.
+SHARP_ANGLE = 2.5 * NARROW_ALPHA
 #: Smallest index of refraction of a solid: at exactly 1 the half vector of light that passes straight through vanishes.
 MIN_IOR = 1.001
 #: Square roots of the head-on reflectances, (ior - 1) / (ior + 1), that :func:`interface_albedo_table` knows.
@@ -43,6 +47,18 @@ def ggx_density(h: Vector3f, alpha: Point2f) -> Float:
     stretch = alpha.x / alpha.y
     spread = dr.square(h.x) / stretch + dr.square(h.y) * stretch + alpha.x * alpha.y * dr.square(h.z)
     return alpha.x * alpha.y / (dr.pi * dr.square(spread))
+
+
+def is_sharp(wi: Vector3f, wo: Vector3f, lobe: Vector3f) -> Bool:
+    """Whether scattering from ``wo`` to ``wi`` keeps an image sharp, by the normal of a narrow ``lobe``; 0 for none.
+
+    All in the surface's frame. Every transmission through a surface with a narrow lobe is sharp.
+    """
+    import drjit as dr
+
+    reflected = wi.z * wo.z > 0
+    is_near = dr.dot(dr.normalize(wi + wo), lobe) > math.cos(SHARP_ANGLE)
+    return (dr.squared_norm(lobe) > 0) & (~reflected | is_near)
 
 
 def _smith_root(w: Vector3f, alpha: Point2f) -> Float:

@@ -13,6 +13,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from lippmann.device.pbr.microfacet import is_sharp
 from lippmann.device.types import (
     Bool,
     Color3f,
@@ -28,7 +29,7 @@ from lippmann.rendering.transport.path_vertex import Scattering, Vertex
 from lippmann.rendering.transport.path_weights import Clamp
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.scene_features import SceneFeatures
-from lippmann.rendering.transport.sharp_events import MOST_EVENTS, facing_normal, is_sharp, lambertian_share
+from lippmann.rendering.transport.sharp_events import MOST_EVENTS, facing_normal, lambertian_share
 from lippmann.rendering.transport.tuning import TUNING
 
 
@@ -165,7 +166,7 @@ class PhotonGathering(Technique):
 
     def sample_emitter(self, state: _Caustics, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
         is_caustic = ~state.all_sharp & (state.sharp < MOST_EVENTS)
-        is_caustic &= is_sharp(vertex.si, vertex.lobe, vertex.si.to_local(ds.d))
+        is_caustic &= is_sharp(vertex.si.wi, vertex.si.to_local(ds.d), vertex.lobe)
         if self._environment is not None:
             is_caustic &= ds.emitter != mi.EmitterPtr(self._environment)
         return dr.select(is_caustic, light * (1 - state.by_photons), light)
@@ -190,8 +191,7 @@ class WithoutSpecularLight(Technique):
 
     def __init__(self, has_without_size: bool) -> None:
         self._has_without_size = has_without_size
-
-    reads = ("lobe",)
+        self.reads = ("lobe",) if has_without_size else ()
 
     def begin(self) -> Bool:
         return mi.Bool(True)
@@ -202,7 +202,7 @@ class WithoutSpecularLight(Technique):
     def sample_emitter(self, state: Bool, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
         if not self._has_without_size:
             return light
-        is_specular = state & ds.delta & is_sharp(vertex.si, vertex.lobe, vertex.si.to_local(ds.d))
+        is_specular = state & ds.delta & is_sharp(vertex.si.wi, vertex.si.to_local(ds.d), vertex.lobe)
         return dr.select(is_specular, 0, light)
 
     def scatter(self, state: Bool, vertex: Vertex, scattering: Scattering) -> Bool:

@@ -125,12 +125,11 @@ class Scattering:
         self.bs, self.weight = bs, weight
         self.passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
         self.is_event = vertex.active & ~self.passes
-        self._vertex = vertex
 
     @cached_property
     def is_rough(self) -> Bool:
         """Whether the event is neither sharp nor straight through."""
-        return self.is_event & ~follows_sharply(self._vertex.si, self._vertex.lobe, self.bs)
+        return self.is_event & ~follows_sharply(self.bs)
 
     @property
     def scattered(self) -> Color3f:

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import upload
+from lippmann.device.pbr.microfacet import is_sharp
 from lippmann.device.sobol import SEED_STEP
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, Color3f, Float, Point3f, SurfaceInteraction3f, UInt32, Vector3f
-from lippmann.rendering.transport.sharp_events import is_sharp
 from lippmann.rendering.transport.tuning import TUNING
 
 Floats = NDArray[np.float32]
@@ -241,7 +241,7 @@ class PhotonMap:
                     brought = dr.gather(mi.Vector4f, self._power_and_surfaces, number, fits)
                     fits &= brought.w <= mi.Float(surfaces)
                     wo = si.to_local(d)
-                    fits &= ~is_sharp(si, lobe, wo)
+                    fits &= ~is_sharp(si.wi, wo, lobe)
                     share_of_power = dr.select(by_kernel, 1 - distance2 / (r * r), 1)
                     power = dr.select(fits, mi.Color3f(brought.xyz) * (share_of_power * mi.Float(step)), 0)
                     # dr.mean would write the number of lanes into the kernel, and make one for each.

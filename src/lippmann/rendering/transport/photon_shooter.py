@@ -32,7 +32,6 @@ from lippmann.rendering.transport.sharp_events import (
     follows_sharply,
     has_wide_lobes,
     lambertian,
-    sharp_lobe,
 )
 from lippmann.rendering.transport.tuning import TUNING
 
@@ -153,14 +152,13 @@ class PhotonShooter:
     ) -> tuple[Point3f, Vector3f, Spectrum, UInt32, Color3f | None, Bool]:
         """The next ray of a photon, and its state after the event; inactive where the event is not sharp."""
         bsdf = si.bsdf()
-        lobe = sharp_lobe(si, bsdf, active)
         context = mi.BSDFContext(mi.TransportMode.Importance)
         bs, weight = bsdf.sample(context, si, stream.next_1d(dimension), stream.next_2d(dimension + 1), active)
         passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
         wo = si.to_world(bs.wo)
         # Light that passes the first surface starts at the next.
         active &= ~passes | (events > 0)
-        active &= follows_sharply(si, lobe, bs)
+        active &= follows_sharply(bs)
         # Adjoint of shading normals: Veach 1997, eq. 5.19.
         into, out = dr.dot(si.n, si.to_world(si.wi)), dr.dot(si.n, wo)
         active &= passes | ((into * si.wi.z > 0) & (out * bs.wo.z > 0))

@@ -11,14 +11,11 @@ where the half vector lies near this normal, and every transmission through such
 
 from __future__ import annotations
 
-import math
-
 import drjit as dr
 import mitsuba as mi
 
-from lippmann.device.pbr.gltf_bsdf import LAMBERTIAN, SHARP_LOBE, WIDE_LOBES
+from lippmann.device.pbr.gltf_bsdf import LAMBERTIAN, SHARP_EVENT, SHARP_LOBE, WIDE_LOBES
 from lippmann.device.types import Bool, BSDFPtr, BSDFSample3f, Color3f, SurfaceInteraction3f, Vector3f
-from lippmann.rendering.transport.tuning import TUNING
 
 #: Sharp events between an emitter and a caustic, straight-through surfaces beside them, and specular surfaces in front
 #: of one whose features a denoiser gets, at most; light of more is left to paths.
@@ -31,17 +28,9 @@ def sharp_lobe(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Vector3
     return dr.select(has_word, mi.Vector3f(bsdf.eval_attribute_3(SHARP_LOBE, si, has_word)), 0)
 
 
-def is_sharp(si: SurfaceInteraction3f, lobe: Vector3f, wo: Vector3f) -> Bool:
-    """Whether scattering from ``wo`` to ``si.wi`` is sharp, by a lobe from :func:`sharp_lobe`."""
-    half = dr.normalize(si.wi + wo)
-    reflected = si.wi.z * wo.z > 0
-    return (dr.squared_norm(lobe) > 0) & (~reflected | (dr.dot(half, lobe) > math.cos(TUNING.least_cosine_angle)))
-
-
-def follows_sharply(si: SurfaceInteraction3f, lobe: Vector3f, bs: BSDFSample3f) -> Bool:
-    """Whether a sampled event is sharp: by a delta lobe, or by ``lobe`` (:func:`sharp_lobe`)."""
-    has_no_width = (bs.sampled_type & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
-    return has_no_width | is_sharp(si, lobe, bs.wo)
+def follows_sharply(bs: BSDFSample3f) -> Bool:
+    """Whether a sampled event is sharp: by a lobe without width or by a narrow one, or straight through."""
+    return (bs.sampled_type & (int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null) | SHARP_EVENT)) != 0
 
 
 def has_wide_lobes(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Bool:

@@ -22,6 +22,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.pbr.gltf_bsdf import SHARP_FIRST, SHARP_LOBE
+from lippmann.device.pbr.microfacet import is_sharp
 from lippmann.device.sobol import SampleStream, hash32, named_seed
 from lippmann.device.syntax import syntax
 from lippmann.device.types import (
@@ -41,7 +42,7 @@ from lippmann.rendering.transport.light_sampling import MAX_CROSSINGS
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.path_vertex import DIMENSIONS, LastVertex, Scattering, Vertex
 from lippmann.rendering.transport.ray_source import PixelRays
-from lippmann.rendering.transport.sharp_events import follows_sharply, is_sharp
+from lippmann.rendering.transport.sharp_events import follows_sharply
 from lippmann.rendering.transport.tuning import TUNING
 
 
@@ -158,7 +159,6 @@ def _chain(
         dimension = (depth * 2 + crossings) * DIMENSIONS + 1
         continues = active & si.is_valid() & (depth < integrator.depth)
         vertex = Vertex(si, bsdf, d, depth, continues, throughput, stream, dimension, states)
-        continues &= _has_no_width(bsdf) | (dr.squared_norm(vertex.lobe) > 0)
         if dr.hint(len(integrator.without_size) > 0, mode="scalar"):
             point = stream.next_2d(dimension + 2)
             drawn, tests = _without_size(integrator, si, bsdf, vertex.lobe, point, continues)
@@ -168,7 +168,7 @@ def _chain(
         scattering = Scattering(vertex, bs, weight)
         passes = scattering.passes
         states = techniques.scatter(vertex, scattering)
-        continues &= passes | follows_sharply(si, vertex.lobe, bs)
+        continues &= follows_sharply(bs)
         throughput *= weight
         onward = si.spawn_ray(si.to_world(bs.wo))
         o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
@@ -194,7 +194,7 @@ def _without_size(
     """Radiance toward ``si.wi`` by a sharp event from a sampled delta emitter, and the shadow rays traced."""
     ds, radiance = integrator.without_size.sample_direction(si, point, active)
     wo = si.to_local(ds.d)
-    lit = active & is_sharp(si, lobe, wo) & (dr.max(radiance) > 0)
+    lit = active & is_sharp(si.wi, wo, lobe) & (dr.max(radiance) > 0)
     reflected = bsdf.eval(mi.BSDFContext(), si, wo, lit) * radiance
     lit &= dr.max(reflected) > 0
     visible, tests = integrator.visibility(si, ds, lit)

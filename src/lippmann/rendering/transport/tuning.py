@@ -28,9 +28,6 @@ class TransportTuning:
         A specular chain counts up to white where it is its pixel's only one; of more chains one counts for as much more
         as this power of their number says. With 1, mirrored balls lose 1.5 to 2.5 dB with 128 samples and promises of
         their quality break; with 0.5 they lose 0.5 to 1 dB, and a ring of chrome 1.5 dB (``estimate_coverage.py``).
-    least_cosine_angle:
-        Radians between half vector and normal up to which a reflection is sharp: 2.5 times the width of the widest lobe
-        that counts as narrow.
     small_emitter:
         Emitters are small whose area is less than this part of the square of the scene's diagonal.
     least_agreement, farthest_from_plane:
@@ -56,7 +53,6 @@ class TransportTuning:
     lanes: int = 1 << 18
     emitter_samples: int = 4
     most_power: float = 0.75
-    least_cosine_angle: float = 0.05
     small_emitter: float = 1e-3
     least_agreement: float = 0.7
     farthest_from_plane: float = 0.4

@@ -50,7 +50,7 @@ class VisibleBlur:
 
             dimension = (depth * 2 + crossings) * DIMENSIONS + 1
             bs, weight = bsdf.sample(context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), active)
-            active &= follows_sharply(si, lobe, bs)
+            active &= follows_sharply(bs)
             throughput *= weight
             if mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null):
                 crossings += 1
