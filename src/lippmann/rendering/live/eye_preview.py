@@ -103,7 +103,7 @@ def render_eye_preview(
 def _choose_samples(asked: RenderRequest, resolved: RenderRequest, pixels: int) -> int:
     if asked.spp is not None or resolved.spp == 1 or resolved.integrator not in POOLED_LIGHT:
         return resolved.samples
-    return min(max(1, TUNING.values // max(1, pixels)), 64)
+    return min(max(1, TUNING.values // max(1, pixels)), TUNING.usual)
 
 
 def _denoises(asked: RenderRequest, resolved: RenderRequest, scene: Scene) -> bool:
