@@ -5,6 +5,9 @@ from __future__ import annotations
 import ast
 import importlib.util
 import re
+import shutil
+import subprocess
+import sys
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -36,6 +39,16 @@ def test_no_program_imports_another_in_a_circle():
         tree = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         graph[path.stem] = {node.module for node in tree if isinstance(node, ast.ImportFrom)}
     assert "harness" in TopologicalSorter(graph).static_order()  # raises CycleError for a circle
+
+
+def test_pages_hold_the_tables_of_the_results(tmp_path):
+    """Tables are written by their program, never by hand."""
+    for folder in ("benchmarks", "docs/background", "docs/reference"):
+        shutil.copytree(FOLDER.parent / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(FOLDER.parent / "README.md", tmp_path)
+    subprocess.run([sys.executable, "benchmarks/tables.py"], cwd=tmp_path, check=True, timeout=60)
+    for page in [tmp_path / "README.md", *tmp_path.glob("docs/*/*.md")]:
+        assert page.read_text() == (FOLDER.parent / page.relative_to(tmp_path)).read_text(), page.name
 
 
 def test_all_that_programs_import_of_the_package_is_there():
