@@ -27,7 +27,7 @@ def teapot():
 
 def test_what_does_not_fit_is_refused_before_the_engine_starts(teapot, monkeypatch):
     monkeypatch.setattr(sessions.engines, "start", lambda *_: pytest.fail("the engine was started"))
-    with pytest.raises(MemoryLimitError, match="1 MiB are too small for 512x512 pixels"):
+    with pytest.raises(MemoryLimitError, match=r"1\.0 MiB are too small for 512x512 pixels"):
         open_session(teapot, replace(DIRECT, memory=1 << 20), (512, 512))
 
 

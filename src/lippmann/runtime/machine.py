@@ -219,7 +219,9 @@ def _resident() -> int:
 
 
 def amount_in_words(size: int) -> str:
-    """Bytes of memory, such as ``1.5 GiB``, ``12 MiB`` or ``1 KiB``."""
+    """Bytes of memory, such as ``1.5 GiB``, ``1.2 MiB``, ``12 MiB`` or ``1 KiB``."""
     if size >= 1 << 30:
         return f"{size / 2**30:.1f} GiB"
-    return f"{size / 2**20:.0f} MiB" if size >= 1 << 20 else f"{max(1, size >> 10)} KiB"
+    if size >= 1 << 20:
+        return f"{size / 2**20:.{1 if size < 10 << 20 else 0}f} MiB"
+    return f"{max(1, size >> 10)} KiB"

@@ -159,7 +159,7 @@ def test_copies_keep_colours_coordinates_and_normals(build, look, parts):
 @pytest.mark.slow
 def test_copies_beyond_the_memory_are_refused(build, parts):
     places = np.tile(np.eye(4), (2_000_000, 1, 1))
-    with pytest.raises(SceneError, match=r"2,000,000 placed meshes of 28,084,000,000 triangles need .* GiB.* 1 GiB"):
+    with pytest.raises(SceneError, match=r"2,000,000 placed meshes of 28,084,000,000 triangles need .* GiB.* 1\.0 GiB"):
         build(parts.describe([parts.ball(steps=60)], [PLAIN], instances=[Instance(0, places)]), memory=1 << 30)
 
 

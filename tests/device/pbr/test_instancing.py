@@ -52,7 +52,7 @@ def test_a_scene_that_fits_no_way_is_refused_in_one_line():
     text = str(refusal.value)
     assert "crowd.glb: memory: 2,000,000 placed meshes of 600,000,000 triangles need" in text
     copy = 300 * 120 + 150 * 64  # bytes, as the module says
-    assert f"1 GiB, about {2**30 // copy:,} such copies" in text
+    assert f"1.0 GiB, about {2**30 // copy:,} such copies" in text
     assert refusal.value.parameter == "memory"
 
 

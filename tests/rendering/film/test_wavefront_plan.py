@@ -45,7 +45,7 @@ def test_an_8k_picture_of_four_samples_fits_two_gigabytes():
 
 
 def test_too_little_memory_says_how_much_is_needed():
-    with pytest.raises(MemoryLimitError, match=r"memory: .* too small .* it needs \d+ MiB; raise the limit"):
+    with pytest.raises(MemoryLimitError, match=r"memory: .* too small .* it needs [\d.]+ MiB; raise the limit"):
         cut_wavefronts(4096, 4096, 1, memory=2**20)
     with pytest.raises(MemoryLimitError, match=r"memory: 1 KiB are too small"):
         cut_wavefronts(4096, 4096, 1, memory=1000)
