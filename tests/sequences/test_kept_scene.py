@@ -65,13 +65,15 @@ def test_a_turn_builds_once_and_shows_what_frames_built_alone_show(engine, displ
 PLACE = np.array([[0.6, 0, 0.8, 6], [0, 1, 0, 4], [-0.8, 0, 0.6, 6], [0, 0, 0, 1.0]])
 
 
-def lamp(kind="point", **more):
+def light_source(kind="point", **more):
     return Light(kind, (80.0, 80.0, 80.0), PLACE, **more)
 
 
 @pytest.mark.parametrize("kind", ["point", "spot", "directional"])
 def test_light_sources_go_along_with_what_is_built(engine, display, builds, kind):
-    motion = open_turntable(teapot(lights=[lamp(kind), lamp("point")], environment=sky(), background=None), 5)
+    motion = open_turntable(
+        teapot(lights=[light_source(kind), light_source("point")], environment=sky(), background=None), 5
+    )
     *_, (_, together) = render_sequence(motion, display, [0, 1], **QUICK)
     assert len(builds) == 1
     ((_, alone),) = render_sequence(motion, display, [1], **QUICK)
@@ -79,7 +81,7 @@ def test_light_sources_go_along_with_what_is_built(engine, display, builds, kind
 
 
 def test_a_light_source_that_is_a_shape_is_built_anew(engine, display, builds):
-    motion = open_turntable(teapot(lights=[lamp(radius=1.0)]), 4)
+    motion = open_turntable(teapot(lights=[light_source(radius=1.0)]), 4)
     list(render_sequence(motion, display, [0, 1], **QUICK))
     assert len(builds) == 2
 
@@ -106,12 +108,12 @@ class Cut(Motion):
 
 @pytest.mark.parametrize("change", ["surfaces", "object", "light", "dark"])
 def test_the_frame_after_a_cut_is_the_first_of_a_film_that_begins_there(engine, display, change):
-    scene = teapot(environment=sky(), lights=[lamp()])
+    scene = teapot(environment=sky(), lights=[light_source()])
     before = {
-        "surfaces": teapot(environment=sky(), lights=[lamp()], materials=scene.physical.materials[::-1]),
-        "object": teapot(environment=sky(), lights=[lamp()], instances=scene.physical.instances[:-1]),
+        "surfaces": teapot(environment=sky(), lights=[light_source()], materials=scene.physical.materials[::-1]),
+        "object": teapot(environment=sky(), lights=[light_source()], instances=scene.physical.instances[:-1]),
         "light": teapot(environment=sky()),
-        "dark": teapot(environment=sky(), lights=[replace(lamp(), color=(0.0, 0.0, 0.0))]),
+        "dark": teapot(environment=sky(), lights=[replace(light_source(), color=(0.0, 0.0, 0.0))]),
     }[change]
     *_, (_, together) = render_sequence(Cut(before, scene), display, [0, 1], **QUICK)
     ((_, alone),) = render_sequence(Cut(before, scene), display, [1], **QUICK)

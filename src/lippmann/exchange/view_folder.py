@@ -129,15 +129,14 @@ def _in_rows(by_place: Mapping[Place, Path], folder: Path, grid: tuple[int, int]
 
 def _in_line(by_place: Mapping[Place, Path]) -> Mapping[Place, Path]:
     """Numbered files as one row or column of views, if their names end in the two numbers of such."""
-    ends = [(int(match[1]), int(match[2])) for path in by_place.values() if (match := _TWO.search(path.stem))]
-    numbers = [number for (number,) in by_place]
-    if len(ends) < len(by_place):
+    rows = [int(match[1]) for path in by_place.values() if (match := _TWO.search(path.stem))]
+    if len(rows) < len(by_place):
         return by_place
-    if len({row for row, _ in ends}) == 1:
+    if len(set(rows)) == 1:
         return {(0, number): path for (number,), path in by_place.items()}
-    return (
-        {(number, 0): path for (number,), path in by_place.items()} if [row for row, _ in ends] == numbers else by_place
-    )
+    if rows == [number for (number,) in by_place]:
+        return {(number, 0): path for (number,), path in by_place.items()}
+    return by_place
 
 
 def is_composable(folder: Path) -> bool:

@@ -73,7 +73,8 @@ class Estimate:
         KeyError
             If a field is missing.
         """
-        numbers = {field.name: cast("float", plain[field.name]) for field in fields(cls)[:6]}
+        others = ("worst_lens", "by_chance")
+        numbers = {each.name: cast("float", plain[each.name]) for each in fields(cls) if each.name not in others}
         column, row = cast("Sequence[int]", plain["worst_lens"])
         return cls(**numbers, worst_lens=(column, row), by_chance=cast("float | None", plain.get("by_chance")))
 

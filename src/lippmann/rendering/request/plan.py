@@ -298,8 +298,8 @@ def _quality(facts: _Facts, method: Method) -> Choice[float | None]:
 
 def _reserve(facts: _Facts, method: Method, samples: int | None, values: int | None) -> Choice[int | None]:
     is_given = facts.request.spp is not None or facts.request.effort != "normal" or samples is None
-    has_none = method != "pooled" and (facts.is_one_ray or not facts.shows_own_colors)
-    is_other = facts.form not in ("picture", "forecast") or has_none or values is None
+    is_judged = method == "pooled" or (facts.shows_own_colors and not facts.is_one_ray)
+    is_other = facts.form not in ("picture", "forecast") or not is_judged or values is None
     spent = (values or 1) * (samples or 1)
     factor = min(TUNING.reserve, TUNING.most_in_reserve // spent)
     return _first(
