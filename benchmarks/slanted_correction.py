@@ -44,7 +44,7 @@ def render_part(scene, exposure, beside, samples, seed=0):
 def gain(display, there, rows, before, after, truth):
     """Decibels by which eyes see ``after`` nearer to the truth, in windows of so many rows."""
     judge = type("Windows", (SlantedRows,), {"window": rows})(display, display.panel.subpixel_offsets, JUDGED)
-    worse, better = (judge.squared_error(np.ascontiguousarray(each), truth, 0, there) for each in (before, after))
+    worse, better = judge.squared_errors([np.ascontiguousarray(each) for each in (before, after)], truth, 0, there)
     return 10.0 * float(np.log10(worse / better))
 
 

@@ -59,7 +59,7 @@ def test_an_eye_sees_the_corrected_picture_nearer_to_what_rays_meet(engine, monk
     # The display stands where its own depth budget has it, not where that of finer pixels would.
     np.testing.assert_array_equal(image.world_from_display, plain.world_from_display)
     judge = lippmann.render("teapot", finer_display(image.display), spp=16, seed=1, **options, placement=placed(image))
-    gain = [LensCorrection(image.display).eye_error(each.pixels, parts_of(judge.pixels)) for each in (plain, image)]
+    gain = LensCorrection(image.display).eye_errors((plain.pixels, image.pixels), parts_of(judge.pixels))
     assert 10.0 * np.log10(gain[0] / gain[1]) > 0.2
 
 

@@ -92,15 +92,15 @@ class LensCorrection:
         solved = [self._rows.solve(np.ascontiguousarray(meant[..., c]), c, first) for c in range(3)]
         return np.stack(solved, axis=-1)
 
-    def eye_error(
-        self, pixels: Floats, parts: Sequence[Floats], profile: LensProfile | None = None, first: int = 0
-    ) -> float:
-        """Mean squared error of the light that an eye sees of ``pixels``, over all lenses and directions meant.
+    def eye_errors(
+        self, pictures: Sequence[Floats], parts: Sequence[Floats], profile: LensProfile | None = None, first: int = 0
+    ) -> list[float]:
+        """Mean squared errors of the light that an eye sees of each picture, over all lenses and directions meant.
 
         ``profile`` is the lens that is there; by default the display's own. ``first`` is the number of the first row.
         """
         there = self.display if profile is None else replace(self.display, lens=profile)
-        return self._rows.squared_error(pixels, _clipped(parts), first, there)
+        return self._rows.squared_errors(pictures, _clipped(parts), first, there)
 
     def describe(self, pixels: Floats, parts: Sequence[Floats], first: int = 0) -> tuple[dict[str, object], str]:
         """What a file says of corrected ``pixels``, and a line for people."""
@@ -123,7 +123,7 @@ class LensCorrection:
         before = np.mean(_clipped(parts), axis=0)
 
         def gain(profile: LensProfile | None) -> float:
-            worse, better = (self.eye_error(picture, parts, profile, first) for picture in (before, pixels))
+            worse, better = self.eye_errors((before, pixels), parts, profile, first)
             return 10.0 * float(np.log10(max(worse, 1e-12) / max(better, 1e-12)))
 
         lens = Lens.of(self.display).profile
@@ -172,16 +172,16 @@ class _UprightRows:
         )
         return solved
 
-    def squared_error(self, pixels: Floats, meant: Floats, first: int, there: Display) -> float:
-        """Mean squared error of what eyes see of pixels ``(rows, width, 3)``, against ``(parts, rows, width, 3)``."""
+    def squared_errors(self, pictures: Sequence[Floats], meant: Floats, first: int, there: Display) -> list[float]:
+        """Mean squared errors of what eyes see of pictures ``(rows, width, 3)`` against ``(parts, rows, width, 3)``."""
         squares = []
         for channel in range(3):
             is_own = there is self.display
             shares = self._systems[channel][0] if is_own else self._shares(there, channel)
-            light = shares.gather(pixels[..., channel].astype(np.float64))
-            goal = np.moveaxis(meant[..., channel], 0, -1).reshape(len(light), -1)
-            squares.append(np.mean((light - goal) ** 2))
-        return float(np.mean(squares))
+            goal = np.moveaxis(meant[..., channel], 0, -1).reshape(meant.shape[1], -1)
+            lights = (shares.gather(pixels[..., channel].astype(np.float64)) for pixels in pictures)
+            squares.append([np.mean((light - goal) ** 2) for light in lights])
+        return [float(error) for error in np.mean(squares, axis=0)]
 
     @cached_property
     def _systems(self) -> list[tuple[PixelShares, Floats]]:

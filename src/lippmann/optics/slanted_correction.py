@@ -11,7 +11,7 @@ uneven in others. So rows are not independent; but the shares of a pixel depend 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -111,8 +111,8 @@ class SlantedRows:
             now, ahead = ahead, now
         return solved[self.margin : -self.margin]
 
-    def squared_error(self, pixels: Floats, meant: Floats, first: int, there: Display) -> float:
-        """Mean squared error of what eyes see of pixels ``(rows, width, 3)``, against ``(parts, rows, width, 3)``.
+    def squared_errors(self, pictures: Sequence[Floats], meant: Floats, first: int, there: Display) -> list[float]:
+        """Mean squared errors of what eyes see of pictures ``(rows, width, 3)``, against ``(parts, rows, width, 3)``.
 
         Light is that over the light of a white panel, whose unevenness no picture can take away. ``there`` is the
         display with the lens that is there.
@@ -120,7 +120,7 @@ class SlantedRows:
         from lippmann.optics.eye_light_kernel import gather_light
 
         display, n = self.display, len(self._row_shares)
-        count = np.arange(0, len(pixels) - n + 1, _JUDGED)
+        count = np.arange(0, meant.shape[1] - n + 1, _JUDGED)
         lens = np.arange(display.lens_grid.columns, dtype=np.float64)
         axis, place = (each[:, ::_JUDGED] for each in self._directions(lens))
         light = _even_light(self.display, there)
@@ -132,8 +132,8 @@ class SlantedRows:
         lines = np.broadcast_to((count[:, None] + np.array([0.0, self.window]))[:, None], (*shape, 2)) + float(first)
         tables = light.weights.reshape(-1, *light.weights.shape[2:])
         cells = np.array(((self.offsets,),), dtype=np.float64)
-        seen, white = (np.zeros((*shape, 3), dtype=np.float32) for _ in range(2))
-        for values, light_seen in ((pixels, seen), (np.ones_like(pixels), white)):
+        white, *eyes = (np.zeros((*shape, 3), dtype=np.float32) for _ in range(1 + len(pictures)))
+        for values, result in zip((np.ones_like(meant[0]), *pictures), (white, *eyes), strict=True):
             Bands(usable_cores()).lines(
                 gather_light,
                 len(count),
@@ -146,16 +146,16 @@ class SlantedRows:
                 numbers,
                 places,
                 lines,
-                light_seen,
+                result,
             )
-        seen = np.divide(seen, white, out=np.zeros_like(seen), where=white > 0.0)
+        eyes = [np.divide(eye, white, out=np.zeros_like(eye), where=white > 0.0) for eye in eyes]
         squares = []
         for channel in range(3):
             goal, is_there = self._meant(meant[..., channel], channel, first, axis, place)
             windows = np.array([self._row_shares @ goal[k : k + n] for k in count])
             inside = np.array([is_there[k : k + n].all(axis=0) for k in count])
-            squares.append(np.mean((seen[..., channel] - windows)[inside] ** 2))
-        return float(np.mean(squares))
+            squares.append([np.mean((eye[..., channel] - windows)[inside] ** 2) for eye in eyes])
+        return [float(error) for error in np.mean(squares, axis=0)]
 
     @property
     def _row_shares(self) -> Real:
