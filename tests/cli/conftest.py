@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +20,14 @@ class Outcome:
     def json(self) -> dict[str, Any]:
         """Standard output as the one object that ``--json`` prints."""
         return json.loads(self.out)
+
+
+@pytest.fixture
+def hangup_ends():
+    """Processes started here end at a hang-up, also where the tests were started to ignore it (``nohup``)."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
 
 
 @pytest.fixture

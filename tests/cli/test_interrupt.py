@@ -81,6 +81,7 @@ system.displays = displays
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("hangup_ends")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_signals_that_follow_do_not_disturb_the_end(number):
     words = [sys.executable, "-c", f"import lippmann.cli\n{SLOW_END}\nlippmann.cli.main(['displays'])"]

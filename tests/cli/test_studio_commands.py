@@ -97,6 +97,7 @@ def test_studio_shows_and_renders_until_ctrl_c(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("hangup_ends")
 @pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGHUP])
 def test_show_serves_the_picture_until_it_is_ended(tmp_path, number):
     pixels = np.random.default_rng(1).random((24, 32, 3), dtype=np.float32)
