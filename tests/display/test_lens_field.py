@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from lippmann.display import Display, LensArray, Panel
-from lippmann.display.lens_field import LensField, lens_numbers
+from lippmann.display.lens_field import LensField
+from lippmann.display.micro_image_layout import lens_numbers
 from lippmann.display.pixel_window import PixelWindow
 
 DISPLAYS = {

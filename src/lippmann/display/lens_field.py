@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from lippmann.display.array_ops import NUMPY
 from lippmann.display.display import Display
-from lippmann.display.micro_image_layout import pixel_lenses
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.micro_image_layout import lens_centers, pixel_lenses
 
 
 class LensField(NamedTuple):
@@ -92,40 +91,3 @@ class LensField(NamedTuple):
         x, y = np.where(exists, x, 0), np.where(exists, y, 0)
         exists &= self.lens[y, x] == other
         return np.where(exists, y * width + x, -1)
-
-
-def lens_numbers(display: Display, window: PixelWindow | None = None, *, subpixels: bool = False) -> NDArray[np.int32]:
-    """``(1, H, W)`` number of the lens of every pixel, lenses counted row by row; ``(3, H, W)`` of every sub-pixel."""
-    panel, grid = display.panel, display.lens_grid
-    window = window or PixelWindow(0, 0, panel.width, panel.height)
-    if not subpixels:
-        i, j = pixel_lenses(display, (window.top, window.bottom))
-        return (j * np.int32(grid.columns) + i)[None, :, window.columns]
-    result = np.empty((3, *window.shape), dtype=np.int32)
-    for first in range(0, window.height, 64):
-        last = min(first + 64, window.height)
-        band = slice(window.top + first, window.top + last)
-        v, u = (index + 0.5 for index in np.mgrid[band, window.columns].astype(np.float64))
-        for channel, part in enumerate(result):
-            i, j = display.lens_of(*display.subpixel_point(u, v, np.full_like(u, channel)))
-            i, j = np.clip(i, 0, grid.columns - 1), np.clip(j, 0, grid.rows - 1)
-            part[first:last] = j * grid.columns + i
-    return result
-
-
-def lens_numbers_in_full_color(display: Display, window: PixelWindow | None = None) -> NDArray[np.int32]:
-    """``(1, H, 3 W)``: :func:`lens_numbers` of the sub-pixels, in their order from left to right."""
-    numbers = lens_numbers(display, window, subpixels=True)[list(display.panel.subpixel_order)]
-    return np.ascontiguousarray(np.moveaxis(numbers, 0, 2)).reshape(1, numbers.shape[1], -1)
-
-
-def lens_centers(display: Display) -> NDArray[np.float64]:
-    """``(rows, columns, 2)`` places of the lenses in the lens plane, in pixels to the right and downwards."""
-    grid, pitch = display.lens_grid, display.panel.pixel_pitch
-    j, i = (index.astype(np.float64) for index in np.indices((grid.rows, grid.columns)))
-    x, y = display.lens_center(i, j, 0 * i, 0 * j)
-    if display.lens_array.layout == "lenticular":
-        # The foot of the axis, so that neighbours lie straight across from each other.
-        lattice = display.lattice
-        x, y = lattice.from_axes(lattice.across(x, y), 0 * i)
-    return np.ascontiguousarray(np.stack([x, -y], axis=-1) / pitch)

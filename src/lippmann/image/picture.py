@@ -5,13 +5,18 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
+import numpy as np
+
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.errors import UsageError
+from lippmann.errors import PictureError, UsageError
 from lippmann.image.encoding import linear_values
 from lippmann.image.provenance import Provenance
 from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, Values
 from lippmann.image.views import Resampling, view_grid
+
+#: Deviation of ``world_from_display`` from a rotation and scales that rounding may leave.
+_TOLERANCE = 1e-6
 
 
 class Picture(ABC):
@@ -89,3 +94,28 @@ class Picture(ABC):
                 raise UsageError("given beside optics", parameter=parameter, rule=rule, fix="leave it out")
             return replay_optics(self, eye, size=size)
         return replay(self, eye, size=size, filter=filter, subpixels=subpixels)
+
+
+def checked_placement(matrix: object) -> Matrix:
+    """``matrix`` as a read-only ``(4, 4)`` float64 array; a :class:`PictureError` if it places no display.
+
+    Columns 0 to 2 are the display's axes in the world: right-handed, x and y at a right angle and equally long. That of
+    z may be longer, where the display shows the scene's depth compressed, and lean, where a camera's lens is shifted.
+    """
+    rule = "it must be 4 x 4: a rotation times a scale (z may differ and lean), a translation, and (0, 0, 0, 1) below"
+    try:
+        values: Matrix = np.array(matrix, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise PictureError("world_from_display is no matrix", rule=rule) from None
+    if values.shape != (4, 4) or not np.isfinite(values).all() or list(values[3]) != [0, 0, 0, 1]:
+        raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
+    linear = values[:3, :3]
+    with np.errstate(all="ignore"):  # what overflows places nothing either: NaN is within no tolerance
+        lengths = np.linalg.norm(linear, axis=0)
+        axes = linear / lengths
+        is_regular = np.linalg.det(axes) > 0.0 and abs(lengths[0] / lengths[1] - 1.0) <= _TOLERANCE
+        is_square = abs(axes[:, 0] @ axes[:, 1]) <= _TOLERANCE
+    if not (is_regular and is_square):
+        raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
+    values.flags.writeable = False
+    return values

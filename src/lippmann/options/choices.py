@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Literal
 
 Method = Literal["auto", "full", "lens-view", "interpolated", "pooled"]
@@ -31,19 +30,3 @@ POOLED_LIGHT: tuple[Integrator, ...] = ("path", "direct")
 
 #: Why a value is this one that was not left open.
 ASKED = "as asked for"
-
-#: Endings of formats for data, whose values are not for the eye alone.
-_DATA = (".exr", ".tif", ".tiff", ".zarr")
-
-
-def tone_map_of(kind: ToneMap, output: Path) -> ToneMap:
-    """The tone map of a picture that is written to ``output``: left open, files for data keep light as it is."""
-    return "none" if kind == "auto" and output.suffix.lower() in _DATA else kind
-
-
-def default_depth(integrator: str) -> int:
-    """Surfaces of a path where none are asked for."""
-    from lippmann.options.integrators import INTEGRATORS
-
-    plugin = INTEGRATORS.find(integrator)
-    return 1 if plugin is None else plugin.value.depth

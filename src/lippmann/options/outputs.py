@@ -1,14 +1,18 @@
 """What is written, what moves in it, and which machines render it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal
 
+from lippmann.errors import UsageError
 from lippmann.options.option import Options, option
 
 #: What a film shows of each frame.
 Shows = Literal["eye", "native", "rgbd", "rgbd-half", "hololuminescent"]
+
+#: Endings of outputs that are films themselves; ``.png`` stays a picture's.
+_FILMS = (".mp4", ".apng")
 
 _frames = partial(option, default=None, group="Animation")
 _cluster = partial(option, default=None, group="Cluster")
@@ -60,6 +64,50 @@ class SequenceOptions(Options):
         "and vp9-rgb keep each code. Default: h264, or hevc where a side is longer."
     )
 
+    @property
+    def turns(self) -> bool:
+        """Whether the scene stands on a turntable."""
+        return self.turntable is not None or self.swing is not None
+
+    def __bool__(self) -> bool:
+        """Whether a sequence is asked for.
+
+        Raises
+        ------
+        UsageError
+            An option is given that means nothing without one.
+        """
+        if self.turns:
+            for name in ("animation", "camera_path"):
+                if getattr(self, name) is not None:
+                    what = "a scene on a turntable moves in no other way"
+                    raise UsageError(what, parameter=name, fix="leave it out")
+            return True
+        if self.frames is not None:
+            return True
+        for name in ("fps", "animation", "camera_path", "fixed_noise", "video", "eye", "codec", "shows"):
+            if getattr(self, name) not in (None, False, "", "eye"):
+                fix = 'add frames="0:48", or turntable=48'
+                raise UsageError("has no meaning for a single picture", parameter=name, fix=fix)
+        return False
+
+    def with_film(self, output: Path) -> tuple["SequenceOptions", Path]:
+        """Where ``output`` is a film, it becomes the film of frames in a folder beside it, ``NAME-frames``.
+
+        Raises
+        ------
+        UsageError
+            There are no frames, or ``video`` names another film.
+        """
+        if output.suffix.lower() not in _FILMS or output.is_dir():
+            return self, output
+        if not self:
+            raise UsageError("a film needs frames", where=str(output), fix='add turntable=48, or frames="0:48"')
+        if self.video is not None:
+            raise UsageError("the output is a film already", parameter="video", fix="leave one of them out")
+        # A dot would make the folder's name that of a file.
+        return replace(self, video=output), output.with_name(f"{output.stem.replace('.', '-')}-frames")
+
 
 @dataclass(frozen=True)
 class ClusterOptions(Options):
@@ -72,3 +120,16 @@ class ClusterOptions(Options):
     tls_ca: Path | None = _cluster(help="Certificate of the authority (PEM), for tls://.")
     tls_cert: Path | None = _cluster(help="Certificate of this machine (PEM).")
     tls_key: Path | None = _cluster(help="Private key of this machine (PEM).")
+
+    def __bool__(self) -> bool:
+        """Whether a cluster is asked for.
+
+        Raises
+        ------
+        UsageError
+            A TLS file is given without one.
+        """
+        for name in ("tls_ca", "tls_cert", "tls_key"):
+            if self.cluster is None and getattr(self, name) is not None:
+                raise UsageError("applies to a cluster only", parameter=name, fix='add cluster="tls://HOST:8786"')
+        return self.cluster is not None

@@ -33,7 +33,6 @@ from lippmann.image.stored_values import FloatArray, Layer, Values
 from lippmann.image.write import can_be_banded, check_output, format_for, replacing_output, write_rows
 from lippmann.journal.tile_file import DamagedTile, TileResult
 from lippmann.journal.tile_journal import TileStore, read_job, sweep_beside
-from lippmann.options.choices import tone_map_of
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise import oidn
 from lippmann.rendering.estimate.denoised_psnr import estimate_sums
@@ -125,7 +124,7 @@ def render_to_file(
     name, stored = format_for(output, bits)
     finish.check_stored(stored, output)
     finish.check_colors(request.transfer)
-    request = replace(request, tone_map=tone_map_of(request.tone_map, output))
+    request = request.for_file(output)
     printed = finish.display(display)
     check_output(output, name)
     if name == "zarr":

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lippmann.options.choices import tone_map_of
+from lippmann.rendering.request.render_request import RenderRequest
 
 
 @pytest.mark.parametrize(
@@ -22,4 +22,4 @@ from lippmann.options.choices import tone_map_of
     ],
 )
 def test_files_for_data_keep_light_unless_a_curve_is_named(kind, name, expected):
-    assert tone_map_of(kind, Path(name)) == expected
+    assert RenderRequest(tone_map=kind).for_file(Path(name)).tone_map == expected

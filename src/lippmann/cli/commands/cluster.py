@@ -11,7 +11,6 @@ import typer
 from lippmann.cli.shared import options
 from lippmann.cli.shared.command_options import only, with_options, without
 from lippmann.cli.shared.console import Console
-from lippmann.errors import UsageError
 from lippmann.options import texts
 from lippmann.options.outputs import ClusterOptions
 from lippmann.options.quality import MachineOptions
@@ -21,39 +20,26 @@ if TYPE_CHECKING:
     from lippmann.tiles.tiled_render import Runner
 
 
-class Cluster:
-    """The cluster of ``--cluster`` and ``--tls-...``; true if it is to render."""
+@contextmanager
+def runner_of(asked: ClusterOptions, console: Console, threads: int | None) -> Iterator[Runner | None]:
+    """The runner that renders tiles on a cluster while the connection is open; None without a cluster.
 
-    def __init__(self, asked: ClusterOptions) -> None:
-        self._asked = asked
-        if asked.cluster is None:
-            for name in ("tls_ca", "tls_cert", "tls_key"):
-                if getattr(asked, name) is not None:
-                    raise UsageError("applies to a cluster only", parameter=name, fix="add --cluster tls://HOST:8786")
+    Raises
+    ------
+    UsageError
+        If the cluster's address is invalid, or a TLS file is missing.
+    ClusterError
+        If the cluster cannot be reached.
+    """
+    if not asked.cluster:
+        yield None
+        return
+    from lippmann.cluster import connect, parse_target
+    from lippmann.cluster.runner import runner_on
 
-    def __bool__(self) -> bool:
-        return self._asked.cluster is not None
-
-    @contextmanager
-    def runner(self, console: Console, threads: int | None) -> Iterator[Runner | None]:
-        """The runner that renders tiles on the cluster while the connection is open; None without a cluster.
-
-        Raises
-        ------
-        UsageError
-            If the cluster's address is invalid, or a TLS file is missing.
-        ClusterError
-            If the cluster cannot be reached.
-        """
-        if self._asked.cluster is None:
-            yield None
-            return
-        from lippmann.cluster import connect, parse_target
-        from lippmann.cluster.runner import runner_on
-
-        target = parse_target(self._asked.cluster)
-        with connect(target, _tls_files(self._asked), threads=threads, remark=console.remark) as cluster:
-            yield runner_on(cluster)
+    target = parse_target(asked.cluster)
+    with connect(target, _tls_files(asked), threads=threads, remark=console.remark) as cluster:
+        yield runner_on(cluster)
 
 
 def _tls_files(asked: ClusterOptions) -> TlsFiles:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated
 
-from lippmann.cli.commands import sequence
 from lippmann.cli.shared import options
 from lippmann.cli.shared.command_options import for_form, only, with_options
 from lippmann.cli.shared.console import Console
@@ -43,12 +42,12 @@ def plan(
     target = display_of(display, printed)
     request = RenderRequest.from_options(how, machine, placement=placement)
     source = SceneSource(scene, asked, light, access)
-    spec = sequence.SequenceSpec.part_of(turning)
     with console.progress() as progress:
-        if spec:
+        if turning:
+            from lippmann.cli.commands.sequence import open_moving
             from lippmann.sequences.frames import find_stand
 
-            motion = sequence.open_moving(source, spec, request)
+            motion = open_moving(source, turning, request)
             where = find_stand(motion, target, placement)
             loaded, frames = motion.scene(0), motion.count
             request = replace(request, placement=where(0))

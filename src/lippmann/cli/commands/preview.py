@@ -13,7 +13,6 @@ from lippmann.cli.shared.console import Console, add_seconds, depth_line, report
 from lippmann.cli.shared.outputs import output_of
 from lippmann.cli.shared.scene_source import SceneSource, display_of
 from lippmann.errors import UsageError
-from lippmann.options.choices import tone_map_of
 from lippmann.options.forms import LEFT_OUT
 from lippmann.options.light import LightOptions
 from lippmann.options.outputs import AccessOptions
@@ -76,7 +75,7 @@ def preview(
     output = output_of(output, scene, "-preview.png")
     check_output(output, format_for(output, bits)[0])
     target = display_of(display, printed)
-    request = RenderRequest.from_options(how, machine, placement=placement, tone_map=tone_map_of(how.tone_map, output))
+    request = RenderRequest.from_options(how, machine, placement=placement).for_file(output)
     source = SceneSource(scene, asked, light, access)
     with console.progress() as progress:
         started = time.perf_counter()

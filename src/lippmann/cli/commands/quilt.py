@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from lippmann.cli.commands import sequence
 from lippmann.cli.commands.interlace import FitOption, fit_note
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import for_form, with_options
@@ -17,7 +16,6 @@ from lippmann.cli.shared.console import Console, add_seconds, depth_line, estima
 from lippmann.cli.shared.grouped_help import HelpfulCommand
 from lippmann.cli.shared.scene_source import SceneSource, sheet_of
 from lippmann.errors import UsageError
-from lippmann.options.choices import tone_map_of
 from lippmann.options.light import LightOptions
 from lippmann.options.outputs import AccessOptions, SequenceOptions
 from lippmann.options.placement import PlacementOptions
@@ -102,7 +100,7 @@ def render(
     placement: PlacementOptions,
     light: LightOptions,
     how: Annotated[QualityOptions, for_form("quilt")],
-    in_frames: SequenceOptions,
+    moving: SequenceOptions,
     machine: MachineOptions,
 ) -> None:
     """Render a scene as a quilt: the views of cameras side by side in front of the display."""
@@ -117,9 +115,8 @@ def render(
     target = load_display(display)
     grid = None if views is None else parse.size(views, "--views", rule="columns x rows, such as 8x6")
     quilt = quilt_of_display(target, grid, None if size is None else parse.size(size, "--size"))
-    moving = sequence.SequenceSpec.part_of(in_frames)
     path = output or Path(f"{Path(scene).stem}{'' if moving else '.png'}")
-    moving, file = sequence.with_film(moving, path)
+    moving, file = moving.with_film(path)
     shows_all = moving.eye is None and moving.shows == "eye"
     if moving.video is not None and shows_all and (file != path or quilt.pair):
         moving = replace(moving, video=_named(moving.video, quilt.ending))
@@ -129,13 +126,14 @@ def render(
         if resume:
             raise UsageError("a quilt is rendered in one piece", where="--resume", fix="leave it out")
         check_output(file, format_for(file, bits)[0])
-    request = RenderRequest.from_options(how, machine, placement=placement, tone_map=tone_map_of(how.tone_map, path))
+    request = RenderRequest.from_options(how, machine, placement=placement).for_file(path)
     source = SceneSource(scene, asked, light, access)
     if moving:
+        from lippmann.cli.commands.sequence import Files, render_frames
         from lippmann.sequences.forms import QuiltForm
 
-        files = sequence.Files(file, bits, None, resume)
-        sequence.render_frames(source, target, request, moving, files, console, form=QuiltForm(quilt))
+        files = Files(file, bits, None, resume)
+        render_frames(source, target, request, moving, files, console, form=QuiltForm(quilt))
         return
     with console.progress() as progress:
         started = time.perf_counter()

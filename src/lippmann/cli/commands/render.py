@@ -9,15 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lippmann.cli.commands import cluster as clusters
-from lippmann.cli.commands import sequence
 from lippmann.cli.shared import options, standard_streams
 from lippmann.cli.shared.command_options import with_options
 from lippmann.cli.shared.console import Console, add_seconds, remarks, report
 from lippmann.cli.shared.outputs import output_of
 from lippmann.cli.shared.scene_source import SceneSource, display_of, sheet_of
 from lippmann.errors import UsageError
-from lippmann.options.choices import tone_map_of
 from lippmann.options.light import LightOptions
 from lippmann.options.outputs import AccessOptions, ClusterOptions, SequenceOptions
 from lippmann.options.placement import PlacementOptions
@@ -89,35 +86,36 @@ def render(
 
     console = Console(quiet, as_json)
     target = display_of(display, printed)
-    spec = sequence.SequenceSpec.part_of(moving)
-    target, finish = sheet_of(target, finishing, in_frames=bool(spec))
-    spec, output = sequence.with_film(spec, output_of(output, scene, "-frames" if spec else ".png"))
-    if opens and spec and spec.video is None:
+    target, finish = sheet_of(target, finishing, in_frames=bool(moving))
+    moving, output = moving.with_film(output_of(output, scene, "-frames" if moving else ".png"))
+    if opens and moving and moving.video is None:
         raise UsageError("shows a picture or a film", where="--open", fix="add --video film.mp4")
     request = RenderRequest.from_options(
         *(how, machine),
         placement=placement,
-        tone_map=tone_map_of(how.tone_map, output),
-        began=None if spec else standard_streams.command_began(),
-    )
+        began=None if moving else standard_streams.command_began(),
+    ).for_file(output)
     source = SceneSource(scene, asked, light, access)
-    on_cluster = clusters.Cluster(on)
     rendered: Callable[..., IntegralImage] = render_picture
     traced = target
     if correct == "lens":
         from lippmann.corrected import finer_display, render_corrected
 
-        if spec or maps is not None:
-            _refuse_correction("frames" if spec else "--maps", "leave one of them out")
+        if moving or maps is not None:
+            _refuse_correction("frames" if moving else "--maps", "leave one of them out")
         rendered, traced = render_corrected, finer_display(target)
-    if spec:
-        files = sequence.Files(output, bits, maps, resume)
-        with on_cluster.runner(console, machine.threads) as runner:
-            sequence.render_frames(source, target, request, spec, files, console, runner=runner)
-        if opens and spec.video is not None:
+    on_cluster = bool(on)
+    if moving:
+        from lippmann.cli.commands.cluster import runner_of
+        from lippmann.cli.commands.sequence import Files, render_frames
+
+        files = Files(output, bits, maps, resume)
+        with runner_of(on, console, machine.threads) as runner:
+            render_frames(source, target, request, moving, files, console, runner=runner)
+        if opens and moving.video is not None:
             from lippmann.cli.commands.view import open_file
 
-            open_file(spec.video)
+            open_file(moving.video)
         return
     name, stored = format_for(output, bits)
     _check_layers(how.layers, name, output)
@@ -129,7 +127,9 @@ def render(
             fix = "leave it out: a file that ends in .exr holds each pixel's error and samples itself"
             rule = "with --resume, to Zarr and beyond the memory pictures are rendered in tiles"
             raise UsageError("needs the whole picture at once", where="--maps", rule=rule, fix=fix)
-        with on_cluster.runner(console, machine.threads) as runner:
+        from lippmann.cli.commands.cluster import runner_of
+
+        with runner_of(on, console, machine.threads) as runner:
             _render_tiled(
                 source, target, request, output, console, bits=bits, resume=resume, finish=finish, runner=runner
             )

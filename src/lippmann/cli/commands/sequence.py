@@ -27,65 +27,9 @@ if TYPE_CHECKING:
     from lippmann.sequences.motion import Motion
     from lippmann.tiles.tiled_render import Runner
 
-#: Endings of outputs that are films themselves; ``.png`` stays a picture's.
-_FILMS = (".mp4", ".apng")
 _NUMBER = re.compile(r"%(?:0(\d{1,2}))?d")
 _NUMERAL = re.compile(r"\([^()]*\)|[\d.]+")
 _FOLDER_PATTERN = "frame_%04d"
-
-
-class SequenceSpec(SequenceOptions):
-    """What is asked for of frames; true if there is anything, else a picture at rest is."""
-
-    @property
-    def turns(self) -> bool:
-        """Whether the scene stands on a turntable."""
-        return self.turntable is not None or self.swing is not None
-
-    def __bool__(self) -> bool:
-        """Whether a sequence is asked for.
-
-        Raises
-        ------
-        UsageError
-            An option is given that means nothing without one.
-        """
-        if self.turns:
-            for option in ("animation", "camera_path"):
-                if getattr(self, option) is not None:
-                    raise UsageError(
-                        "a scene on a turntable moves in no other way",
-                        where=f"--{option.replace('_', '-')}",
-                        fix="leave it out",
-                    )
-            return True
-        if self.frames is not None:
-            return True
-        for option in ("fps", "animation", "camera_path", "fixed_noise", "video", "eye", "codec", "shows"):
-            if getattr(self, option) not in (None, False, "", "eye"):
-                name = f"--{option.replace('_', '-')}"
-                raise UsageError(
-                    "has no meaning for a single picture", where=name, fix="add --frames 0:48, or --turntable 48"
-                )
-        return False
-
-
-def with_film(spec: SequenceSpec, output: Path) -> tuple[SequenceSpec, Path]:
-    """Where ``output`` is a film, it becomes the film of frames in a folder beside it, ``NAME-frames``.
-
-    Raises
-    ------
-    UsageError
-        There are no frames, or ``--video`` names another film.
-    """
-    if output.suffix.lower() not in _FILMS or output.is_dir():
-        return spec, output
-    if not spec:
-        raise UsageError("a film needs frames", where=str(output), fix="add --turntable 48, or --frames 0:48")
-    if spec.video is not None:
-        raise UsageError("the output is a film already", where="--video", fix="leave one of them out")
-    # A dot would make the folder's name that of a file.
-    return replace(spec, video=output), output.with_name(f"{output.stem.replace('.', '-')}-frames")
 
 
 @dataclass(frozen=True)
@@ -102,7 +46,7 @@ def render_frames(
     source: SceneSource,
     display: Display,
     request: RenderRequest,
-    spec: SequenceSpec,
+    spec: SequenceOptions,
     files: Files,
     console: Console,
     *,
@@ -218,7 +162,7 @@ def render_frames(
     )
 
 
-def open_moving(source: SceneSource, spec: SequenceSpec, request: RenderRequest) -> Motion:
+def open_moving(source: SceneSource, spec: SequenceOptions, request: RenderRequest) -> Motion:
     """What moves."""
     if spec.turns:
         from lippmann.options.placement import PlacementOptions
@@ -249,7 +193,7 @@ def open_moving(source: SceneSource, spec: SequenceSpec, request: RenderRequest)
 
 
 def _filming(
-    spec: SequenceSpec, motion: Motion, display: Display, request: RenderRequest, form: Form[Any] | None, count: int
+    spec: SequenceOptions, motion: Motion, display: Display, request: RenderRequest, form: Form[Any] | None, count: int
 ) -> Filming | None:
     """What the film shows of each frame."""
     if spec.video is None:

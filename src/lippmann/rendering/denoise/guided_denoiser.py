@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.sobol import named_seed
-from lippmann.display.lens_field import lens_numbers, lens_numbers_in_full_color
+from lippmann.display.micro_image_layout import lens_numbers, lens_numbers_in_full_color
 from lippmann.options.choices import Denoiser
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import NETWORK_STEP, Effort, denoise

@@ -25,12 +25,11 @@ from lippmann.options.choices import (
     Method,
     PixelFilter,
     ToneMap,
-    default_depth,
 )
 from lippmann.options.forms import Form
 from lippmann.options.light import LightOptions
 from lippmann.rendering.request.preconditions import check, check_off_surfaces
-from lippmann.rendering.request.render_request import Choice, RenderPlan, RenderRequest
+from lippmann.rendering.request.render_request import Choice, RenderPlan, RenderRequest, default_depth
 from lippmann.rendering.request.tuning import TUNING
 from lippmann.runtime import machine
 from lippmann.scene.scene import Scene

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Coding, Transfer, pbr_neutral
-from lippmann.options.choices import ASKED, Caustics, Denoiser, Integrator, Method, PixelFilter, ToneMap, default_depth
+from lippmann.options.choices import ASKED, Caustics, Denoiser, Integrator, Method, PixelFilter, ToneMap
+from lippmann.options.integrators import INTEGRATORS
 from lippmann.options.option import Options, options_of
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.quality import MachineOptions, QualityOptions
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
     from lippmann.display import Display
 
 T = TypeVar("T")
+
+#: Endings of formats for data, whose values are not for the eye alone.
+_DATA = (".exr", ".tif", ".tiff", ".zarr")
 
 
 @dataclass(frozen=True)
@@ -118,6 +123,12 @@ def format_value(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
+def default_depth(integrator: str) -> int:
+    """Surfaces of a path where none are asked for."""
+    plugin = INTEGRATORS.find(integrator)
+    return 1 if plugin is None else plugin.value.depth
+
+
 @dataclass(frozen=True)
 class RenderRequest(MachineOptions, QualityOptions):
     """A request to render: quality options, the machine's options, and the display's placement.
@@ -165,6 +176,10 @@ class RenderRequest(MachineOptions, QualityOptions):
         """Make a request of several classes of options; ``others`` are further fields, and override those."""
         values = {each.name: getattr(part, each.name) for part in parts for each, _ in options_of(type(part))}
         return cls(**{**values, **others})
+
+    def for_file(self, output: Path) -> RenderRequest:
+        """The request for a picture that is written to ``output``: left open, files for data keep light as it is."""
+        return replace(self, tone_map="none") if self.tone_map == "auto" and output.suffix.lower() in _DATA else self
 
     @property
     def reason(self) -> str:

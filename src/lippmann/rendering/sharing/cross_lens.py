@@ -26,7 +26,7 @@ from lippmann.device.kernel_ops import divide, to_numpy, upload
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Array, UInt32
 from lippmann.display import Display
-from lippmann.display.lens_field import lens_centers, lens_numbers
+from lippmann.display.micro_image_layout import lens_centers, lens_numbers
 from lippmann.rendering.film.memory_model import PREFERRED_LANES
 from lippmann.rendering.sharing.tuning import TUNING
 
@@ -57,9 +57,9 @@ def share_light(
     stop:
         Weight of a squared relative difference of light in the sum that decides a pixel's weight.
     lenses:
-        From :func:`~lippmann.display.lens_field.lens_numbers`: of a window, or of sub-pixels that show one colour each;
-        those of sub-pixels in full colour from :func:`~lippmann.display.lens_field.lens_numbers_in_full_color`. None
-        for whole pixels of the whole panel.
+        From :func:`~lippmann.display.micro_image_layout.lens_numbers`: of a window, or of sub-pixels that show one
+        colour each; of sub-pixels in full colour from its ``lens_numbers_in_full_color``. None for whole pixels of the
+        whole panel.
     columns:
         Columns of ``pixels`` for each pixel of the panel: 3 for sub-pixels in full colour, else 1.
 
