@@ -19,7 +19,7 @@ from typing import IO, Any, TypeGuard
 from lippmann.errors import LippmannError, OutputError, PictureError
 from lippmann.journal.file_lock import locked
 from lippmann.journal.fingerprint import differences
-from lippmann.runtime.atomic_write import Unfinished, remark
+from lippmann.runtime.atomic_write import Unfinished, output_error, remark
 
 #: Added to the sequence's name.
 ENDING = ".journal"
@@ -74,7 +74,7 @@ class FrameJournal:
             try:
                 file = stack.enter_context(locked(path, path))
             except OSError as error:
-                raise OutputError(f"cannot be written: {error.strerror or error}", where=str(path)) from error
+                raise output_error(path, error) from error
             file.seek(0)
             line = file.readline(_MOST_HEAD)
             head = _head_of(line, path)
@@ -146,7 +146,7 @@ class FrameJournal:
             self._file.flush()
             os.fsync(self._file.fileno())
         except OSError as error:
-            raise OutputError(f"cannot be written: {error.strerror or error}", where=str(self.path)) from error
+            raise output_error(self.path, error) from error
 
 
 def _remove(path: Path, file: IO[bytes]) -> None:

@@ -22,6 +22,8 @@ from lippmann.options.option import Options, option
 
 #: Stops of the largest exposure, up or down.
 MOST_EXPOSURE = 40
+#: Samples per pixel beyond which another one is lost in the rounding of single precision sums.
+MOST_SAMPLES = 1 << 24
 
 _scene = partial(option, group="Scene")
 _light = partial(option, group="Light")
@@ -99,7 +101,7 @@ class QualityOptions(Options):
         "pooled, for classic as the scene has it.",
         first=True,
         low=1,
-        high=2**24,
+        high=MOST_SAMPLES,
     )
     method: Method = _quality(
         "auto",

@@ -26,6 +26,7 @@ from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.request.render_request import RenderRequest, format_value
 from lippmann.rendering.session import Session, open_session
 from lippmann.runtime.engine_lock import exclusive
+from lippmann.runtime.machine import amount_in_words
 from lippmann.scene.placement import Placement
 from lippmann.scene.scene import Scene
 from lippmann.wording import depths_in_words, duration_in_words, html_table, samples_in_words
@@ -122,8 +123,8 @@ class Forecast:
             **{name: proof[name] for name in ("crosstalk", "advice") if name in proof},
             "rays": f"{self.rays['primary'] / 1e6:.1f} M from pixels ({samples_in_words(self.spp, 'each')}), "
             f"about {(self.rays['shadow'] + self.rays['secondary']) / 1e6:.1f} M more",
-            "memory": f"about {self.memory['expected'] / 2**30:.1f} GiB, "
-            f"with a limit of {self.memory['limit'] / 2**30:.1f} GiB for the picture",
+            "memory": f"about {amount_in_words(self.memory['expected'])}, "
+            f"with a limit of {amount_in_words(self.memory['limit'])} for the picture",
             "time": f"about {duration_in_words(self.seconds['total'])} on {self.device} ({stages})",
             **{name: f"{format_value(each['value'])} ({each['reason']})" for name, each in self.plan.items()},
         }

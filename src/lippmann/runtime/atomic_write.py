@@ -282,7 +282,7 @@ def _place(path: Path, *, folder: bool = False) -> Path:
         place = path.resolve()
         parent = _mode(place.parent)
     except OSError as error:
-        raise _output_error(path, error) from None
+        raise output_error(path, error) from None
     if parent is None:
         raise OutputError(
             f"the folder '{path.parent}' not found", where=str(path), fix=f"create it: mkdir -p '{path.parent}'"
@@ -392,7 +392,7 @@ def _reported(path: Path, temporary: Path) -> Iterator[None]:
         ours = not name or name == str(path) or str(name).startswith(str(temporary))
         if not ours:
             raise  # the block failed to read something else
-        raise _output_error(path, error) from error
+        raise output_error(path, error) from error
 
 
 def reason_and_fix(error: OSError) -> tuple[str, str]:
@@ -402,7 +402,8 @@ def reason_and_fix(error: OSError) -> tuple[str, str]:
     return _REASONS.get(number, (error.strerror or str(error), ""))
 
 
-def _output_error(path: Path, error: OSError) -> OutputError:
+def output_error(path: Path, error: OSError) -> OutputError:
+    """The error that ``path`` cannot be written."""
     reason, fix = reason_and_fix(error)
     if error.errno == errno.ENOENT and path.parent.is_dir():  # as in /proc
         reason, fix = "its folder takes no files", "choose another place"

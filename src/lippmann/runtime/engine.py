@@ -280,13 +280,14 @@ def diagnose(device: DeviceChoice = "auto") -> Diagnosis:
     """
     render, engine = _try_render(device)
     on_gpu = engine is not None and engine.device == "gpu"
+    free, total = map(machine.amount_in_words, (machine.available_memory(), machine.total_memory()))
     checks = (
         _check_packages(),
         Check("variant", engine is not None, engine.variant if engine else "none", render.fix),
         _check_llvm(needed=not on_gpu),
         Check("GPU", on_gpu, (engine.gpu_name if engine and on_gpu else None) or "none in use", needed=False),
         Check("threads", True, str(machine.usable_cores())),
-        Check("memory", True, f"{_gib(machine.available_memory())} free of {_gib(machine.total_memory())}"),
+        Check("memory", True, f"{free} free of {total}"),
         *_check_extras(),
         render,
     )
@@ -317,10 +318,6 @@ def _check_extras() -> list[Check]:
         )
         for name, absent in sorted(missing.items())
     ]
-
-
-def _gib(size: int) -> str:
-    return f"{size / 2**30:.1f} GiB"
 
 
 def _check_packages() -> Check:

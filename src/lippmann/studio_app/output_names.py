@@ -12,7 +12,7 @@ from lippmann.errors import LippmannError, OutputError
 from lippmann.journal.file_lock import locked
 from lippmann.journal.frame_journal import ENDING as FRAMES_ENDING
 from lippmann.journal.tile_journal import journal_of, read_job
-from lippmann.runtime.atomic_write import disk_name
+from lippmann.runtime.atomic_write import disk_name, output_error
 
 #: Bytes of a name without its number and ending: endings of journals and temporary files are added to it.
 _MOST_STEM = 150
@@ -95,7 +95,7 @@ def _claim(output: Path) -> OutputClaim | None:
     except OutputError:  # held by another studio
         return None
     except OSError as error:
-        raise OutputError(f"cannot be written: {error.strerror or error}", where=str(output)) from None
+        raise output_error(output, error) from None
     claim = OutputClaim(output, lock)
     try:
         if os.path.samestat(os.fstat(lock.fileno()), os.stat(file)):

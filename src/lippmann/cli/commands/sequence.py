@@ -263,7 +263,7 @@ def numbered(output: Path, frames: int, ending: str = "") -> Callable[[int], Pat
 @contextmanager
 def _places(output: Path, first: Path, video: Path | None) -> Iterator[None]:
     """See that frames and film can be written, in a new folder that goes again if no frame comes to lie in it."""
-    from lippmann.runtime.atomic_write import check_writable, undone
+    from lippmann.runtime.atomic_write import check_writable, output_error, undone
 
     is_new = first.parent == output and not output.is_dir()
 
@@ -277,7 +277,7 @@ def _places(output: Path, first: Path, video: Path | None) -> Iterator[None]:
             try:
                 output.mkdir()
             except OSError as error:
-                raise OutputError(f"cannot be made ({error.strerror or error})", where=str(output)) from None
+                raise output_error(output, error) from None
         check_writable(first)
         if video is not None:
             check_writable(video)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.splats.bvh import Floats, SplatBvh, make_bvh
 from lippmann.errors import MemoryLimitError
+from lippmann.runtime.machine import amount_in_words
 from lippmann.scene.values.splats import Splats, rotation_matrices
 
 #: Alpha below which a Gaussian does not count, as in the rasterizer of Kerbl et al. 2023.
@@ -70,9 +71,9 @@ def make_table(splats: Splats, memory: int, *, name: str = "") -> SplatTable | N
     need = splats.count * (_BYTES + 4 * splats.harmonics.shape[1] * 3)
     if need > memory:
         raise MemoryLimitError(
-            f"{splats.count} Gaussian splats take {need / 2**30:.1f} GiB of memory",
+            f"{splats.count} Gaussian splats take {amount_in_words(need)} of memory",
             where=name,
-            rule=f"{memory / 2**30:.1f} GiB are left",
+            rule=f"{amount_in_words(memory)} are left",
             fix="allow more with memory=..., or leave faint ones out with min_opacity=...",
         )
     visible = np.flatnonzero(splats.opacities > LEAST_ALPHA)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import MemoryLimitError
+from lippmann.runtime.machine import amount_in_words
 from lippmann.runtime.numba_jit import compiled, inlined
 from lippmann.scene.values.volume import TransferFunction, Volume
 
@@ -84,9 +85,9 @@ def make_table(volume: Volume, memory: int, *, name: str = "") -> VolumeTable:
     need = volume.grid.nbytes
     if need > memory:
         raise MemoryLimitError(
-            f"the volume's {' x '.join(map(str, volume.size))} voxels take {need / 2**30:.1f} GiB of memory",
+            f"the volume's {' x '.join(map(str, volume.size))} voxels take {amount_in_words(need)} of memory",
             where=name,
-            rule=f"{memory / 2**30:.1f} GiB are left",
+            rule=f"{amount_in_words(memory)} are left",
             fix="allow more with memory=..., or show a part with crop=...",
         )
     transfer = volume.transfer

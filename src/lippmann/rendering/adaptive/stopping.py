@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from lippmann.options.quality import MOST_SAMPLES
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
@@ -69,7 +70,7 @@ class Goal:
     @property
     def most(self) -> int:
         """Most samples per pixel, with which rendering stops short of the goal."""
-        return min(self.spp or TUNING.most, TUNING.most)
+        return self.spp or MOST_SAMPLES
 
     @property
     def least_worst(self) -> float | None:
@@ -216,7 +217,7 @@ def _next_total(samples: int, missing: float, slope: float) -> int:
 def _affordable(seconds: float, sampler: FullInBatches) -> int:
     """Samples per pixel that are taken within a share of ``seconds``."""
     most = TUNING.time_share * max(0.0, seconds) / max(_seconds_per_sample(sampler), 1e-9)
-    return math.floor(min(most, TUNING.most))
+    return math.floor(min(most, MOST_SAMPLES))
 
 
 def _seconds_per_sample(sampler: FullInBatches) -> float:

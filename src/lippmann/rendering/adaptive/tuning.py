@@ -11,8 +11,6 @@ class AdaptiveTuning:
 
     Attributes
     ----------
-    most:
-        Samples per pixel at which a goal is given up: the noise of single precision sums comes near.
     least_growth, most_growth:
         Factors on the samples by which one round grows: smaller ones cost an assessment each, larger ones overshoot
         (``goals.py``).
@@ -31,7 +29,6 @@ class AdaptiveTuning:
         (``docs/research/equal-time.md``).
     """
 
-    most: int = 1 << 20
     least_growth: float = 1.2
     most_growth: float = 4.0
     denoised_slope: float = 0.6

@@ -28,9 +28,9 @@ Floats = NDArray[np.float32]
 _LEAST_SLOPE, _LEAST_AREA = 0.01, 0.05
 #: Odd factors of the coordinates of a cell in its hash.
 _FACTORS = SEED_STEP, pow(SEED_STEP, 2, 1 << 32), pow(SEED_STEP, 3, 1 << 32)
-#: Bitmap of wide cells with photons in reach: bits per bucket, fewest bits in all, and width of a wide cell in radii.
-#: One look-up in fifty then finds no photon.
-_NEAR_BITS, _FEWEST_BITS, _NEAR_WIDTH = 16, 1 << 10, 4
+#: Bitmap of wide cells with photons in reach: bits per bucket, and width of a wide cell in radii. One look-up in fifty
+#: then finds no photon.
+_NEAR_BITS, _NEAR_WIDTH = 16, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +124,7 @@ class PhotonMap:
         # Opaque to the compiler, so that all sets of photons share a kernel.
         self._last_bucket = dr.opaque(mi.UInt32, self._mask)
         starts, ordered, before = [], [], 0
-        near = np.zeros(max(_FEWEST_BITS, _NEAR_BITS * (self._mask + 1)), bool)
+        near = np.zeros(_NEAR_BITS * (self._mask + 1), bool)
         for half in halves:
             # In single precision as on the device, so that both find the same cells.
             cell = np.floor(half.position / np.float32(radius)).astype(np.int32).astype(np.uint32)
