@@ -179,12 +179,11 @@ def replacing_output(path: Path, name: FormatName) -> Iterator[Path]:
     remark(f"{path} was written")
 
 
-def check_output(path: Path, name: FormatName) -> None:
-    """Raise :class:`OutputError` if a picture of this format cannot be written to ``path``; writes nothing."""
-    if name == "zarr":
-        check_folder_writable(path)
-    else:
-        check_writable(path)
+def check_output(path: Path, bits: int | None = None) -> tuple[FormatName, Stored]:
+    """:func:`format_for`, and an :class:`OutputError` if ``path`` cannot be written; writes nothing."""
+    name, stored = format_for(path, bits)
+    (check_folder_writable if name == "zarr" else check_writable)(path)
+    return name, stored
 
 
 def _write(

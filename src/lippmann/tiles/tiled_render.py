@@ -126,7 +126,7 @@ def render_to_file(
     finish.check_colors(request.transfer)
     request = request.for_file(output)
     printed = finish.display(display)
-    check_output(output, name)
+    check_output(output, bits)
     if name == "zarr":
         zarr_array.load_zarr(output)
     job = make_job(

@@ -61,10 +61,10 @@ def pattern(
     from lippmann.calibration.patterns import fields as fields_of
     from lippmann.display import load_display
     from lippmann.display.formats.monitor import Monitor
-    from lippmann.image.write import check_output, format_for
+    from lippmann.image.write import check_output
 
     console = Console(quiet, as_json)
-    check_output(output, format_for(output, bits)[0])
+    check_output(output, bits)
     chosen = Pattern(name, views, fields, step)  # type: ignore[arg-type]  # it is checked there
     if name == "stripes" and step is not None:
         raise UsageError("does not apply to stripes", where="--step", fix="leave it out")

@@ -36,14 +36,14 @@ def compare(
     """Compare a picture with a reference: PSNR, worst micro-images, SSIM of views, the paper's metrics."""
     from lippmann.image import IntegralImage
     from lippmann.image.streamed import open_picture
-    from lippmann.image.write import check_output, format_for
+    from lippmann.image.write import check_output
     from lippmann.metrics import compare as compare_pictures
     from lippmann.metrics import error_map
     from lippmann.runtime.atomic_write import check_writable
 
     console = Console(quiet, as_json)
     if picture is not None:
-        check_output(picture, format_for(picture)[0])
+        check_output(picture)
     if table is not None:
         check_writable(table)
     target = parse.display(display)
@@ -56,8 +56,7 @@ def compare(
         _write_table(comparison, table)
     if picture is not None:
         error_map(comparison).save(picture)
-    for note in comparison.notes:
-        console.remark(note)
+    console.remark(*comparison.notes)
     values = {"reference": str(reference), "test": str(test), **comparison.to_dict()}
     console.result(values, "\n".join(_lines(comparison)))
 

@@ -42,8 +42,7 @@ def export(
     image = read_picture(picture, display=parse.display(display))
     with console.progress() as progress:
         done = export_image(image, output, layout, bits=bits, distance=distance, progress=progress)
-    for note in done.notes:
-        console.remark(note)
+    console.remark(*done.notes)
     down, across, height, width = done.shape
     result = {
         "output": str(output),
@@ -72,15 +71,14 @@ def import_(
 ) -> None:
     """Import a light field of another tool as a picture for a display."""
     from lippmann.exchange import import_image
-    from lippmann.image.write import check_output, format_for
+    from lippmann.image.write import check_output
 
     console = Console(quiet, as_json)
-    check_output(output, format_for(output, bits)[0])
+    check_output(output, bits)
     with console.progress() as progress:
         image, notes = import_image(source, layout, display=parse.display(display), progress=progress)
     image.save(output, bits=bits)
-    for note in notes:
-        console.remark(note)
+    console.remark(*notes)
     height, width = image.pixels.shape[:2]
     result = {
         "output": str(output),

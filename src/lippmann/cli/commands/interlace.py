@@ -103,8 +103,7 @@ def interlace(
             keeps_profile=target.sheet is not None,
             progress=progress,
         )
-        for note in (*read.notes, *fit_note(read.cropped[::-1] if across else read.cropped, fit)):
-            console.remark(note)
+        console.remark(*read.notes, *fit_note(read.cropped[::-1] if across else read.cropped, fit))
         choice = views or ("nearest" if across else "linear")
         pixels, notes = write_interlaced(
             read,
@@ -117,8 +116,7 @@ def interlace(
             finish=finish,
             progress=progress,
         )
-    for note in notes:
-        console.remark(note)
+    console.remark(*notes)
     result: dict[str, Any] = {
         "output": str(output),
         "size": list(pixels),

@@ -112,10 +112,10 @@ def compose(
 ) -> None:
     """Join views or micro-images into the native picture."""
     from lippmann.image import compose as compose_folder
-    from lippmann.image.write import check_output, format_for
+    from lippmann.image.write import check_output
 
     console = Console(quiet, as_json)
-    check_output(output, format_for(output, bits)[0])
+    check_output(output, bits)
     with console.progress() as progress:
         image = compose_folder(folder, progress=progress)
     image.save(output, bits=bits)
@@ -187,7 +187,7 @@ def replay(
     """Simulate what an eye in front of the display sees."""
     from lippmann.codecs.stereo_pairs import PAIRS
     from lippmann.image.streamed import open_picture
-    from lippmann.image.write import check_output, format_for, write_plain_picture
+    from lippmann.image.write import check_output, write_plain_picture
     from lippmann.runtime.atomic_write import check_writable
     from lippmann.viewing.quilt_views import quilt_display, replay_quilt
     from lippmann.viewing.replay import default_eye, path_of_eye
@@ -220,7 +220,7 @@ def replay(
                 raise UsageError("is for two eyes", where=str(output), rule="of 8 bits", fix="add --sbs full")
             check_writable(output)
         else:
-            check_output(output, format_for(output, bits)[0])
+            check_output(output, bits)
     if width is not None and not sweep:
         raise UsageError("applies to a sweep only", where="--sweep-width", fix="add --sweep")
     places = None if path is None else head_path(path)
@@ -329,7 +329,7 @@ def refocus(
 ) -> None:
     """Refocus on a plane, or on several, as a camera whose aperture is as wide as the field of view."""
     from lippmann.image.streamed import open_picture
-    from lippmann.image.write import check_output, format_for, write_plain_picture
+    from lippmann.image.write import check_output, write_plain_picture
     from lippmann.viewing.focal_stack import check_stack_path, write_planes
     from lippmann.viewing.quilt_views import quilt_display, refocus_quilt
     from lippmann.viewing.refocus import focal_planes
@@ -341,7 +341,7 @@ def refocus(
     if plane is None:
         check_stack_path(output, bits)
     else:
-        check_output(output, format_for(output, bits)[0])
+        check_output(output, bits)
     planes_asked = heights if plane is None else [plane]
     quilt = quilt_of(picture, layout, aspect)
     if quilt is None:

@@ -54,7 +54,6 @@ def plan(
         else:
             loaded, frames = source.load(), 1
         prediction = forecast(loaded, target, request, progress, frames=frames)
-    for note in prediction.notes:
-        console.remark(note)
+    console.remark(*prediction.notes)
     lines = [f"{name:<15}{text}" for name, text in prediction.in_words().items()]
     console.result(prediction.to_dict(), "\n".join(lines))

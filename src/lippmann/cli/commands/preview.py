@@ -68,12 +68,12 @@ def preview(
     machine: MachineOptions,
 ) -> None:
     """Show in a second or two what a display will show to an eye in front of its middle."""
-    from lippmann.image.write import check_output, format_for, write_plain_picture
+    from lippmann.image.write import check_output, write_plain_picture
     from lippmann.rendering.request.render_request import RenderRequest
 
     console = Console(quiet, as_json)
     output = output_of(output, scene, "-preview.png")
-    check_output(output, format_for(output, bits)[0])
+    check_output(output, bits)
     target = display_of(display, printed)
     request = RenderRequest.from_options(how, machine, placement=placement).for_file(output)
     source = SceneSource(scene, asked, light, access)
@@ -96,8 +96,7 @@ def preview(
         provenance = add_seconds(provenance, write=time.perf_counter() - writing)
     if not plain:
         console.remark(depth_line(provenance))
-    for note in provenance.notes:
-        console.remark(note)
+    console.remark(*provenance.notes)
     height, width = image.pixels.shape[:2]
     before = "" if plain else f" as {target.name} will show it"
     console.result(

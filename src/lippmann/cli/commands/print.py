@@ -49,13 +49,13 @@ def marks(
     from lippmann.display.validation import length
     from lippmann.image.read import open_file
     from lippmann.image.streamed import picture_of_file
-    from lippmann.image.write import check_output, format_for
+    from lippmann.image.write import check_output
 
     console = Console(quiet, as_json)
     if output is None and job_sheet is None:
         raise UsageError("is missing", where="--output", rule="marks writes a picture, a job sheet or both")
     if output is not None:
-        check_output(output, format_for(output, bits)[0])
+        check_output(output, bits)
     if job_sheet is not None:
         check_job_sheet(job_sheet)
     file = open_file(picture)

@@ -105,7 +105,7 @@ def render(
 ) -> None:
     """Render a scene as a quilt: the views of cameras side by side in front of the display."""
     from lippmann.display import load_display
-    from lippmann.image.write import check_output, format_for
+    from lippmann.image.write import check_output
     from lippmann.quilts.files import write_quilt
     from lippmann.quilts.quilt import Quilt, quilt_of_display
     from lippmann.rendering.quilt import render_quilt
@@ -125,7 +125,7 @@ def render(
     if not moving:
         if resume:
             raise UsageError("a quilt is rendered in one piece", where="--resume", fix="leave it out")
-        check_output(file, format_for(file, bits)[0])
+        check_output(file, bits)
     request = RenderRequest.from_options(how, machine, placement=placement).for_file(path)
     source = SceneSource(scene, asked, light, access)
     if moving:
@@ -149,8 +149,7 @@ def render(
         write_quilt(made, file, bits=bits)
     spent = add_seconds(made.provenance, load=load_seconds, write=time.perf_counter() - writing)
     console.remark(depth_line(spent))
-    for note in spent.notes:
-        console.remark(note)
+    console.remark(*spent.notes)
     if spent.estimate is not None:
         console.remark(f"estimated PSNR {estimate_in_words(spent.estimate, 'view')}")
     seconds = spent.seconds["total"]
@@ -169,17 +168,16 @@ def pack(
     quiet: options.Quiet = False,
 ) -> None:
     """Put a folder of views into a quilt, the leftmost at the bottom left."""
-    from lippmann.image.write import check_output, format_for
+    from lippmann.image.write import check_output
     from lippmann.quilts.files import read_views, write_quilt
     from lippmann.quilts.quilt import layout_of_name
 
     console = Console(quiet, as_json)
     layout = layout_of_name(output)
-    check_output(output, format_for(output, bits)[0])
+    check_output(output, bits)
     with console.progress() as progress:
         packed = read_views(folder, layout, progress=progress)
-        for note in packed.notes:
-            console.remark(note)
+        console.remark(*packed.notes)
     write_quilt(packed, output, bits=bits)
     width, height = packed.size
     result = {"output": str(output), "size": [width, height], "views": layout.views}
@@ -204,8 +202,7 @@ def unpack(
     console = Console(quiet, as_json)
     check_folder_writable(output)
     quilt = read_quilt(picture, layout_of(layout, aspect))
-    for note in quilt.notes:
-        console.remark(note)
+    console.remark(*quilt.notes)
     with console.progress() as progress:
         write_views(quilt, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
     width, height = quilt.view_size
@@ -262,14 +259,13 @@ def weave(
     from lippmann.display import load_display
     from lippmann.display.sheet_layout import trim_of
     from lippmann.image.streamed import LARGE
-    from lippmann.image.write import can_be_banded, check_output, format_for
+    from lippmann.image.write import can_be_banded, check_output
     from lippmann.quilts.fit_views import fit_views
     from lippmann.quilts.weave import weave as weave_views
     from lippmann.quilts.weave import weave_to_file
 
     console = Console(quiet, as_json)
-    name, stored = format_for(output, bits)
-    check_output(output, name)
+    name, stored = check_output(output, bits)
     target, asked_finish = sheet_of(load_display(display), finishing)
     finish = asked_finish or NO_FINISH
     finish.check_stored(stored, output)
@@ -277,12 +273,10 @@ def weave(
     width, height = panel.width, panel.height
     with console.progress() as progress:
         views = _views(source, layout_of(layout, aspect), progress)
-        for note in views.notes:
-            console.remark(note)
+        console.remark(*views.notes)
         if fit is not None or source.is_dir():  # a quilt of another shape is refused, unless a fit is asked for
             views, cropped = fit_views(views, trim.width / trim.height, fit or "cover")
-            for note in fit_note(cropped, fit):
-                console.remark(note)
+            console.remark(*fit_note(cropped, fit))
         asked: dict[str, Any] = {"choice": choice, "correct": correct, "scene": source.stem, "progress": progress}
         if width * height > LARGE and can_be_banded(name):
             notes = weave_to_file(views, target, output, bits=bits, finish=finish, **asked)
@@ -290,8 +284,7 @@ def weave(
             woven = weave_views(views, target, **asked)
             write_finished(woven, output, finish, bits=bits)
             notes = woven.provenance.notes
-    for note in notes:
-        console.remark(note)
+    console.remark(*notes)
     result = {
         "output": str(output),
         "size": [width, height],

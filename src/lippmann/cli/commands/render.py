@@ -136,7 +136,7 @@ def render(
         if opens:
             _open(output, quiet=quiet, as_json=as_json)
         return
-    check_output(output, name)
+    check_output(output, bits)
     if finish is not None:
         finish.check_stored(stored, output)
     if maps is not None:

@@ -37,9 +37,9 @@ class Console:
         elif lines and not self.quiet:
             print(printable.lines(lines) if isinstance(lines, str) else "\n".join(map(printable.one_line, lines)))
 
-    def remark(self, line: str) -> None:
-        """One line that is no result: a note or a warning, its parameters as options."""
-        if not self.quiet:
+    def remark(self, *lines: str) -> None:
+        """Lines that are no result: notes and warnings, their parameters as options."""
+        for line in () if self.quiet else lines:
             print(printable.one_line(translated(line)), file=sys.stderr)
 
     @contextmanager
@@ -71,8 +71,7 @@ def remarks(console: Console, made: Provenance) -> None:
     console.remark(depth_line(made))
     if "auto" in made.options:
         console.remark(f"auto: {made.options['auto']}")
-    for note in made.notes:
-        console.remark(note)
+    console.remark(*made.notes)
     if made.estimate is not None:
         console.remark(f"estimated PSNR {estimate_in_words(made.estimate)}")
 
