@@ -110,7 +110,7 @@ def test_balls_have_a_quarter_of_the_van_der_waals_radius_and_their_colour(read)
     assert red == 1
     assert green == blue < 0.01
     low, high = load_scene(scene).bounds
-    assert low[0] == pytest.approx(-0.24 - 0.25 * 1.10, rel=1e-2)
+    assert low[0] == pytest.approx(-0.24 - 0.25 * 1.20, rel=1e-2)
     assert high[0] == pytest.approx(20 + 0.25 * 1.70, rel=1e-3)
     assert low[2] == pytest.approx(-0.25 * 1.70, rel=1e-3)
 
@@ -227,6 +227,26 @@ ATOM      3 HG   SER A   3       0.000   9.000   0.000  1.00 10.00
     assert places(scene, "balls of element 6").tolist() == [[0, 0, 0]]
     assert places(scene, "balls of element 20").tolist() == [[9, 0, 0]]
     assert places(scene, "balls of element 1").tolist() == [[0, 9, 0]]
+
+
+@pytest.mark.parametrize(
+    ("name", "element"),
+    [(" NA ", 11), (" CL ", 17), ("Cl- ", 17), (" SOD", 11), ("CLA ", 17), (" CAL", 20), ("ZN2 ", 30)],
+)
+def test_an_atom_alone_in_a_residue_of_its_name_is_an_ion(read, name, element):
+    """As GROMACS, AMBER and CHARMM write ions without a column of elements."""
+    scene = read(f"HETATM    1 {name} {name.strip():<4s}    2       0.000   0.000   0.000  1.00  0.00\nEND\n")
+    assert [mesh.name for mesh in scene.meshes] == [f"balls of element {element}"]
+
+
+def test_metals_have_their_own_colours_and_radii(read):
+    gold, silver = (read(SALT.replace("Na", metal), "m.cif") for metal in ("Au", "Ag"))
+    red, green, blue = gold.materials[1].base_color
+    assert red == 1
+    assert green > 5 * blue
+    assert min(silver.materials[1].base_color) > 0.5
+    assert load_scene(gold).bounds[0][2] == pytest.approx(-0.25 * 1.75, rel=1e-2)  # chlorine is the larger
+    assert load_scene(read(SALT.replace("Na", "Cs"), "m.cif")).bounds[0][2] == pytest.approx(-0.25 * 3.43, rel=1e-2)
 
 
 def test_hydrogens_do_not_bond_to_each_other(read):

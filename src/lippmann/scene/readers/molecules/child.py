@@ -25,19 +25,33 @@ _COMPONENT_TAGS = (
 )
 
 _PDB = (".pdb", ".ent", ".pdb.gz", ".ent.gz")
+#: CHARMM's names of ions, whose first letters mean other elements.
+_IONS = {
+    "SOD": "Na",
+    "POT": "K",
+    "CLA": "Cl",
+    "CAL": "Ca",
+    "CES": "Cs",
+    "LIT": "Li",
+    "RUB": "Rb",
+    "BAR": "Ba",
+    "CAD": "Cd",
+}
 #: Columns 73 to 80 of a file's lines before 1996: the entry's code and the number of the line.
 _ENTRY = re.compile(rb"[0-9][0-9A-Z]{3}[ 0-9]{3}[0-9]")
 
 
 def main() -> None:
-    """Answer requests by positions, elements and notes."""
+    """Answer requests by positions, elements, notes, and covalent and van der Waals radii (n, 2) of the elements."""
     serve_arrays(_read)
 
 
 def _read(request: dict[str, Any]) -> dict[str, NDArray[np.generic]]:
     notes: list[str] = []
     elements, positions = _atoms(request["path"], notes)
-    return {"elements": elements, "positions": positions, "notes": np.array(notes, np.str_)}
+    of_each = [gemmi.Element(int(number)) for number in elements]
+    radii = np.array([(each.covalent_r, each.vdw_r) for each in of_each], np.float64)
+    return {"elements": elements, "positions": positions, "radii": radii, "notes": np.array(notes, np.str_)}
 
 
 def _atoms(path: str, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -87,7 +101,7 @@ def _of_structure(structure: gemmi.Structure, notes: list[str]) -> tuple[NDArray
             first = next((atom.altloc for atom in residue if atom.altloc != "\0"), "\0")
             for atom in residue:  # its own first_conformer() keeps alternatives that stand apart
                 if atom.altloc in ("\0", first):
-                    elements.append(_element(atom, residue.name))
+                    elements.append(_element(atom, residue))
                     places.append(atom.pos)
         if len(elements) > MOST_ATOMS:
             break
@@ -109,13 +123,18 @@ def _first_residues(chain: gemmi.Chain) -> Iterator[gemmi.Residue]:
         yield residue
 
 
-def _element(atom: gemmi.Atom, residue: str) -> gemmi.Element:
+def _element(atom: gemmi.Atom, residue: gemmi.Residue) -> gemmi.Element:
     """The element of an atom; a carbon that a name such as ``CA`` in the first column makes a calcium.
 
     Files without an element column tell the two apart by the column in which the name begins, which many programs get
-    wrong. The residues of proteins and nucleic acids hold no such metals.
+    wrong. The residues of proteins and nucleic acids hold no such metals; an atom that is alone in a residue of its own
+    name is an ion.
     """
-    tabulated = gemmi.find_tabulated_residue(residue)
+    if len(residue) == 1 and atom.name == residue.name:
+        symbol = "".join(itertools.takewhile(str.isalpha, atom.name)).upper()
+        ion = gemmi.Element(_IONS.get(symbol, symbol))
+        return ion if ion.atomic_number else atom.element
+    tabulated = gemmi.find_tabulated_residue(residue.name)
     biopolymer = tabulated.is_standard() and (tabulated.is_amino_acid() or tabulated.is_nucleic_acid())
     return gemmi.Element(atom.name[0]) if biopolymer and len(atom.element.name) == 2 else atom.element
 

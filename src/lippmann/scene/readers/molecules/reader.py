@@ -31,29 +31,16 @@ _SIDES = 16
 _BYTES_PER_ATOM = 2_000
 _MOST_SECONDS = 120.0
 
-#: Atomic number: sRGB colour, covalent radius (Cordero et al. 2008) and van der Waals radius (Bondi 1964), angstroms.
-_ELEMENTS: dict[int, tuple[tuple[int, int, int], float, float]] = {
-    1: ((255, 255, 255), 0.31, 1.10),
-    5: ((255, 181, 181), 0.84, 1.92),
-    6: ((120, 120, 120), 0.76, 1.70),
-    7: ((48, 80, 248), 0.71, 1.55),
-    8: ((255, 13, 13), 0.66, 1.52),
-    9: ((144, 224, 80), 0.57, 1.47),
-    11: ((171, 92, 242), 1.66, 2.27),
-    12: ((138, 255, 0), 1.41, 1.73),
-    14: ((240, 200, 160), 1.11, 2.10),
-    15: ((255, 128, 0), 1.07, 1.80),
-    16: ((255, 255, 48), 1.05, 1.80),
-    17: ((31, 240, 31), 1.02, 1.75),
-    19: ((143, 64, 212), 2.03, 2.75),
-    20: ((61, 255, 0), 1.76, 2.31),
-    26: ((224, 102, 51), 1.32, 2.00),
-    29: ((200, 128, 51), 1.32, 1.40),
-    30: ((125, 128, 176), 1.22, 1.39),
-    35: ((166, 41, 41), 1.20, 1.85),
-    53: ((148, 0, 148), 1.39, 1.98),
-}
-_OTHER = ((255, 20, 147), 1.40, 2.00)
+#: sRGB colours by atomic number, as Jmol has them but for a darker carbon; first that of what is no element.
+_COLORS = bytes.fromhex("""
+FF1493 FFFFFF D9FFFF CC80FF C2FF00 FFB5B5 787878 3050F8 FF0D0D 90E050 B3E3F5 AB5CF2 8AFF00 BFA6A6 F0C8A0 FF8000
+FFFF30 1FF01F 80D1E3 8F40D4 3DFF00 E6E6E6 BFC2C7 A6A6AB 8A99C7 9C7AC7 E06633 F090A0 50D050 C88033 7D80B0 C28F8F
+668F8F BD80E3 FFA100 A62929 5CB8D1 702EB0 00FF00 94FFFF 94E0E0 73C2C9 54B5B5 3B9E9E 248F8F 0A7D8C 006985 C0C0C0
+FFD98F A67573 668080 9E63B5 D47A00 940094 429EB0 57178F 00C900 70D4FF FFFFC7 D9FFC7 C7FFC7 A3FFC7 8FFFC7 61FFC7
+45FFC7 30FFC7 1FFFC7 00FF9C 00E675 00D452 00BF38 00AB24 4DC2FF 4DA6FF 2194D6 267DAB 266696 175487 D0D0E0 FFD123
+B8B8D0 A6544D 575961 9E4FB5 AB5C00 754F45 428296 420066 007D00 70ABFA 00BAFF 00A1FF 008FFF 0080FF 006BFF 545CF2
+785CE3 8A4FE3 A136D4 B31FD4 B31FBA B30DA6 BD0D87 C70066 CC0059 D1004F D90045 E00038 E6002E EB0026
+""")
 
 _process = HelperProcess("from lippmann.scene.readers.molecules.child import main; main()", _MOST_SECONDS)
 
@@ -83,28 +70,32 @@ def read_molecule(path: Path) -> SceneDescription:
     elements, positions = arrays["elements"].astype(np.int64), arrays["positions"].astype(np.float64)
     notes = arrays["notes"].tolist()
     fit = np.isfinite(positions).all(axis=1) & (np.abs(positions) < 1e6).all(axis=1)
-    elements, positions = elements[fit], positions[fit]
+    elements, positions, radii = elements[fit], positions[fit], arrays["radii"][fit]
     if not 0 < len(elements) <= _MOST_ATOMS:
         raise SceneError(f"holds {len(elements)} atoms", where=path.name, rule=f"1 to {_MOST_ATOMS} are read")
     check_input(_BYTES_PER_ATOM * len(elements), "its atoms", where=path.name)
-    description = _description(path.stem, elements, positions)
+    description = _description(path.stem, elements, positions, radii)
     return replace(description, notes=[*description.notes, *notes])
 
 
-def _description(name: str, elements: NDArray[np.int64], positions: NDArray[np.float64]) -> SceneDescription:
+def _description(
+    name: str, elements: NDArray[np.int64], positions: NDArray[np.float64], radii: NDArray[np.float64]
+) -> SceneDescription:
+    """The molecule; ``radii`` ``(n, 2)`` are covalent and van der Waals radii."""
     detail = next((level for most, level in _DETAIL if len(elements) <= most), 0)
-    ends, others = _half_bonds(elements, positions)
+    ends, others = _half_bonds(elements, positions, radii[:, 0])
     meshes: list[Mesh] = []
     materials: list[Material] = []
     instances: list[Instance] = []
     for number in np.unique(elements):
-        (red, green, blue), _, radius = _ELEMENTS.get(int(number), _OTHER)
-        color = decode_srgb(np.array([red, green, blue]) / 255.0)
+        own_atoms = elements == number
+        code = _COLORS[3 * number :][:3] or _COLORS[:3]
+        color = decode_srgb(np.array(list(code)) / 255.0)
         material = len(materials)
         materials.append(Material(f"element {number}", base_color=tuple(color.tolist()), roughness=0.4))
-        balls = np.tile(np.eye(4), (int((elements == number).sum()), 1, 1))
-        balls[:, :3, :3] *= BALL * radius
-        balls[:, :3, 3] = positions[elements == number]
+        balls = np.tile(np.eye(4), (int(own_atoms.sum()), 1, 1))
+        balls[:, :3, :3] *= BALL * radii[own_atoms][0, 1]
+        balls[:, :3, 3] = positions[own_atoms]
         instances.append(Instance(len(meshes), balls))
         meshes.append(_ball(f"balls of element {number}", detail, material))
         own = elements[ends] == number
@@ -117,11 +108,9 @@ def _description(name: str, elements: NDArray[np.int64], positions: NDArray[np.f
 
 
 def _half_bonds(
-    elements: NDArray[np.int64], positions: NDArray[np.float64]
+    elements: NDArray[np.int64], positions: NDArray[np.float64], own: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The atoms at either end of each bond, each bond from both sides."""
-    radii = np.array([_ELEMENTS.get(int(number), _OTHER)[1] for number in np.unique(elements)])
-    own = radii[np.searchsorted(np.unique(elements), elements)]
+    """The atoms at either end of each bond, each bond from both sides; ``own`` are the atoms' covalent radii."""
     # Hydrogens bond to one atom; a cell of nothing but overlaid atoms would have pairs without number.
     tree = cKDTree(positions)
     _, near = tree.query(positions, k=min(13, len(positions)), distance_upper_bound=2.0 * own.max() + SLACK)
