@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from lippmann.errors import PictureError
-from lippmann.quilts.view_names import middle_row, places_of_views
+from lippmann.quilts.view_names import line_of_grid, middle_row, places_of_views
 
 
 def places(*names):
@@ -55,3 +55,34 @@ def test_the_middle_row_of_a_grid_is_a_row_of_views():
     grid = {(row, column): Path(f"{row}_{column}") for row in (1, 2, 3) for column in (0, 1)}
     assert middle_row(grid) == ({0: Path("2_0"), 1: Path("2_1")}, 3)
     assert middle_row({(7,): Path("a"), (8,): Path("b")}) == ({7: Path("a"), 8: Path("b")}, 1)
+
+
+@pytest.mark.parametrize("name", ["view_{0:02}_{1:02}.png", "out_{0:02}_{1:02}_{0}.0_{1}.0_.png"])
+def test_of_a_whole_grid_the_middle_row_or_column_is_a_line(name):
+    paths = {(row, column): Path(name.format(row, column)) for row in range(3) for column in range(5)}
+    line, notes = line_of_grid(list(paths.values()))
+    assert line == [paths[1, column] for column in range(5)]
+    assert notes == ("of a grid of 5 x 3 cameras the middle row is taken: 5 views",)
+    assert line_of_grid(list(paths.values()), down=True)[0] == [paths[row, 2] for row in range(3)]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["a.jpg", "b.jpg"],
+        ["frame_1.png", "frame_2.png", "frame_10.png"],
+        ["v_0_0.png", "v_0_1.png", "v_1_0.png"],  # a corner is missing
+        ["row1_1.png", "row1_2.png"],
+    ],
+)
+def test_other_pictures_are_a_line_as_they_are(names):
+    paths = [Path(name) for name in names]
+    assert line_of_grid(paths) == (paths, ())
+
+
+def test_views_of_the_benchmark_lie_in_rows_as_their_parameters_say(tmp_path):
+    paths = [tmp_path / f"input_Cam{number:03}.png" for number in range(12)]
+    assert places_of_views(paths)[(11,)] == paths[11]
+    (tmp_path / "parameters.cfg").write_text("[extrinsics]\nnum_cams_x = 4\nnum_cams_y = 3\n")
+    assert places_of_views(paths)[2, 3] == paths[11]
+    assert line_of_grid(paths)[0] == paths[4:8]

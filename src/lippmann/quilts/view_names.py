@@ -1,8 +1,9 @@
 """Where the views of a folder belong, by the numbers in their files' names.
 
 Numbers that all names share say nothing. Of the others the last one counts the views, or the last two side by side are
-row and column, where rows and columns repeat. The names of the Stanford light field archive also hold where the camera
-stood, ``out_ROW_COLUMN_Y_X``, in mm, x to the right and y downwards; their rows and columns run either way.
+row and column, where rows and columns repeat. Folders of the 4D Light Field Benchmark count row by row, in rows as long
+as their ``parameters.cfg`` says. The names of the Stanford light field archive also hold where the camera stood,
+``out_ROW_COLUMN_Y_X``, in mm, x to the right and y downwards; their rows and columns run either way.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from lippmann.quilts.quilt import QUILT_NAME
 Place = tuple[int, ...]
 
 _NUMBER = re.compile(r"[0-9]{1,9}")
+_HCI = re.compile(r"input_Cam(\d{3,6})")
+_HCI_COLUMNS = re.compile(rb"^\s*num_cams_x\s*=\s*([1-9]\d{0,4})\s*$", re.MULTILINE)
 _STANFORD = re.compile(r"_(\d{1,6})_(\d{1,6})_(-?\d{1,9}\.\d{1,9})_(-?\d{1,9}\.\d{1,9})(?![\d.])")
 
 
@@ -52,6 +55,8 @@ def places_of_views(paths: Sequence[Path]) -> dict[Place, Path]:
     stems = [path.stem for path in paths]
     if all(_STANFORD.search(stem) for stem in stems):
         return _by_place(paths, _stanford_places(stems))
+    if across := _benchmark_columns(paths):
+        return _by_place(paths, [divmod(int(stem[len("input_Cam") :]), across) for stem in stems])
     numbers = [tuple(int(number) for number in _NUMBER.findall(stem)) for stem in stems]
     for path, parts in zip(paths, numbers, strict=True):
         if not parts:
@@ -90,6 +95,36 @@ def _stanford_places(stems: Sequence[str]) -> list[Place]:
         if ends[0] > ends[1]:
             places[:, axis] = first + last - numbers
     return [(int(row), int(column)) for row, column in places]
+
+
+def _benchmark_columns(paths: Sequence[Path]) -> int | None:
+    """Views in a row of a folder of the 4D Light Field Benchmark, None of other folders."""
+    parameters = paths[0].with_name("parameters.cfg")
+    if not all(_HCI.fullmatch(path.stem) for path in paths) or not parameters.is_file():
+        return None
+    with parameters.open("rb") as file:
+        match = _HCI_COLUMNS.search(file.read(1 << 16))
+    return int(match[1]) if match else None
+
+
+def line_of_grid(paths: Sequence[Path], *, down: bool = False) -> tuple[list[Path], tuple[str, ...]]:
+    """Of a whole grid of cameras the middle row, or the middle column where views part ``down``; and notes.
+
+    Pictures of other names are returned as they are.
+    """
+    try:
+        by_place = places_of_views(paths)
+    except PictureError:
+        return list(paths), ()
+    axes = [sorted(set(numbers)) for numbers in zip(*by_place, strict=True)]
+    if len(axes) != 2 or min(map(len, axes)) < 2 or len(axes[0]) * len(axes[1]) != len(paths):
+        return list(paths), ()
+    kept = 1 if down else 0
+    middle = axes[kept][len(axes[kept]) // 2]
+    line = [by_place[place] for place in sorted(by_place) if place[kept] == middle]
+    word = "column" if down else "row"
+    note = f"of a grid of {len(axes[1])} x {len(axes[0])} cameras the middle {word} is taken: {len(line)} views"
+    return line, (note,)
 
 
 def middle_row(by_place: Mapping[Place, Path]) -> tuple[dict[int, Path], int]:

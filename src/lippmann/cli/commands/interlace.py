@@ -82,13 +82,14 @@ def interlace(
     from lippmann.calibration.finish import NO_FINISH
     from lippmann.quilts.interlace import check_interlaced_path, view_size, write_interlaced
     from lippmann.quilts.photos import natural_order, read_photos
+    from lippmann.quilts.view_names import line_of_grid
 
     console = Console(quiet, as_json)
     check_interlaced_path(output)
     across = lenses == "across"
     target, asked_finish = sheet_of(_display(display, printed, turned=across), replace(finishing, icc=icc))
     finish = asked_finish or NO_FINISH
-    paths = natural_order(_pictures(photos))
+    paths, of_grid = line_of_grid(natural_order(_pictures(photos)), down=across)
     if reverse:
         paths.reverse()
     with console.progress() as progress:
@@ -103,7 +104,7 @@ def interlace(
             keeps_profile=target.sheet is not None,
             progress=progress,
         )
-        console.remark(*read.notes, *fit_note(read.cropped[::-1] if across else read.cropped, fit))
+        console.remark(*of_grid, *read.notes, *fit_note(read.cropped[::-1] if across else read.cropped, fit))
         choice = views or ("nearest" if across else "linear")
         pixels, notes = write_interlaced(
             read,
