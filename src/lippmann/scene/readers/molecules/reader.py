@@ -70,7 +70,7 @@ def read_molecule(path: Path) -> SceneDescription:
     elements, positions = arrays["elements"].astype(np.int64), arrays["positions"].astype(np.float64)
     notes = arrays["notes"].tolist()
     fit = np.isfinite(positions).all(axis=1) & (np.abs(positions) < 1e6).all(axis=1)
-    elements, positions, radii = elements[fit], positions[fit], arrays["radii"][fit]
+    elements, positions, radii = elements[fit], positions[fit], arrays["radii"].astype(np.float64)[fit]
     if not 0 < len(elements) <= _MOST_ATOMS:
         raise SceneError(f"holds {len(elements)} atoms", where=path.name, rule=f"1 to {_MOST_ATOMS} are read")
     check_input(_BYTES_PER_ATOM * len(elements), "its atoms", where=path.name)
