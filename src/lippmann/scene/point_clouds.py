@@ -1,4 +1,4 @@
-"""Clouds of plain points, drawn as balls: fitted to their bulk, and cropped."""
+"""Clouds of plain points, drawn as balls: fitted to their bulk, and cropped; lines alone, drawn as rods."""
 
 from __future__ import annotations
 
@@ -36,14 +36,25 @@ def draw_cloud(clouds: Sequence[Mesh]) -> tuple[list[Mesh], Width]:
     return meshes, width
 
 
-def describe_cloud(cloud: Mesh, material: Material, notes: Sequence[str]) -> SceneDescription:
-    """A scene of points alone, whose ``faces`` are ``(m, 1)``; unshaded where they have colours.
+def draw_thin(thin: Sequence[Mesh]) -> tuple[list[Mesh], Width]:
+    """Points as by :func:`draw_cloud`, or rods along lines, whose ``faces`` are ``(m, 2)``; and how wide they are."""
+    if thin[0].faces.shape[1] == 1:
+        return draw_cloud(thin)
+    positions = np.concatenate([mesh.positions for mesh in thin])
+    diagonal = float(np.linalg.norm(np.ptp(positions, axis=0)))
+    width = width_of(diagonal, sum(len(mesh.faces) for mesh in thin), lines=True)
+    return [as_mesh(mesh, np.eye(4)[None], width.radius, mesh.material) for mesh in thin], width
 
-    Nearly all such files come from scanners, which record the light with the colour.
+
+def describe_cloud(cloud: Mesh, material: Material, notes: Sequence[str]) -> SceneDescription:
+    """A scene of points ``(m, 1)`` or lines ``(m, 2)`` alone, which ``faces`` are; unshaded where they have colours.
+
+    Nearly all such points come from scanners, which record the light with the colour.
     """
     step = max(1, -(-len(cloud.faces) // MOST))
-    left_out = [f"of {len(cloud.faces)} points one in {step} is drawn"] if step > 1 else []
-    meshes, width = draw_cloud([thinned(cloud, step)])
+    what = "lines" if cloud.faces.shape[1] == 2 else "points"
+    left_out = [f"of {len(cloud.faces)} {what} one in {step} is drawn"] if step > 1 else []
+    meshes, width = draw_thin([thinned(cloud, step)])
     material = replace(material, unlit=cloud.colors is not None)
     instances = [Instance(number, np.eye(4)) for number in range(len(meshes))]
     return SceneDescription(cloud.name, meshes, [material], instances, notes=[*notes, *left_out, width.note])

@@ -238,6 +238,30 @@ def test_clouds_of_points_are_drawn_as_balls(plotter, tmp_path):
         assert not any("lines or points" in note for note in scene.notes)
 
 
+@pytest.mark.parametrize("of_cells", [False, True], ids=["points", "cells"])
+def test_lines_alone_are_drawn_as_rods(plotter, tmp_path, of_cells):
+    """Streamlines, from an object, a file and a plotter: two pieces and one, in the colours of their scalars."""
+    corners = np.array([(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 3, 0), (2, 3, 0)], np.float32)
+    lines = pyvista.PolyData(corners, lines=[3, 0, 1, 2, 2, 3, 4])
+    table = lines.cell_data if of_cells else lines.point_data
+    table["speed"] = np.array([0.0, 1.0] if of_cells else [0.0, 0.0, 0.0, 1.0, 1.0])
+    lines.set_active_scalars("speed")
+    lines.save(tmp_path / "a.vtp")
+    lines.cast_to_unstructured_grid().save(tmp_path / "a.vtu")
+    plotter.add_mesh(lines, name="streams", cmap="viridis", interpolate_before_map=False)
+    for source in (lines, tmp_path / "a.vtp", tmp_path / "a.vtu", plotter):
+        scene = load_scene(source)
+        (mesh,) = scene.description.meshes
+        pieces = mesh.positions.reshape(3, -1, 3)
+        assert pieces.mean(axis=1) == pytest.approx(np.array([(0.5, 0, 0), (1.5, 0, 0), (1, 3, 0)]), abs=1e-5)
+        yellow = decode_srgb(np.array([253, 231, 36]) / 255)
+        colors = mesh.colors.reshape(3, pieces.shape[1], -1)[..., :3]
+        assert colors[2] == pytest.approx(np.tile(yellow, (pieces.shape[1], 1)), abs=0.01)
+        assert colors[:2].max() < 0.1
+        assert scene.description.materials[mesh.material].unlit
+        assert any("lines are drawn as rods" in note for note in scene.notes)
+
+
 def test_an_array_is_chosen_by_its_name(tmp_path):
     sphere = pyvista.Sphere()
     sphere["height"], sphere.cell_data["number"] = sphere.points[:, 2], np.arange(float(sphere.n_cells))

@@ -30,10 +30,10 @@ _NO_NUMBER = (160, 160, 160, 255)
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Triangles of a data set, or points alone.
+    """Triangles of a data set, or points or lines alone.
 
-    ``positions`` ``(n, 3)``, ``faces`` ``(m, 3)``, of points ``(n, 1)``, ``normals`` ``(n, 3)`` and ``uvs``
-    ``(n, 2)`` (v up) or None; ``colors`` ``(n, 4)`` sRGB bytes or None. ``notes`` are remarks, one line each.
+    ``positions`` ``(n, 3)``, ``faces`` ``(m, 3)``, of points ``(n, 1)``, of lines ``(m, 2)``, ``normals`` ``(n, 3)``
+    and ``uvs`` ``(n, 2)`` (v up) or None; ``colors`` ``(n, 4)`` sRGB bytes or None. ``notes`` are remarks, a line each.
     """
 
     positions: NDArray[np.float64]
@@ -45,7 +45,7 @@ class Surface:
 
 
 def surface_of(source: pyvista.DataSet | pyvista.MultiBlock) -> Surface:
-    """The outer surface of a data set, cut into triangles; of points alone, these.
+    """The outer surface of a data set, cut into triangles; of points or lines alone, these.
 
     Bytes with three or four channels are colours; other scalars are coloured over their range by a table of their own,
     as files of VTK's older kind may have it, or by :data:`COLOR_MAP`, vectors by their length.
@@ -60,25 +60,24 @@ def surface_of(source: pyvista.DataSet | pyvista.MultiBlock) -> Surface:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of defaults to come, whose new names older versions do not know
         surface = source if hasattr(source, "verts") else source.extract_surface()
-        if is_points(surface):
+        if is_thin(surface) and surface.n_verts:
             return _points(surface)
         surface, notes = _polygons(surface)
-        surface, faces, owners = _triangles(surface)
+        surface, faces, owners = _segments(surface) if is_thin(surface) else _triangles(surface)
     positions = np.asarray(surface.points, np.float64)
     if len(faces) == 0:
-        fix = "give lines a thickness, in PyVista by: mesh.tube(radius=0.1)"
-        raise SceneError("the PyVista data set has no surface", rule="there must be at least one face", fix=fix)
+        raise SceneError("the PyVista data set has no surface", rule="there must be at least one face, line or point")
     normals, uvs = surface.point_data.active_normals, surface.active_texture_coordinates
     colors = None
     scalars = surface.active_scalars
     if scalars is not None:
         colors = _colors(np.asarray(scalars), str(surface.active_scalars_name), _own_table(scalars), notes)
     if colors is not None and len(colors) != len(positions):  # one colour per face
-        corners = faces.ravel()
-        colors, positions = np.repeat(colors[owners], 3, axis=0), positions[corners]
+        corners, sides = faces.ravel(), faces.shape[1]
+        colors, positions = np.repeat(colors[owners], sides, axis=0), positions[corners]
         normals = None if normals is None else np.asarray(normals)[corners]
         uvs = None if uvs is None else np.asarray(uvs)[corners]
-        faces = np.arange(len(corners)).reshape(-1, 3)
+        faces = np.arange(len(corners)).reshape(-1, sides)
     return Surface(
         positions,
         faces,
@@ -89,9 +88,10 @@ def surface_of(source: pyvista.DataSet | pyvista.MultiBlock) -> Surface:
     )
 
 
-def is_points(source: pyvista.DataSet) -> bool:
-    """Whether a data set has cells of single points and no others."""
-    return bool(0 < getattr(source, "n_verts", 0) == source.n_cells)
+def is_thin(source: pyvista.DataSet) -> bool:
+    """Whether a data set has cells of single points and no others, or of lines."""
+    counts = getattr(source, "n_verts", 0), getattr(source, "n_lines", 0)
+    return source.n_cells > 0 and source.n_cells in counts
 
 
 def _points(source: pyvista.PolyData) -> Surface:
@@ -144,6 +144,18 @@ def _triangles(surface: pyvista.PolyData) -> tuple[pyvista.PolyData, NDArray[np.
     return surface, faces, np.arange(len(faces))
 
 
+def _segments(surface: pyvista.PolyData) -> tuple[pyvista.PolyData, NDArray[np.int64], NDArray[np.int64]]:
+    """Lines, their pieces ``(m, 2)`` from point to point, and the cell ``(m,)`` that each belongs to."""
+    listed = np.asarray(surface.lines, np.int64)
+    pieces, first = [np.empty((0, 2), np.int64)], 0
+    while first < len(listed):
+        line = listed[first + 1 : first + 1 + listed[first]]
+        pieces.append(np.stack([line[:-1], line[1:]], axis=1))
+        first += len(line) + 1
+    owners = np.repeat(np.arange(surface.n_cells), [len(each) for each in pieces[1:]])
+    return surface, np.concatenate(pieces), owners
+
+
 def unshown_arrays(source: pyvista.DataSet | pyvista.MultiBlock) -> str:
     """Names of the arrays of a data set without active ones, or of the blocks of an uncoloured collection; or empty."""
     if hasattr(source, "combine"):
@@ -159,7 +171,7 @@ def unshown_arrays(source: pyvista.DataSet | pyvista.MultiBlock) -> str:
 
 
 def mesh_of(surface: Surface, name: str, material: int) -> Mesh:
-    """The triangles as a scene's mesh, whose material has that index."""
+    """The triangles, lines or points as a scene's mesh, whose material has that index."""
     uvs = surface.uvs
     return Mesh(
         name=name,
@@ -173,9 +185,9 @@ def mesh_of(surface: Surface, name: str, material: int) -> Mesh:
 
 
 def describe_surface(surface: Surface, name: str, notes: list[str]) -> SceneDescription:
-    """The scene of a surface alone, or of points."""
+    """The scene of a surface alone, or of points or lines."""
     mesh, material = mesh_of(surface, name, 0), material_of(surface.colors)
-    if surface.faces.shape[1] == 1:
+    if surface.faces.shape[1] < 3:
         return describe_cloud(mesh, material, notes)
     return SceneDescription(name, [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.vertex_colors import COLORED
-from lippmann.scene.point_clouds import draw_cloud
-from lippmann.scene.readers.vtk.data_set import Surface, image_of, is_points, mesh_of, surface_of
+from lippmann.scene.point_clouds import draw_thin
+from lippmann.scene.readers.vtk.data_set import Surface, image_of, is_thin, mesh_of, surface_of
 from lippmann.scene.values.description import (
     Camera,
     Color,
@@ -88,8 +88,8 @@ def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
                 surface = replace(surface, normals=None)
             drawn = [mesh_of(surface, block.name, len(materials))]
             material = _material(actor.prop, block, texture, is_mapped=is_mapped)
-            if surface.faces.shape[1] == 1:
-                drawn, width = draw_cloud(drawn)
+            if surface.faces.shape[1] < 3:
+                drawn, width = draw_thin(drawn)
                 material = replace(material, unlit=True)
                 notes.append(f"'{block.name[:40]}': {width.note}")
             materials.append(material)
@@ -128,7 +128,7 @@ def _left_out(actor: Any, mapper: Any) -> list[str]:
             features.append("its way of blending")
         return features
     prop = actor.prop
-    if prop.GetRepresentation() != _SURFACE and not is_points(mapper.dataset):
+    if prop.GetRepresentation() != _SURFACE and not is_thin(mapper.dataset):
         features.append("lines or points in place of the surface")
     elif prop.GetEdgeVisibility():
         features.append("edges")
