@@ -2,12 +2,12 @@
 
 The display's place is held fixed over all frames: where the scene is fitted to it, the box around all that the motion
 ever fills is; where it follows a camera, it stays in the same place in front of that camera. So nothing
-jumps from frame to frame, and a frame is the same whether it is rendered alone or with all others.
+jumps from frame to frame, and a frame shows the same whether it is rendered alone or with all others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -23,6 +23,7 @@ from lippmann.rendering.session import Build
 from lippmann.runtime.heap import return_freed_memory
 from lippmann.scene.placement import Placement, options_of_sequence, place, stand
 from lippmann.scene.values.description import Camera, Matrix
+from lippmann.sequences.cuts import Moment
 from lippmann.sequences.flicker import with_flicker
 from lippmann.sequences.forms import INTEGRAL, Form, QuiltForm, Shown
 from lippmann.sequences.kept_scene import KeptScene
@@ -304,23 +305,33 @@ def render_frames(
     request: RenderRequest,
     form: Form[Shown],
     progress: ProgressCallback,
+    finished: Iterable[int] = (),
 ) -> Iterator[tuple[int, Shown]]:
-    """The frames of :func:`render_sequence`, in any form, once it is known where the display stands."""
+    """The frames of :func:`render_sequence`, in any form, once it is known where the display stands.
+
+    ``finished`` are frames of the sequence that an earlier run rendered.
+    """
     kept = KeptScene()
     request = hold_exposure(request, motion, display, where, kept.build)
 
-    def trace(frame: int, asked: RenderRequest, report: ProgressCallback) -> Shown:
-        return form.render(motion.scene(frame), display, replace(asked, placement=where(frame)), report, kept.build)
+    def moment(frame: int) -> Moment:
+        return Moment(frame, motion.scene(frame), where(frame))
 
-    keys = KeyFrames(lambda number: trace(number, of_frame(request, number), silent).provenance)
+    def trace(now: Moment, request: RenderRequest, report: ProgressCallback) -> Shown:
+        return form.render(now.scene, display, replace(request, placement=now.placement), report, kept.build)
+
+    keys = KeyFrames(
+        {*frames, *finished}, display, moment, lambda key: trace(key, of_frame(request, key.number), silent).provenance
+    )
 
     def render(position: int, frame: int) -> Shown:
-        asked, key = of_frame(request, frame), keys.before(frame, request)
+        now, own = moment(frame), of_frame(request, frame)
+        key = keys.before(now, request)
         if key is not None:
-            asked = without_halves(asked, frame, key)
-        image = trace(frame, asked, _report_of_frame(progress, position, len(frames)))
+            own = without_halves(own, frame, key)
+        image = trace(now, own, _report_of_frame(progress, position, len(frames)))
         made = image.provenance
-        keys.add(frame, made)
+        keys.add(now, made)
         estimate = made.estimate if key is None else key.estimate
         # Noise that stands still has no flicker that the frames' own errors would tell.
         if not request.fixed_noise:
