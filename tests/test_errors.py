@@ -24,6 +24,12 @@ def test_an_unknown_name_is_told_with_the_likeliest_first(name, line):
     assert str(SceneError.unknown("scene", name, NAMES)) == line
 
 
+def test_a_long_list_is_left_out_beside_a_likely_name():
+    many = [*NAMES, *(f"number {each}" for each in range(10))]
+    assert str(SceneError.unknown("scene", "teapt", many)) == "unknown scene 'teapt', did you mean 'teapot'?"
+    assert "; known are room, teapot, tree, number 0, " in str(SceneError.unknown("scene", "xyz", many))
+
+
 def test_where_a_name_stands_and_what_else_is_allowed():
     error = UsageError.unknown(
         "scene", "a", NAMES, where="a.toml:3", parameter="scene", rule="or a file", fix="name one"

@@ -8,7 +8,7 @@ import pytest
 
 import lippmann
 from lippmann.progress import Progress, silent
-from lippmann.progress_bar import Overall, show_progress
+from lippmann.progress_bar import Overall, PlainProgress, show_progress
 
 
 def shares(reports):
@@ -76,3 +76,11 @@ def test_the_bar_fits_eighty_columns(monkeypatch):
             told(Progress("guides", done, 4, "worst micro-image 33.3 of 40 dB, 36.1 of 42 dB, about 1234 s left"))
     lines = stream.getvalue().replace("\r", "\n").split("\n")
     assert all(len(line) <= 80 for line in lines)
+
+
+def test_plain_lines_do_not_repeat_themselves(monkeypatch, capsys):
+    monkeypatch.setattr("lippmann.progress_bar.PLAIN_INTERVAL", 0.0)
+    tell = PlainProgress()
+    for left in (9, 9, 8):
+        tell(Progress("trace", 1, 2, f"about {left} s left"))
+    assert capsys.readouterr().err.splitlines() == [f"32 %: tracing, about {left} s left" for left in (9, 8)]

@@ -16,6 +16,8 @@ E = TypeVar("E", bound="LippmannError")
 
 #: Names that a line lists at most.
 _MOST_LISTED = 40
+#: Names that are listed beside a likely one at most.
+_MOST_BESIDE_LIKELY = 12
 #: Letters of an unknown name that a line quotes at most.
 _MOST_QUOTED = 80
 
@@ -70,13 +72,15 @@ class LippmannError(Exception):
     ) -> E:
         """The error of a ``kind`` of thing called ``name``, which is none of those known: the likeliest come first.
 
-        ``rule`` stands for the list of all that are known.
+        ``rule`` stands for the list of all that are known; a long one is left out where likely names are said.
         """
         names = list(known)
-        listed = ", ".join(names[:_MOST_LISTED]) + (", ..." if len(names) > _MOST_LISTED else "")
-        rule = rule or (f"known are {listed}" if names else "there is none")
         quoted = str(name)[:_MOST_QUOTED]
-        what = f"unknown {kind} '{quoted}'{suggestion(quoted, names)}" if quoted else f"no {kind}"
+        likely = suggestion(quoted, names)
+        listed = ", ".join(names[:_MOST_LISTED]) + (", ..." if len(names) > _MOST_LISTED else "")
+        if not rule and not (likely and len(names) > _MOST_BESIDE_LIKELY):
+            rule = f"known are {listed}" if names else "there is none"
+        what = f"unknown {kind} '{quoted}'{likely}" if quoted else f"no {kind}"
         return cls(what, where=where, parameter=parameter, rule=rule, fix=fix)
 
     @classmethod

@@ -90,10 +90,11 @@ def bar() -> Iterator[ProgressCallback]:
 
 
 class PlainProgress:
-    """A line of text every few seconds, so that logs stay short."""
+    """A line of text every few seconds, so that logs stay short; none that says what the last one said."""
 
     def __init__(self) -> None:
         self._last = time.perf_counter()
+        self._line = ""
         self._overall = Overall()
 
     def __call__(self, progress: Progress) -> None:
@@ -101,9 +102,11 @@ class PlainProgress:
         now = time.perf_counter()
         if now - self._last < PLAIN_INTERVAL or progress.done == 0:
             return
-        self._last = now
         note = f", {progress.note}" if progress.note else ""
-        print(f"{100 * share:.0f} %: {STAGE_NAMES.get(progress.stage, progress.stage)}{note}", file=sys.stderr)
+        line = f"{100 * share:.0f} %: {STAGE_NAMES.get(progress.stage, progress.stage)}{note}"
+        if line != self._line:
+            self._last, self._line = now, line
+            print(line, file=sys.stderr)
 
 
 @contextmanager

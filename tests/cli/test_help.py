@@ -6,6 +6,7 @@ import re
 import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import typer
@@ -13,6 +14,7 @@ import typer
 from lippmann.cli.app import COMMANDS, GROUPS, app_of, make_app
 from lippmann.cli.shared.examples import EXAMPLES
 from lippmann.cli.shared.grouped_help import OPTION_GROUPS
+from lippmann.cli.shared.outputs import output_of
 
 
 def commands(command=None, words=()):
@@ -124,6 +126,12 @@ class TestOutputsThatNobodyNamed:
         assert done.code == 2
         assert done.err == "lippmann: teapot.png: is there, and no picture of Lippmann's; say -o FILE\n"
         assert (tmp_path / "teapot.png").read_bytes() == b"a texture"
+
+    def test_the_picture_of_a_photograph_has_a_name_of_its_own(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        Path("photo.png").write_bytes(b"a photograph")
+        assert output_of(None, "photo.png", ".png") == Path("photo-native.png")
+        assert output_of(None, "elsewhere/photo.png", "-seen.png") == Path("photo-seen.png")
 
 
 def test_a_picture_is_opened_once_it_is_written(lippmann, engine, tmp_path, monkeypatch):

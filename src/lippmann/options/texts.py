@@ -106,7 +106,7 @@ def _from_plain(kind: Any, value: object) -> object:
     raise UsageError(shorten(value), rule=rule)
 
 
-_MEMORY_UNITS = {"": 1, "k": 2**10, "m": 2**20, "g": 2**30, "t": 2**40}
+_MEMORY_UNITS = {"k": 2**10, "m": 2**20, "g": 2**30, "t": 2**40}
 
 
 def numbers(text: str, option: str, counts: tuple[int, ...] = (3,)) -> tuple[float, ...]:
@@ -138,8 +138,8 @@ def number(text: str, option: str, rule: str) -> float:
 
 
 def memory(text: str, option: str) -> int:
-    """Bytes of an amount such as ``2G``, ``512M`` or a plain number of bytes."""
-    match = re.fullmatch(r"(\d{1,20}(?:\.\d{1,20})?)\s*([kmgt]?)(?:i?b)?", text.strip().lower())
+    """Bytes of an amount such as ``2G`` or ``512M``."""
+    match = re.fullmatch(r"(\d{1,20}(?:\.\d{1,20})?)\s*([kmgt])(?:i?b)?", text.strip().lower())
     amount = 0 if match is None else int(float(match[1]) * _MEMORY_UNITS[match[2]])
     if amount <= 0:
         raise UsageError(f"'{text}' is no amount of memory", where=option, rule="a number with K, M or G, such as 2G")

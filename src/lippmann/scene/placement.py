@@ -29,6 +29,9 @@ from lippmann.scene.matrices import (
 from lippmann.scene.scene import box, box_corners, find_camera, thin_axis
 from lippmann.scene.values.description import Camera, Matrix
 
+#: Flattening above this factor is too little to be said.
+_UNNOTICED_SCALE = 0.95
+
 
 @dataclass(frozen=True, eq=False)
 class Placement:
@@ -250,7 +253,7 @@ def _fit(
         pop_out=options.pop_out,
         covers=covers,
     )
-    if options.depth_scale is None and fit.depth_scale < 1.0 - 1e-6:
+    if options.depth_scale is None and fit.depth_scale < _UNNOTICED_SCALE:
         beyond, within = ("soft", "sharp") if display.stereo is None else ("a strain", "comfortable")
         warnings.append(
             f"depth {fit.depth:.3g} mm flattened to {100 * fit.depth_scale:.2g} %: depth_scale=1 keeps it, {beyond} at "

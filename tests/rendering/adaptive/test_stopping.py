@@ -169,7 +169,7 @@ def test_reports_climb_to_the_end_and_say_where_the_picture_stands():
     assert done == sorted(done)
     assert all(report.done <= report.total for report in reports)
     assert "of 40 dB, about" in reports[-1].note
-    assert reports[-1].note.endswith("s left")
+    assert reports[-1].note.endswith("about 0 s left")
 
 
 def test_missing_is_by_the_likely_value_and_by_the_low_end():

@@ -49,6 +49,8 @@ def _files(value: object) -> Iterator[Path]:
 def output_of(given: Path | None, source: str | Path, ending: str) -> Path:
     """The file to write: ``given``, or in the working folder the source's name with ``ending``, such as ``-seen.png``.
 
+    The picture of a photograph ``photo.png`` in this folder is ``photo-native.png``.
+
     Raises
     ------
     OutputError
@@ -59,6 +61,8 @@ def output_of(given: Path | None, source: str | Path, ending: str) -> Path:
     path = Path(f"{Path(source).stem or 'picture'}{ending}")
     # With a word in its name the file is this program's; a model's plain name may be that of its texture.
     if ending.startswith(".") and path.exists() and not _is_ours(path):
+        if os.path.exists(source) and path.samefile(source):
+            return path.with_stem(f"{path.stem}-native")
         raise OutputError("is there, and no picture of Lippmann's", where=str(path), fix="say -o FILE")
     return path
 

@@ -269,8 +269,8 @@ def _of_plugin(name: str, path: Path) -> Display | None:
     plugin = door.find(name) or door.find(path.suffix.lower())
     if plugin is None and not path.exists():
         known = [each for each in door.claims() if not each.startswith(".")]
-        rule = f"known are {', '.join(known)}, or a .toml file, or a Looking Glass's visual.json"
         names = dict.fromkeys([*known, *(preset.removeprefix(_FAMILY) for preset in door.own[_OWN].presets)])
+        rule = "'lippmann displays' lists those known; a .toml file, or a Looking Glass's visual.json, is one, too"
         raise DisplayError.unknown("display", name, names, rule=rule, fix=door.problems)
     if plugin is None or not plugin.distribution:
         return None

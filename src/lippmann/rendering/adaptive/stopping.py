@@ -171,10 +171,10 @@ def reach(
         Expected seconds of denoising and of an estimate, until they have been measured.
     """
     began = clock() if goal.began is None else goal.began
-    first, note, expected = min(first, goal.most), "", 0.0
+    first, note, seconds, expected = min(first, goal.most), "", 0.0, 0.0
     samples = first if goal.max_time is None else 1
     while True:
-        sampler.add(samples, _of_all(progress, sampler.samples, samples, expected, note))
+        sampler.add(samples, _of_all(progress, sampler.samples, samples, expected, note, seconds))
         left = goal.seconds_left(clock() - began)
         if sampler.samples < first:
             samples = min(first - sampler.samples, _affordable(left - assessment, sampler))
@@ -199,8 +199,8 @@ def reach(
             return Outcome("time", estimate, errors)
         if goal.has_quality:
             expected = min(goal.most, sampler.samples * 10 ** (max(missing, 0) / (10 * slope)))
-        left = min(left, (expected - sampler.samples) * _seconds_per_sample(sampler) if expected else left)
-        note = f"{goal.describe(estimate)}, about {max(0.0, left):.0f} s left"
+        seconds = min(left, (expected - sampler.samples) * _seconds_per_sample(sampler) if expected else left)
+        note = goal.describe(estimate)
 
 
 def _next_total(samples: int, missing: float, slope: float) -> int:
@@ -225,12 +225,18 @@ def _seconds_per_sample(sampler: FullInBatches) -> float:
     return sampler.seconds_trace / max(sampler.samples, 1)
 
 
-def _of_all(progress: ProgressCallback, done: int, coming: int, expected: float, note: str) -> ProgressCallback:
-    """Reports of a round of ``coming`` samples after ``done`` as reports of all the work, ``expected`` samples."""
+def _of_all(
+    progress: ProgressCallback, done: int, coming: int, expected: float, note: str, seconds: float
+) -> ProgressCallback:
+    """Reports of a round of ``coming`` samples after ``done`` as reports of all the work, ``expected`` samples.
+
+    ``seconds`` is the time left at the beginning of the round.
+    """
     total = max(expected, float(done + coming))
 
     def report(inner: Progress) -> None:
         now = done + coming * inner.done / max(inner.total, 1e-9)
-        progress(Progress(inner.stage, now, max(total, now), note))
+        left = f", about {max(0.0, seconds * (total - now) / (total - done)):.0f} s left" if note else ""
+        progress(Progress(inner.stage, now, max(total, now), note + left))
 
     return report

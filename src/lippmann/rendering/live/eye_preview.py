@@ -56,7 +56,7 @@ def render_eye_preview(
     resolved = resolve(replace(request, method="full"), scene, display)
     width, height = display.panel.size_inside(*(size or (LONGER_SIDE, LONGER_SIDE)))
     visible = EyeMap(display, (width, height), subpixels=bool(resolved.subpixels)).pixels_for_eye(eye)
-    samples = _choose_samples(request, resolved, len(visible.column))
+    samples = _choose_samples(request, resolved, len(visible.column) // visible.channels)
     denoises = _denoises(request, resolved, scene)
     # The eye's view is denoised, not the traced pixels.
     plain = replace(resolved, spp=samples, denoise="none")
