@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.far_origin import near_origin
 from lippmann.scene.parsing.files import MissingFileError, NamedFiles, decode_text, is_file, read_bytes, uncommented
 from lippmann.scene.parsing.points_lines import as_material
 from lippmann.scene.parsing.triangulation import triangulate
@@ -247,7 +248,7 @@ def _assemble(statements: _Statements, where: str) -> tuple[_Geometry, list[str]
     counts = (len(positions), len(uvs), len(normals))
     notes = drop_absent(corners, counts)
     check_range(corners, counts, numbers, where)
-    positions = positions[:, :3]
+    positions = near_origin(positions[:, :3], notes)
     triangles, owners = triangulate(positions, corners[:, 0] - 1, sizes)
     cut = corners[triangles] - 1
     geometry = _Geometry(

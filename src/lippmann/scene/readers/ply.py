@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.far_origin import near_origin
 from lippmann.scene.parsing.files import NamedFiles, read_bytes, read_image
 from lippmann.scene.parsing.ply_body import Columns, Integers, Lists, Numbers, read_body
 from lippmann.scene.parsing.ply_header import Element, read_header
@@ -70,7 +71,7 @@ def read_ply(path: Path, *, files: NamedFiles | None = None) -> SceneDescription
     outline = _outline(columns, where)
     if not len(outline.sizes):
         return replace(_cloud(columns["vertex"], elements["vertex"], path.stem, notes, where), up=header.up)
-    mesh, owners = _mesh(columns, elements, outline, path.stem, where)
+    mesh, owners = _mesh(columns, elements, outline, path.stem, notes, where)
     if "face" in elements and all(_color_names(elements[name]) for name in ("vertex", "face")):
         notes.append("colours of faces are not shown: vertices have their own")
     textures: list[Texture | None] = []
@@ -107,6 +108,7 @@ def _cloud(vertex: Columns, element: Element, name: str, notes: list[str], where
     if not len(positions):
         raise SceneError("holds no vertices", where=where)
     _check_finite(positions, where)
+    positions = near_origin(positions, notes)
     colors = _colors(vertex, element)
     points = np.arange(len(positions), dtype=np.uint32)[:, None]
     thin = Mesh(name, positions.astype(np.float32), points, 0, None, (), colors)
@@ -155,7 +157,12 @@ def _triangles_of_strips(strips: Lists) -> Lists:
 
 @np.errstate(over="ignore")  # of normals and coordinates of textures
 def _mesh(
-    columns: Mapping[str, Columns], elements: Mapping[str, Element], outline: Lists, name: str, where: str
+    columns: Mapping[str, Columns],
+    elements: Mapping[str, Element],
+    outline: Lists,
+    name: str,
+    notes: list[str],
+    where: str,
 ) -> tuple[Mesh, Integers]:
     """The triangles, and of each the number of its face."""
     vertex = {key: column for key, column in columns["vertex"].items() if isinstance(column, np.ndarray)}
@@ -171,6 +178,7 @@ def _mesh(
         bad = corners.min() if corners.min() < 0 else corners.max()
         raise SceneError(f"a face uses vertex {bad}", where=where, rule=f"the file has 0 to {len(positions) - 1}")
     _check_finite(positions, where)
+    positions = near_origin(positions, notes)
     places, owners = triangulate(positions, corners, outline.sizes[keep])
     faces = corners[places]
     normals = _stack(vertex, ("nx", "ny", "nz"))

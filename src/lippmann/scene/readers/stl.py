@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb, encode_srgb
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.far_origin import near_origin
 from lippmann.scene.parsing.files import decode_text, read_bytes
 from lippmann.scene.values.description import FloatArray, Instance, Material, Mesh, SceneDescription
 
@@ -47,7 +48,7 @@ def read_stl(path: Path) -> SceneDescription:
     colors = None
     if binary:
         facets = _binary_facets(data, where)
-        positions = np.ascontiguousarray(facets["vertices"].reshape(-1, 3), np.float32)
+        positions = facets["vertices"].reshape(-1, 3).astype(np.float64)
         colors = _facet_colors(data[:80], facets["attribute"])
     else:
         positions = _text_positions(decode_text(data, where), where)
@@ -56,7 +57,9 @@ def read_stl(path: Path) -> SceneDescription:
     plain = (0.7, 0.7, 0.7) if colors is None else (1.0, 1.0, 1.0)
     material = Material(path.stem, base_color=plain, roughness=0.6, double_sided=True)
     faces = np.arange(len(positions), dtype=np.uint32).reshape(-1, 3)
-    mesh = Mesh(path.stem, positions, faces, material=0, colors=colors)
+    with np.errstate(over="ignore"):  # infinite places are refused with those of all formats
+        places = np.ascontiguousarray(near_origin(positions, notes), np.float32)
+    mesh = Mesh(path.stem, places, faces, material=0, colors=colors)
     return SceneDescription(path.stem, [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
 
 
@@ -101,7 +104,7 @@ def _facet_colors(header: bytes, numbers: NDArray[np.uint16]) -> FloatArray | No
     return np.repeat(colors.astype(np.float32), 3, axis=0)
 
 
-def _text_positions(text: str, where: str) -> FloatArray:
+def _text_positions(text: str, where: str) -> NDArray[np.float64]:
     """Vertices ``(3 facets, 3)``; words other than vertices, such as normals, are not looked at."""
     text = text.lower()
     opened, closed = (len(re.findall(rf"(?m)^[ \t]*{word}\b", text)) for word in ("solid", "endsolid"))
@@ -124,7 +127,6 @@ def _text_positions(text: str, where: str) -> FloatArray:
     if len(words) != 9 * len(facets):
         raise SceneError("a vertex has fewer than three numbers", where=where, fix="is it cut short?")
     try:
-        with np.errstate(over="ignore"):  # infinite places are refused with those of all formats
-            return np.array(words, np.float64).reshape(-1, 3).astype(np.float32)
+        return np.array(words, np.float64).reshape(-1, 3)
     except ValueError as error:
         raise SceneError(f"a vertex is no number ({error})", where=where) from None

@@ -6,13 +6,14 @@ PyVista is not imported here: whoever has an object of it has loaded it.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.far_origin import near_origin
 from lippmann.scene.parsing.vertex_colors import linear_colors, material_of
 from lippmann.scene.point_clouds import describe_cloud
 from lippmann.scene.values.description import Instance, Mesh, SceneDescription
@@ -186,6 +187,7 @@ def mesh_of(surface: Surface, name: str, material: int) -> Mesh:
 
 def describe_surface(surface: Surface, name: str, notes: list[str]) -> SceneDescription:
     """The scene of a surface alone, or of points or lines."""
+    surface = replace(surface, positions=near_origin(surface.positions, notes))
     mesh, material = mesh_of(surface, name, 0), material_of(surface.colors)
     if surface.faces.shape[1] < 3:
         return describe_cloud(mesh, material, notes)

@@ -1,0 +1,78 @@
+"""Coordinates far from the origin, as surveys write them."""
+
+import struct
+
+import numpy as np
+import pytest
+
+from lippmann.scene.parsing.far_origin import near_origin
+from lippmann.scene.readers.load import load_scene
+
+UTM = np.array([450_000.0, 5_400_000.0, 312.0])
+CORNERS = np.array([(0, 0, 0), (0.1, 0, 0), (0, 0.2, 0), (0, 0, 0.3)])
+FACES = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+
+
+def obj(places):
+    lines = ["v " + " ".join(map(repr, place)) for place in places.tolist()]
+    return "\n".join(lines + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in FACES]).encode()
+
+
+def ply(places, faces=FACES):
+    head = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(places)}\n"
+    head += "".join(f"property double {axis}\n" for axis in "xyz")
+    head += f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    return head.encode() + places.astype("<f8").tobytes() + b"".join(struct.pack("<B3i", 3, *face) for face in faces)
+
+
+def stl(places):
+    facets = [
+        "facet\n" + "".join(f"vertex {x} {y} {z}\n" for x, y, z in places[[*face]]) + "endfacet\n" for face in FACES
+    ]
+    return ("solid a\n" + "".join(facets) + "endsolid a\n").encode()
+
+
+@pytest.mark.parametrize(("ending", "write"), [("obj", obj), ("ply", ply), ("stl", stl)])
+def test_a_model_in_coordinates_of_a_survey_keeps_its_shape(tmp_path, ending, write):
+    (tmp_path / f"here.{ending}").write_bytes(write(CORNERS))
+    (tmp_path / f"far.{ending}").write_bytes(write(CORNERS + UTM))
+    here, far = (load_scene(tmp_path / f"{name}.{ending}") for name in ("here", "far"))
+    sizes = [scene.bounds[1] - scene.bounds[0] for scene in (here, far)]
+    assert sizes[1] == pytest.approx(sizes[0], rel=1e-5)
+    assert np.abs(far.bounds).max() < 1
+    assert not any("moved by" in note for note in here.notes)
+    assert any(note.startswith("moved by -45") for note in far.notes)
+
+
+def test_a_cloud_of_points_with_strays_is_moved(tmp_path):
+    rng = np.random.default_rng(0)
+    places = np.concatenate([rng.uniform(-1, 1, (50, 3)) + UTM, np.zeros((1, 3))])
+    (tmp_path / "a.ply").write_bytes(ply(places, []))
+    scene = load_scene(tmp_path / "a.ply")
+    balls = scene.description.meshes[0]
+    middles = balls.positions.reshape(-1, balls.points, 3).mean(axis=1)
+    assert middles == pytest.approx(places[:50] - np.round(np.median(places, axis=0)), abs=1e-5)
+    assert "moved by -450000, -5400000, -312: so far from the origin its shape would be rounded" in scene.notes
+
+
+def test_vtks_surfaces_are_moved(tmp_path):
+    pyvista = pytest.importorskip("pyvista", reason="PyVista is not installed")
+    pyvista.PolyData(CORNERS + UTM, faces=np.hstack([(3, *face) for face in FACES])).save(tmp_path / "a.vtp")
+    low, high = load_scene(tmp_path / "a.vtp").bounds
+    assert high - low == pytest.approx(np.array([0.1, 0.2, 0.3]), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "places",
+    [
+        np.empty((0, 3)),
+        np.ones((4, 3)),  # without extent
+        CORNERS + 5,
+        np.array([(np.inf, 0, 0), (np.nan, 1, 0), (0, 0, 1)]),
+        CORNERS[:1] + UTM,
+    ],
+)
+def test_others_stay(places):
+    notes = []
+    assert near_origin(places, notes) is places
+    assert notes == []
