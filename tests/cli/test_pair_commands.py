@@ -95,9 +95,20 @@ def test_a_film_holds_both_eyes(lippmann, balls, tmp_path):
     assert abs(places(frames[0][:, :240], "red")[0] - places(frames[0][:, 240:], "red")[0]) > 0.2
 
 
+def test_a_plan_is_of_the_pair_that_is_asked_for(lippmann, balls):
+    words = ("plan", balls, "--target", "odyssey-3d", "--integrator", "albedo", "--spp", 2, "--threads", 1, "--json")
+    own, wide = (lippmann(*words, *size).json for size in ((), ("--size", "7680x2160")))
+    assert (own["size"], wide["size"]) == ([3840, 2160], [7680, 2160])
+    assert wide["rays"]["primary"] == 2 * own["rays"]["primary"]
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        (("plan", "--target", "odyssey-3d", "--size", "999x999"), "it is 999 x 999 pixels; pairs for"),
+        (("plan", "--target", "odyssey-3d", "--size", "20x30cm"), "--size: '20x30cm' is no size"),
+        (("plan", "--target", "odyssey-3d", "--size", "3840x2160", "--lpi", "60"), "--lpi: does not apply to the"),
+        (("plan", "--target", "portrait", "--size", "3360x3360"), "--size: does not apply to the display portrait"),
         (("render", "--target", "odyssey-3d"), "--display: odyssey-3d takes no native pixels; an eye-tracked monitor"),
         (("render", "--target", "odyssey-3d", "-o", "a.zarr"), "--display: odyssey-3d takes no native pixels"),
         (("quilt", "render", "--target", "odyssey-3d", "--size", "999x999"), "it is 999 x 999 pixels; pairs for"),

@@ -143,19 +143,28 @@ class Forecast:
 
 @exclusive()
 def forecast(
-    scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback = silent, *, frames: int = 1
+    scene: Scene,
+    display: Display,
+    request: RenderRequest,
+    progress: ProgressCallback = silent,
+    *,
+    frames: int = 1,
+    size: tuple[int, int] | None = None,
 ) -> Forecast:
     """Foresee what rendering ``scene`` for ``display`` will take; nothing but the probe is rendered.
 
-    ``frames`` alike, such as those of a turntable, take compiling once and all else anew for each.
+    ``frames`` alike, such as those of a turntable, take compiling once and all else anew for each. ``size`` is that of
+    an eye-tracked monitor's pair, by default its own.
 
     Raises
     ------
     UsageError, SceneError, MemoryLimitError, EngineError
         Those that rendering would raise before its first ray.
     """
-    request = resolve(request, scene, display, "forecast")
     width, height = display.panel.width, display.panel.height
+    if size is None:
+        size = (width if display.stereo is None else display.stereo.panels * width, height)
+    request = resolve(request, scene, display, "forecast", size=size)
     session = open_session(scene, request, (width, height), progress=progress)
     placement = session.place(display)
 
@@ -165,8 +174,8 @@ def forecast(
     window = traced_window(session, display, placement)
     source = whole if window is None else WindowRays(whole, window)
     probe = _Probe(source, request.seed)
-    panels = 1 if display.stereo is None else display.stereo.panels
-    samples = panels * source.width * source.height * request.channels * request.samples
+    panels = size[0] * size[1] / (width * height)
+    samples = round(panels * source.width * source.height) * request.channels * request.samples
     integrator = session.integrator(whole, placement.display_from_world, placement.exposure)
     probed = probe.trace(integrator, session)
     seconds = {
@@ -182,7 +191,7 @@ def forecast(
     return Forecast(
         scene=scene.name,
         display=display.name,
-        size=(panels * width, height),
+        size=size,
         frames=frames,
         subpixels=bool(request.subpixels),
         spp=request.samples,
@@ -199,7 +208,7 @@ def forecast(
             **{kind: round(frames * samples * share) for kind, share in probed.rays.items()},
         },
         memory={
-            "expected": _resident() + panels * width * height * memory_model.PICTURE + _working_bytes(source, session),
+            "expected": _resident() + size[0] * size[1] * memory_model.PICTURE + _working_bytes(source, session),
             "limit": session.memory,
         },
         seconds=seconds,

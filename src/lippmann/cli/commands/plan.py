@@ -8,7 +8,7 @@ from typing import Annotated
 from lippmann.cli.shared import options
 from lippmann.cli.shared.command_options import for_form, only, with_options
 from lippmann.cli.shared.console import Console
-from lippmann.cli.shared.scene_source import SceneSource, display_of
+from lippmann.cli.shared.scene_source import SceneSource, planned_display
 from lippmann.options.light import LightOptions
 from lippmann.options.outputs import AccessOptions, SequenceOptions
 from lippmann.options.placement import PlacementOptions
@@ -39,7 +39,7 @@ def plan(
     from lippmann.rendering.request.render_request import RenderRequest
 
     console = Console(quiet, as_json)
-    target = display_of(display, printed)
+    target, pair_size = planned_display(display, printed)
     request = RenderRequest.from_options(how, machine, placement=placement)
     source = SceneSource(scene, asked, light, access)
     with console.progress() as progress:
@@ -53,7 +53,7 @@ def plan(
             request = replace(request, placement=where(0))
         else:
             loaded, frames = source.load(), 1
-        prediction = forecast(loaded, target, request, progress, frames=frames)
+        prediction = forecast(loaded, target, request, progress, frames=frames, size=pair_size)
     console.remark(*prediction.notes)
     lines = [f"{name:<15}{text}" for name, text in prediction.in_words().items()]
     console.result(prediction.to_dict(), "\n".join(lines))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from lippmann.errors import DisplayError, UsageError
@@ -77,6 +77,28 @@ def display_of(name: str, printed: PrintOptions) -> Display:
         rule = f"it applies to --display {_PRINT} only"
         raise UsageError(f"does not apply to the display {name}", where=f"--{_option(key)}", rule=rule)
     return load_display(name)
+
+
+def planned_display(name: str, printed: PrintOptions) -> tuple[Display, tuple[int, int] | None]:
+    """The display ``name``, and the size in pixels of an eye-tracked monitor's pair where ``printed`` says it.
+
+    Raises
+    ------
+    DisplayError, UsageError
+        As :func:`display_of`.
+    PictureError
+        If the size has not the shape of a pair.
+    """
+    from lippmann.display import load_display
+
+    if printed.size is None or name == _PRINT or load_display(name).stereo is None:
+        return display_of(name, printed), None
+    from lippmann.cli.shared import parse
+    from lippmann.quilts.quilt import quilt_of_display
+
+    display = display_of(name, replace(printed, size=None))
+    pair = quilt_of_display(display, size=parse.size(printed.size, "--size"))
+    return display, (pair.width, pair.height)
 
 
 def _given(printed: PrintOptions) -> dict[str, str]:
