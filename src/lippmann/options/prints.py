@@ -19,8 +19,8 @@ class PrintOptions(Options):
     )
     ppi: str | None = _print(help="Resolution in pixels per inch.", first=True)
     size: str | None = _print(
-        help="Of a print: WIDTHxHEIGHT with a unit, such as 200x300mm or 8x10in. 'plan' takes the pixels of an eye-tracked "
-        "monitor's pair, too, such as 7680x2160.",
+        help="Of a print: WIDTHxHEIGHT with a unit, such as 200x300mm or 8x10in. 'plan' takes the pixels of an "
+        "eye-tracked monitor's pair, too, such as 7680x2160.",
         first=True,
     )
     viewing_distance: str | None = _print(help="Viewing distance, such as 600mm, or infinite. Default: 500mm.")

@@ -38,6 +38,7 @@ from lippmann.viewing.video_frames import (
     projection_of,
     quilt_of_video,
     view_of_quilt,
+    view_size_of_video,
     view_toward,
 )
 
@@ -59,11 +60,14 @@ class Filming(NamedTuple):
         Of the film; None where its format has none.
     quilt:
         The layout of a film of quilts.
+    note:
+        What the film does not show as it is in the files, in one line.
     """
 
     codes: Callable[[SavedFrame], Pixels]
     codec: Codec | None
     quilt: QuiltLayout | None = None
+    note: str | None = None
 
 
 def film_of_pictures(
@@ -177,7 +181,16 @@ def film_of_quilts(
         size = form.quilt.width, form.quilt.height
         widest = most_pixels(codec_for(size, codec))
         chosen = codec_of_film(video, (min(size[0], widest), min(size[1], widest)), codec)
-        return Filming(lambda frame: quilt_of_video(form.read(frame.path), widest), chosen, layout)
+        if chosen is None:
+            widest = max(size)
+        view = size[0] // layout.columns, size[1] // layout.rows
+        smaller = view_size_of_video(view, layout, widest)
+        note = None
+        if smaller != view:
+            width, height = smaller[0] * layout.columns, smaller[1] * layout.rows
+            rule = f"{chosen} takes sides of at most {widest}"
+            note = f"the film's pictures are {width}x{height} pixels, smaller than {size[0]}x{size[1]}: {rule}"
+        return Filming(lambda frame: quilt_of_video(form.read(frame.path), widest), chosen, layout, note)
     if shows not in ("eye", "hololuminescent"):
         rule = "quilts have neither native pixels nor depth"
         raise UsageError(f"'{shows}' of quilts", parameter="shows", rule=rule, fix="use lippmann render")

@@ -96,16 +96,21 @@ def view_of_quilt(quilt: Quilt, number: int) -> FloatArray:
 
 def quilt_of_video(quilt: Quilt, widest: int = WIDEST_QUILT) -> Pixels:
     """Codes of the views of a quilt side by side, at most ``widest`` pixels wide and high, of 8 bits."""
-    width, height = quilt.view_size
-    columns, rows = quilt.layout[:2]
-    shrink = min(1.0, widest / (columns * width), widest / (rows * height))
-    if shrink == 1.0 and quilt.values.dtype == np.uint8:
+    (width, height), (columns, rows) = quilt.view_size, quilt.layout[:2]
+    size = view_size_of_video(quilt.view_size, quilt.layout, widest)
+    if size == quilt.view_size and quilt.values.dtype == np.uint8:
         return quilt.values[quilt.size[1] - rows * height :, : columns * width].astype(np.uint8, copy=False)
-    size = max(1, int(width * shrink)), max(1, int(height * shrink))
     small = Quilt(np.empty((size[1] * rows, size[0] * columns, 3), dtype=np.uint8), quilt.layout)
     for number in range(quilt.layout.views):
         small.view_values(number)[...] = quantize(_resized(quilt.view(number), *size), 8, quilt.provenance.transfer)
     return small.values.astype(np.uint8, copy=False)
+
+
+def view_size_of_video(view: tuple[int, int], layout: QuiltLayout, widest: int) -> tuple[int, int]:
+    """Width and height of the views of a quilt at most ``widest`` pixels wide and high, in proportion to ``view``'s."""
+    width, height = view
+    shrink = min(1.0, widest / (layout.columns * width), widest / (layout.rows * height))
+    return max(1, int(width * shrink)), max(1, int(height * shrink))
 
 
 def _resized(pixels: FloatArray, width: int, height: int) -> FloatArray:

@@ -91,6 +91,8 @@ def render_frames(
     path_of = numbered(output, len(frames), ending)
     name, _ = format_for(path_of(frames[0]), files.bits)
     filming = _filming(spec, motion, display, request, form, len(frames))
+    if filming is not None and filming.note is not None:
+        console.remark(filming.note)
     if files.maps is not None:
         raise UsageError("a sequence writes no pictures of its maps", where="--maps", fix="leave it out")
     if request.layers and name != "exr":
