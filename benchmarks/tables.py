@@ -18,6 +18,7 @@ import defaults_tables
 import drafts_tables
 import equal_error_tables
 import estimate_coverage_tables
+import film_encoding
 import films_tables
 import first_picture_tables
 import goals_tables
@@ -409,6 +410,7 @@ SECTIONS = {
     "equal_error": equal_error_tables.describe,
     "goals": goals_tables.describe,
     "films": films_tables.describe,
+    "film_encoding": film_encoding.describe,
     "drafts": drafts_tables.describe,
     "estimate_coverage": estimate_coverage_tables.describe,
     "reuse": _reuse,
