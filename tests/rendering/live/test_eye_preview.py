@@ -68,9 +68,9 @@ def test_noise_is_taken_out_of_the_eyes_view(display):
     room = lippmann.load_scene("room")
 
     def shown(**options):
-        return render_eye_preview(room, display, EYES[0], RenderRequest(integrator="path", **options), (120, 120))
+        return render_eye_preview(room, display, EYES[0], RenderRequest(integrator="path", **options), (90, 90))
 
-    many = shown(spp=256, denoise="none").pixels
+    many = shown(spp=128, denoise="none").pixels
     noisy, clean, asked = (shown(spp=4, denoise=each, seed=3) for each in ("none", "auto", "oidn-high"))
     assert "denoise" not in noisy.provenance.options
     assert clean.provenance.options["denoise_effort"] == "fast"

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lippmann.display import Display, LensArray, Panel
+from lippmann.options.placement import PlacementOptions
+
 pytestmark = pytest.mark.usefixtures("engine")
 
 
@@ -33,18 +36,29 @@ def balls(engine):
     return scene
 
 
+DISPLAY = Display("test", Panel(96, 64, 1.0), LensArray("square", 8.0), 30.0, "", 500.0, 80.0)
+ASKED = {"integrator": "path", "spp": 16, "placement": PlacementOptions(place="display"), "exposure": 0}
+
+
 def rendered(scene, **options):
     import lippmann
-    from lippmann.display import Display, LensArray, Panel
-    from lippmann.options.placement import PlacementOptions
 
-    display = Display("test", Panel(96, 64, 1.0), LensArray("square", 8.0), 30.0, "", 500.0, 80.0)
-    chosen = {"integrator": "path", "spp": 16, "placement": PlacementOptions(place="display"), "exposure": 0}
-    return lippmann.render(scene, display, tone_map="none", **(chosen | options))
+    return lippmann.render(scene, DISPLAY, tone_map="none", **(ASKED | options))
 
 
-def chains(picture):
-    return picture.provenance.options.get("seen_chains", 0)
+def prepared_chains(scene, **options):
+    """Chains of a picture, which are decided before its first sample."""
+    from lippmann.rendering.request.plan import resolve
+    from lippmann.rendering.request.render_request import RenderRequest
+    from lippmann.rendering.session import open_session
+
+    session = open_session(scene, resolve(RenderRequest(**(ASKED | options)), scene, DISPLAY))
+    placement = session.place(DISPLAY)
+
+    from lippmann.rendering.transport.ray_source import DisplayRays
+
+    session.integrator(DisplayRays(DISPLAY, placement.world_from_display), placement.display_from_world)
+    return session.choices.get("seen_chains", 0)
 
 
 def test_denoised_pictures_of_sharp_surfaces_have_them(engine):
@@ -57,23 +71,24 @@ def test_denoised_pictures_of_sharp_surfaces_have_them(engine):
     sky = np.zeros((64, 128, 3), np.float32)
     sky[:, np.arange(128) % 16 < 8] = 4.0
 
-    def picture(roughness, brightness=1.0, **options):
+    def scene(roughness, brightness=1.0):
         materials = [Material("ball", metallic=1.0, roughness=roughness)]
         environment = Environment(sky * np.float32(brightness))
-        scene = SceneDescription("ball", [mesh], materials, [Instance(0, np.eye(4))], environment=environment)
-        return rendered(lippmann.load_scene(scene), **options)
+        described = SceneDescription("ball", [mesh], materials, [Instance(0, np.eye(4))], environment=environment)
+        return lippmann.load_scene(described)
 
-    assert chains(picture(0.02)) > 0
-    assert chains(picture(0.02, spp=1)) > 0
-    assert chains(picture(0.02, spp=None, quality=12.0)) > 0
-    assert chains(picture(0.8)) == 0
+    sharp, dim = scene(0.02), scene(0.02, brightness=0.2)
+    made = rendered(sharp, spp=1).provenance.options["seen_chains"]
+    assert made == prepared_chains(sharp, spp=1) == prepared_chains(sharp) > 0
+    assert prepared_chains(sharp, spp=None, quality=12.0) > 0
+    assert prepared_chains(scene(0.8)) == 0
     # What is mirrored is brighter than white, or is once it is exposed.
-    assert chains(picture(0.02, brightness=0.2, spp=1)) == 0
-    assert chains(picture(0.02, brightness=0.2, spp=1, exposure=1.0)) > 0
+    assert prepared_chains(dim, spp=1) == 0
+    assert prepared_chains(dim, spp=1, exposure=1.0) > 0
     # Where all the noise is left in, samples bring more; rays through the centre of a pixel are all the same.
-    assert chains(picture(0.02, denoise="none")) == 0
-    assert chains(picture(0.02, pixel_filter="point")) == 0
-    assert chains(picture(0.02, method="lens-view", denoise="oidn")) == 0
+    assert prepared_chains(sharp, denoise="none") == 0
+    assert prepared_chains(sharp, pixel_filter="point") == 0
+    assert prepared_chains(sharp, method="lens-view", denoise="oidn") == 0
 
 
 @pytest.mark.long
