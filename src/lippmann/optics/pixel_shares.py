@@ -10,15 +10,14 @@ from numpy.typing import NDArray
 
 from lippmann.display.display import Display
 from lippmann.errors import DisplayError
+from lippmann.optics.eye_light import eye_light
 from lippmann.optics.lens import Lens, Real
-from lippmann.optics.light_table import PLACES_PER_LENS, light_table
-from lippmann.optics.pixel_profile import kernel, pixel_trapezoid
-
-#: Lenses to either side whose pixels shine through one.
-_NEIGHBOURS = 2
 
 #: Share of a lens's light below which a pixel counts as dark.
 _LEAST = 1e-5
+
+#: Slope by which the directions whose light is known reach beyond those asked for, so that one alone will do.
+_BEYOND = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,27 +63,27 @@ def pixel_shares(display: Display, lens: Real, slopes: Real, offset: float = 0.0
     DisplayError
         If the display gives no lens, or its lenses are not upright cylinders.
     """
-    shape = Lens.of(display)
+    Lens.of(display)
     if not display.lattice.rows_are_alike:
         rule = "light through upright cylinders is followed row by row"
         raise DisplayError("has other lenses", where=display.name, rule=rule)
     pixel, width = display.panel.pixel_pitch, display.panel.width
-    step = shape.pitch / PLACES_PER_LENS
-    table = light_table(shape, slopes, neighbours=_NEIGHBOURS)
-    blur = display.pixel.blur if display.pixel else 0.0
-    lit = kernel(pixel_trapezoid(display), blur, step)
-    profile = np.array([np.convolve(row, lit) for row in table.shares])
+    light = eye_light(display, (slopes.min() - _BEYOND, slopes.max() + _BEYOND), (-_BEYOND, _BEYOND))
+    number, middle = light.nearest(slopes, np.zeros_like(slopes))
+    profile, step = light.weights.reshape(-1, light.weights.shape[3]), light.step
     half = 0.5 * (profile.shape[1] - 1)
-    # Pixels from the middle of the panel; the lens's axis as seen straight ahead.
-    axis = (display.lattice.origin_x + lens * display.lattice.pitch) / pixel + 0.5 * width - 0.5 - offset
-    reach = math.floor(half * step / pixel)
+    # Pixels from the middle of the panel; the middle of the light.
+    axis = display.lattice.origin_x + lens * display.lattice.pitch + middle[:, 0]
+    axis = axis / pixel + 0.5 * width - 0.5 - offset
+    reach = math.ceil(half * step / pixel)
     first = np.round(axis).astype(np.int64) - reach
     columns = first[:, None] + np.arange(2 * reach + 1)
-    place = np.clip((columns - axis[:, None]) * (pixel / step) + half, 0.0, 2.0 * half)
-    left = np.minimum(place.astype(np.int64), profile.shape[1] - 2)
-    rows = np.arange(len(lens))[:, None]
-    shares = profile[rows, left] + (profile[rows, left + 1] - profile[rows, left]) * (place - left)
-    shares[(columns < 0) | (columns >= width) | (shares < _LEAST)] = 0.0
+    place = (columns - axis[:, None]) * (pixel / step) + half
+    left = np.clip(place.astype(np.int64), 0, profile.shape[1] - 2)
+    lower, upper = (profile[number[:, None], left + right] for right in (0, 1))
+    shares = lower + (upper - lower) * (place - left)
+    is_dark = (place < 0.0) | (place > 2.0 * half) | (shares < _LEAST)
+    shares[(columns < 0) | (columns >= width) | is_dark] = 0.0
     total = shares.sum(axis=1, keepdims=True)
     shares = np.divide(shares, total, out=np.zeros_like(shares), where=total > 0.0)
     lit_places = np.flatnonzero(shares.any(axis=0))
