@@ -46,6 +46,8 @@ def test_crests_reach_to_where_lenses_meet():
         (CYLINDERS, {"index": True}, "index is True"),
         (CYLINDERS, {"conic": -11}, "conic is -11; it must lie between -10 and 10; crests have -1 (parabola) to 0"),
         (CYLINDERS, {"radius": math.inf}, "radius is inf"),
+        (CYLINDERS, {"radius": 1e300}, "radius is 1e+300; it must lie between 1e-09 and 1e+12 mm"),
+        (CYLINDERS, {"thickness": 120.0}, "thickness is 120 mm; 100 mm is the most; sheets are 1.2 to 4 pitches thick"),
         (CYLINDERS, {"thickness": "2 mm"}, "thickness is '2 mm'"),
     ],
 )

@@ -23,6 +23,9 @@ INDICES = (1.3, 2.0)
 #: Conic constants, far beyond those of any crest.
 _CONICS = (-10.0, 10.0)
 
+#: Pitches, far beyond any sheet: lenses that are thicker have no field of view to speak of.
+_THICKEST = 100.0
+
 
 @dataclass(frozen=True)
 class LensProfile:
@@ -91,9 +94,10 @@ class LensProfile:
         if self.radius <= least:
             rule = f"lenses {2 * reach:.4g} mm wide need more than {least:.4g} mm; sheets have 0.53 to 1.7 pitches"
             raise DisplayError(f"radius is {self.radius:.4g} mm", where="lens.radius", rule=rule)
-        sag = self.sag(reach)
-        if self.thickness <= sag:
-            rule = f"the crest alone is {sag:.4g} mm high; sheets are 1.2 to 4 pitches thick"
+        sag, most = self.sag(reach), _THICKEST * lenses.pitch
+        if not sag < self.thickness <= most:
+            limit = f"the crest alone is {sag:.4g} mm high" if self.thickness <= sag else f"{most:.4g} mm is the most"
+            rule = f"{limit}; sheets are 1.2 to 4 pitches thick"
             raise DisplayError(f"thickness is {self.thickness:.4g} mm", where="lens.thickness", rule=rule)
 
 

@@ -20,8 +20,8 @@ Table: TypeAlias = Mapping[str, object]
 #: A table whose keys are known, as arguments of a constructor that checks each value itself. Hence ``Any``.
 Arguments: TypeAlias = Mapping[str, Any]
 
-#: Millimetres, far below any wavelength; keeps what is divided by a length finite.
-LEAST_LENGTH = 1e-9
+#: Millimetres, from far below any wavelength to beyond the Moon's orbit: keeps quotients and powers of lengths finite.
+LENGTHS = (1e-9, 1e12)
 
 POSITIVE = "it must be a finite length above zero"
 
@@ -50,8 +50,9 @@ def positive(value: object, key: str) -> float:
     checked = finite(value, key, rule=POSITIVE)
     if checked <= 0:
         raise DisplayError(f"{_last(key)} is {value!r}", where=key, rule=POSITIVE)
-    if checked < LEAST_LENGTH:
-        raise DisplayError(f"{_last(key)} is {value!r}", where=key, rule=f"it must be at least {LEAST_LENGTH:g} mm")
+    if not LENGTHS[0] <= checked <= LENGTHS[1]:
+        rule = "it must lie between {:g} and {:g} mm".format(*LENGTHS)
+        raise DisplayError(f"{_last(key)} is {value!r}", where=key, rule=rule)
     return checked
 
 
