@@ -3,10 +3,16 @@
 python benchmarks/lens_correction.py [SCENE ...]
 
 Each bundled scene, or each scene or file named, is rendered for a 60-lpi print whose crest is at best focus, and 20 %
-above the paraxial focus: along the directions of a pinhole at thickness over index, of one at the gap, along true
-directions, and corrected. The light that each picture sends through the lens is compared with rays in directions that
-were not solved for: the middles of thirds of pixels, where the correction knows halves. `bound` is the best that any
-pixels between black and white can do: solved for these very directions. Writes
+above the paraxial focus. Rays go through the middles of lenses, as those of a picture that is not corrected, or all
+across them. Pictures of rays through the middles: along the directions of a pinhole at thickness over index (`t/n`),
+of one at the gap (`gap`), and along true directions (`true`). Pictures of rays across: `t/n across`, `true across`,
+and `corrected`.
+
+The light that each picture sends through the lens is compared with rays in directions that were not solved for: the
+middles of thirds of pixels, where the correction knows halves. Under `psnr` these rays go across the lenses: a lens has
+one colour to an eye, and the mean of the scene behind it is nearest to the scene. Under `psnr of middles` they go
+through the middles. `bound` is the best that any pixels between black and white can do, and `bound without limits` the
+best of any pixels at all: solved for these very directions, of this very light. Writes
 benchmarks/results/lens_correction.json, where other scenes keep their rows.
 """
 
@@ -18,9 +24,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy import sparse
 
 from harness import RESULTS, machine, save
+from lippmann.corrected import WholeLensDisplay
 from lippmann.display import load_display
 from lippmann.optics.correction import TOLERANCE, LensCorrection, parts_beside
 from lippmann.optics.pixel_shares import pixel_shares
@@ -33,54 +39,102 @@ from part_rays import render
 SHEET = "print:lpi=60,ppi=720,size=10x5mm,thickness=26mil"
 CRESTS = {"best focus": "", "R + 20 %": ",radius=0.2877mm"}
 #: Of pictures, and of each part of the light that they are held against: its noise lies 10 dB below their errors.
-SAMPLES, TRUTH_SAMPLES = 16, 48
+SAMPLES, TRUTH_SAMPLES = 64, 64
+#: Parts of a pixel that are judged: the outer thirds.
+JUDGED = (-1 / 3, 1 / 3)
 
 
-def picture(scene, display, part=0, parts=1, samples=SAMPLES, seed=0):
-    """Rays of a part of each pixel: its number, and of how many."""
-    beside = (part + 0.5) / parts - 0.5
-    return render(scene, display, EXPOSURE, samples, beside=beside, width=1.0 / parts, seed=seed)
+def light_table_of(display, own):
+    """``(n, width)`` shares of the pixels in the light of the directions that are judged, those of ``own`` pixels."""
+    width, tables = own.panel.width, []
+    for beside in JUDGED:
+        u = np.arange(width) + 0.5 + beside
+        x, y = own.panel_point(u, 0.0 * u)
+        lens, _ = own.lens_of(x, y)
+        place = x - own.lens_center(lens, 0.0 * lens, x, y)[0]
+        shares = pixel_shares(display, lens, -own.pinhole_place(place) / own.gap)
+        columns = np.clip(shares.first[:, None] + np.arange(shares.shares.shape[1]), 0, width - 1)
+        table = np.zeros((width, width))
+        np.add.at(table, (np.arange(width)[:, None], columns), shares.shares)
+        tables.append(table)
+    return np.concatenate(tables)
 
 
-def shares_of(display):
-    """Shares of the pixels in the light of the directions that are judged, those of the outer thirds of pixels."""
-    for beside in (-1 / 3, 1 / 3):
-        u = np.arange(display.panel.width) + 0.5 + beside
-        x, y = display.panel_point(u, 0.0 * u)
-        lens, _ = display.lens_of(x, y)
-        place = x - display.lens_center(lens, 0.0 * lens, x, y)[0]
-        yield pixel_shares(display, lens, -TRUE.pinhole_place(place) / TRUE.gap)
+def columns_of(pixels):
+    """``(width, rows x 3)`` of pixels ``(rows, width, 3)``."""
+    return pixels.transpose(1, 0, 2).reshape(pixels.shape[1], -1).astype(np.float64)
 
 
-def seen_error(display, pixels, truth):
+def seen_error(table, columns, truth):
     """Mean squared error of what eyes see."""
-    errors = [
-        np.mean((shares.gather(pixels[..., channel].astype(np.float64)) - true[..., channel]) ** 2)
-        for shares, true in zip(shares_of(display), truth.values(), strict=True)
-        for channel in range(3)
-    ]
-    return float(np.mean(errors))
+    return float(np.mean((table @ columns - truth) ** 2))
 
 
-def best(display, truth, start, steps=100):
-    """The pixels between black and white of least error in the directions that are judged."""
-    width, blocks = display.panel.width, []
-    for shares in shares_of(display):
-        columns = shares.first[:, None] + np.arange(shares.shares.shape[1])
-        row = np.broadcast_to(np.arange(width)[:, None], columns.shape)
-        lit = shares.shares > 0.0
-        blocks.append(sparse.csr_matrix((shares.shares[lit], (row[lit], columns[lit])), shape=(width, width)))
-    matrix = sparse.vstack(blocks).tocsr()
-    goal = matrix.T @ np.concatenate([true.transpose(1, 0, 2).reshape(width, -1) for true in truth.values()])
-    normal = (matrix.T @ matrix).tocsr()
-    step = 1.0 / normal.sum(axis=1).max()
-    solved = ahead = start.transpose(1, 0, 2).reshape(width, -1).astype(np.float64)
-    t = 1.0
+def best(table, truth, steps=400):
+    """Columns of the pixels of least error: without limits, and between black and white."""
+    free = np.linalg.lstsq(table, truth, rcond=1e-9)[0]
+    normal, goal = table.T @ table, table.T @ truth
+    step, t = 1.0 / np.linalg.norm(normal, 2), 1.0
+    solved = ahead = np.clip(free, 0.0, 1.0)
     for _ in range(steps):
         after = np.clip(ahead - step * (normal @ ahead - goal), 0.0, 1.0)
         t, before = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * t * t)), t
         ahead, solved = after + (before - 1.0) / t * (after - solved), after
-    return solved.reshape(width, -1, 3).transpose(1, 0, 2)
+    return free, solved
+
+
+def decibels(error):
+    return -10.0 * float(np.log10(error))
+
+
+def measure(scene, crest):
+    own = load_display(SHEET + CRESTS[crest])
+    exposure = choose_exposure(scene, own, RenderRequest(integrator="direct", threads=1))
+    pinhole = replace(own, distortion=None)
+    simple = replace(pinhole, gap=own.lens.thickness / own.lens.index)
+    whole = WholeLensDisplay.of
+
+    def halves(display):
+        # Each has random numbers of its own: else the noise of both would be the same.
+        return [
+            render(scene, display, exposure, SAMPLES // 2, beside=each, width=0.5, seed=2 + number)
+            for number, each in enumerate(parts_beside())
+        ]
+
+    middle, across = halves(own), halves(whole(own))
+    pictures = {
+        "t/n": render(scene, simple, exposure, SAMPLES),
+        "gap": render(scene, pinhole, exposure, SAMPLES),
+        "true": np.mean(middle, axis=0),
+        "t/n across": render(scene, whole(simple), exposure, SAMPLES),
+        "true across": np.mean(across, axis=0),
+        "corrected": LensCorrection(own).rows(across),
+    }
+    columns = {name: columns_of(pixels) for name, pixels in pictures.items()}
+    table, row = light_table_of(own, own), {}
+    for key, display in (("psnr", whole(own)), ("psnr of middles", own)):
+        thirds = (render(scene, display, exposure, TRUTH_SAMPLES, beside=each, width=1 / 3, seed=1) for each in JUDGED)
+        truth = np.concatenate([columns_of(pixels) for pixels in thirds])
+        free, bounded = best(table, truth)
+        judged = {**columns, "bound": bounded, "bound without limits": free}
+        if key == "psnr":
+            row["gain where off"] = {
+                name: [
+                    gain_where_off(own, value, factor, columns[name], columns["corrected"], truth)
+                    for value in ("radius", "thickness", "index")
+                    for factor in (1 - TOLERANCE, 1 + TOLERANCE)
+                ]
+                for name in ("true", "true across")
+            }
+        row[key] = {name: decibels(seen_error(table, each, truth)) for name, each in judged.items()}
+    return row
+
+
+def gain_where_off(own, value, factor, before, after, truth):
+    """Decibels that the correction gains where the lens is another."""
+    other = replace(own, lens=replace(own.lens, **{value: factor * getattr(own.lens, value)}))
+    table = light_table_of(other, own)
+    return decibels(seen_error(table, after, truth)) - decibels(seen_error(table, before, truth))
 
 
 known = RESULTS / "lens_correction.json"
@@ -88,30 +142,9 @@ rows = json.loads(known.read_text(encoding="utf-8"))["rows"] if known.exists() e
 for given in sys.argv[1:] or names():
     scene, name = load_scene(given), Path(given).parent.name or given
     rows = [row for row in rows if row["scene"] != name]
-    for crest, stated in CRESTS.items():
-        TRUE = load_display(SHEET + stated)
-        EXPOSURE = choose_exposure(scene, TRUE, RenderRequest(integrator="direct", threads=1))
-        pinhole = replace(TRUE, distortion=None)
-        simple = replace(pinhole, gap=TRUE.lens.thickness / TRUE.lens.index)
-        truth = {part: picture(scene, TRUE, part, 3, TRUTH_SAMPLES, seed=1) for part in (0, 2)}
-        parts = [picture(scene, TRUE, part, 2) for part in range(len(parts_beside()))]
-        corrected = LensCorrection(TRUE).rows(parts)
-        pictures = {
-            "t/n": picture(scene, simple),
-            "gap": picture(scene, pinhole),
-            "true": np.mean(parts, axis=0),
-            "corrected": corrected,
-            "bound": best(TRUE, truth, corrected),
-        }
-        decibels = {key: -10 * np.log10(seen_error(TRUE, pixels, truth)) for key, pixels in pictures.items()}
-        off = {}
-        for value in ("radius", "thickness", "index"):
-            for factor in (1 - TOLERANCE, 1 + TOLERANCE):
-                other = replace(TRUE, lens=replace(TRUE.lens, **{value: factor * getattr(TRUE.lens, value)}))
-                before, after = (seen_error(other, pictures[key], truth) for key in ("true", "corrected"))
-                off[f"{value} x {factor:g}"] = 10 * np.log10(before / after)
-        rows.append({"scene": name, "crest": crest, "psnr": decibels, "gain where off": off})
-        print(
-            name, crest, {k: round(float(v), 2) for k, v in decibels.items()}, round(min(off.values()), 2), flush=True
-        )
+    for crest in CRESTS:
+        row = measure(scene, crest)
+        rows.append({"scene": name, "crest": crest, **row})
+        figures = [{name: round(value, 2) for name, value in row[key].items()} for key in ("psnr", "psnr of middles")]
+        print(name, crest, *figures, *(round(min(each), 2) for each in row["gain where off"].values()), flush=True)
     save("lens_correction", {"machine": machine(), "sheet": SHEET, "samples": SAMPLES, "rows": rows}, show=False)

@@ -18,9 +18,12 @@ def render(scene, display, exposure, samples, *, beside=0.0, width=1.0, seed=0):
 
     class PartRays(whole):
         def light_rays(self, column, row, channel, jitter):
+            import drjit as dr
             import mitsuba as mi
 
-            jitter = mi.Point2f(0.5 + beside + (jitter.x - 0.5) * width, jitter.y)
+            # Opaque to the compiler, so that all parts share a kernel.
+            middle, share = (dr.opaque(mi.Float, value) for value in (0.5 + beside, width))
+            jitter = mi.Point2f(middle + (jitter.x - 0.5) * share, jitter.y)
             return super().light_rays(column, row, channel, jitter)
 
     request = RenderRequest(

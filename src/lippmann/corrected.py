@@ -1,13 +1,18 @@
 """Scenes rendered for the lens that is there: pixels whose light through it comes nearest to what rays meet.
 
-What is meant is the light in more directions than the display has pixels: the picture of one with pixels half as wide.
+The light that is meant has more directions than the display has pixels: it is the picture of a display with pixels half
+as wide. It is that of whole lenses: a lens has one colour to an eye, and nearest to the scene is the mean of all that
+stands behind the lens, not the colour behind its middle.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, fields, replace
 
 from lippmann.display import Display
+from lippmann.display.array_ops import NUMPY, Array, ArrayOps
+from lippmann.display.display import Vector
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
 from lippmann.image.stored_values import FloatArray
@@ -20,6 +25,9 @@ from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.scene import Scene
+
+#: Samples of a finer pixel where a scene asks for one ray through its middle.
+_SAMPLES = 4
 
 
 @exclusive()
@@ -46,6 +54,9 @@ def render_corrected(
         subpixels=bool(resolved.subpixels),
         spp=None if request.spp is None else -(-request.spp // PARTS**2),
     )
+    if request.spp is None and request.pixel_filter == "auto" and resolved.pixel_filter == "point":
+        # One ray through the middle of a lens tells nothing of the rest of it.
+        asked = replace(asked, pixel_filter="box", spp=_SAMPLES)
     # The display stands where its own depth budget has it.
     finer = render_picture(scene, finer_display(display), asked, progress, stands_as=display)
     parts = parts_of(finer.pixels)
@@ -65,7 +76,29 @@ def render_corrected(
     return IntegralImage(pixels, display, finer.world_from_display, provenance)
 
 
-def finer_display(display: Display) -> Display:
+@dataclass(frozen=True)
+class WholeLensDisplay(Display):
+    """A display whose pixels record the light of all of their lens, not of its middle alone.
+
+    Samples of a pixel run across the lens as they run down the pixel.
+    """
+
+    @staticmethod
+    def of(display: Display) -> WholeLensDisplay:
+        """Such a display with all else as it is."""
+        return WholeLensDisplay(**{each.name: getattr(display, each.name) for each in fields(Display)})
+
+    def light_ray(self, x: Array, y: Array, ops: ArrayOps = NUMPY) -> tuple[Vector, Vector]:
+        """:meth:`Display.light_ray` moved in parallel across the lens, by the place of ``y`` in its row of pixels."""
+        (origin_x, origin_y, origin_z), direction = super().light_ray(x, y, ops)
+        _, v = self.pixel_coordinates(x, y)
+        aside = (v - ops.floor(v) - 0.5) * self.lens_array.pitch
+        slant = math.radians(self.lens_array.slant)
+        origin = origin_x + aside * math.cos(slant), origin_y - aside * math.sin(slant), origin_z
+        return origin, direction
+
+
+def finer_display(display: Display) -> WholeLensDisplay:
     """The same lenses before pixels half as wide and high; the middles of its sub-pixels lie where they lay."""
     panel = display.panel
     red, green, blue = ((PARTS * right, PARTS * down) for right, down in panel.subpixel_offsets)
@@ -76,7 +109,7 @@ def finer_display(display: Display) -> Display:
         pixel_pitch=panel.pixel_pitch / PARTS,
         subpixel_offsets=(red, green, blue),
     )
-    return replace(display, panel=finer, sheet=None, pixel=None)
+    return WholeLensDisplay.of(replace(display, panel=finer, sheet=None, pixel=None))
 
 
 def parts_of(pixels: FloatArray) -> list[FloatArray]:
