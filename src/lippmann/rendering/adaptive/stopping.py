@@ -228,10 +228,7 @@ def _seconds_per_sample(sampler: FullInBatches) -> float:
 def _of_all(
     progress: ProgressCallback, done: int, coming: int, expected: float, note: str, seconds: float
 ) -> ProgressCallback:
-    """Reports of a round of ``coming`` samples after ``done`` as reports of all the work, ``expected`` samples.
-
-    ``seconds`` is the time left at the beginning of the round.
-    """
+    """A round of ``coming`` samples after ``done``, reported as part of ``expected`` samples; ``seconds`` are left."""
     total = max(expected, float(done + coming))
 
     def report(inner: Progress) -> None:

@@ -111,8 +111,7 @@ class BatchedPicture:
         return first, second
 
     def excess(self) -> Floats | None:
-        """The excess in :meth:`picture`, see :mod:`lippmann.rendering.transport.specular_chains`; None where it is not
-        kept."""
+        """The light of :meth:`picture` above the clamp on its specular chains; None where it is not kept."""
         return None if self._excess is None else self.displayed(self._mean(self._excess))
 
     def _mean(self, sums: Floats) -> Floats:

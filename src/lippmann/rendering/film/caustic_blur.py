@@ -73,7 +73,7 @@ class SquaredBlur:
         return (self._of_pass * np.float32(scaled**2)).reshape(*self._window.shape, 3)
 
     def _measure(self, photons: PhotonMap, share: float) -> Floats:
-        """``(pixels, 3)`` from a ``share`` of the pixels, each weighted by 1 / share; the others are 0."""
+        """``(pixels, 3)`` squared bias, measured at a ``share`` of the pixels and divided by it; 0 at the others."""
         blur = VisibleBlur(self._integrator, photons)
         chosen = _choose_pixels(self._source, self._window, self._seed, share)
         squares = np.zeros((self._window.pixels, 3), np.float32)

@@ -190,7 +190,7 @@ class FullInBatches(BatchedPicture):
 def _blur_after(
     integrator: Integrator, source: RaySource, window: PixelWindow, seed: int
 ) -> Callable[[int], Floats] | None:
-    """Squared bias of a window's pixels by the blur of caustics, from the samples of each; None without photons."""
+    """The function from samples per pixel to the squared bias of photon density estimation; None without photons."""
     if not isinstance(integrator, PathIntegrator) or integrator.light.photon_passes is None:
         return None
     from lippmann.rendering.film.caustic_blur import SquaredBlur
@@ -283,6 +283,6 @@ def _sizes(pixels: int, channels: int, memory: int, further: int) -> tuple[int, 
 
 
 def _table(numbers: Sequence[int]) -> UInt32:
-    """``numbers`` on the device, and two more: a single number would become a constant of the kernel."""
+    """``numbers`` on the device, padded by two zeros: Dr.Jit would compile a single number into the kernel."""
     table: UInt32 = upload(np.append(numbers, [0, 0]).astype(np.uint32))
     return table

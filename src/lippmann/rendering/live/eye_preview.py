@@ -100,10 +100,10 @@ def render_eye_preview(
     return Preview(resolved.tone_mapped(picture), provenance)
 
 
-def _choose_samples(asked: RenderRequest, resolved: RenderRequest, pixels: int) -> int:
+def _choose_samples(asked: RenderRequest, resolved: RenderRequest, places: int) -> int:
     if asked.spp is not None or resolved.spp == 1 or resolved.integrator not in POOLED_LIGHT:
         return resolved.samples
-    return min(max(1, TUNING.values // max(1, pixels)), TUNING.usual)
+    return min(max(1, TUNING.values // max(1, places)), TUNING.usual)
 
 
 def _denoises(asked: RenderRequest, resolved: RenderRequest, scene: Scene) -> bool:

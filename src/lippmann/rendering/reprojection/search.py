@@ -87,7 +87,7 @@ def search(
 def mark_edges(
     first_row: int, last_row: int, points: PointImage, lens: IntArray, tolerance: float, coded: bool, marked: BoolArray
 ) -> None:
-    """Set ``wanted (H, W)`` for untraced pixels that differ from a neighbour under the same lens.
+    """Set ``marked (H, W)`` for untraced pixels that differ from a neighbour under the same lens.
 
     ``lens (H, W)`` is the number of each pixel's lens. Pixels differ if a colour does by more than ``tolerance``, or if
     one shows the background and the other does not.
@@ -144,9 +144,9 @@ def mark_near(points: PointImage, lens: IntArray, numbers: IntArray, marked: Boo
 def mark_surroundings(
     points: PointImage, reach: int, rows: int, share: int, numbers: IntArray, marked: BoolArray
 ) -> None:
-    """Set ``marked`` for a few untraced pixels, one in ``share``, in the wider surroundings of the pixels ``numbers``.
+    """Set ``marked`` for one in ``share`` of the untraced pixels in the wider surroundings of the pixels ``numbers``.
 
-    These are the micro-image, which is about ``reach`` columns wide, and those beside it, so many ``rows`` up and down.
+    These are the micro-image, about ``reach`` columns wide, and those beside it, up to ``rows`` rows up and down.
     """
     height, width = points.status.shape
     # Surroundings of several pixels overlap, so each row of a micro-image is visited once.
@@ -168,7 +168,7 @@ def mark_surroundings(
 def follow_points(
     points: PointImage, field: LensField, neighbors: IntArray, numbers: IntArray, rules: Rules, marked: BoolArray
 ) -> None:
-    """Set ``wanted (H, W)`` for untraced pixels under the ``neighbors (lenses, n)`` that should show the points of the
+    """Set ``marked (H, W)`` for untraced pixels under the ``neighbors (lenses, n)`` that should show the points of the
     pixels ``numbers``, and do not.
 
     A point lies between four pixels of another lens. It is missing there if none of them shows that surface in that

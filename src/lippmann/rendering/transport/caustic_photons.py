@@ -139,7 +139,7 @@ def _radius(photons: Photons, neighbours: float) -> float:
     # Axis by axis: a product of matrices would round by how many threads share it.
     axes = np.ascontiguousarray(photons.position.T)
     distances = []
-    for point in photons.position[:: max(1, len(photons) // TUNING.probe_side)]:  # a median needs no more of them
+    for point in photons.position[:: max(1, len(photons) // TUNING.probe_side)]:  # a subset suffices for a median
         squares = sum(np.square(axis - place) for axis, place in zip(axes, point, strict=True))
         distances.append(math.sqrt(np.partition(squares, number - 1)[number - 1]))
     return float(np.median(distances)) or max(distances) or 1.0

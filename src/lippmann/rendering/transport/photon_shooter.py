@@ -186,7 +186,7 @@ class _Landed:
         self._lanes = lanes
         self._number = dr.opaque(mi.UInt32, lanes)
         rows = lanes * surfaces
-        #: Sharp events on the way to each; 0 where none landed, whose other values are not written.
+        #: Sharp events on each photon's path; 0 marks a row without a photon, whose other values are undefined.
         self._events = dr.zeros(mi.UInt32, rows)
         self._values = [dr.empty(mi.Float, 3 * rows) for _ in range(4)]
         dr.eval(self._events, self._values)

@@ -1,7 +1,7 @@
 """Sharp events: scattering that keeps an image sharp, by mirrors, clear glass, smooth gloss and holes.
 
-Light that comes from an emitter by sharp events alone and then meets a rough surface is a *caustic* there; paths from
-the eye hardly ever find small emitters so. All other light is left to them.
+Light that comes from an emitter by sharp events alone and then meets a rough surface is a *caustic* there. Paths from
+the eye hardly ever sample it where the emitter is small; they sample all other light.
 
 Whether an event is sharp follows from the surface and the two directions alone, not from the sampled lobe. So the
 division of light into sharp and rough is exact however light is sampled. Delta lobes are sharp. A surface with a narrow

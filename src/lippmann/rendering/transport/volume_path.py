@@ -143,7 +143,7 @@ class VolumePathIntegrator:
             # ---- next-event estimation ----
             phase = mei.medium.phase_function()
             smooth = at_surface & may_bounce & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-            # Only media that are lit by emitter sampling have its share of the light.
+            # Media may opt out of emitter sampling; phase sampling alone then finds their light.
             lit_medium = scattered & medium.use_emitter_sampling()
             reference = dr.select(scattered, mi.Interaction3f(mei), mi.Interaction3f(si))
             light_ds, light = self.light_sampler.sample_direction(
