@@ -35,6 +35,12 @@ def kept(tmp_path):
     assert {entry.name for entry in tmp_path.iterdir() if "part" in entry.name} == set()
 
 
+@pytest.mark.parametrize("words", [("quilt",), ("quilt", "model.glb"), ("calibrate",)])
+def test_a_group_of_commands_names_them(lippmann, words):
+    known = {"quilt": "render, pack, unpack, sizes", "calibrate": "pattern, page"}[words[0]]
+    refuse(lippmann(*words), "command", f"Known are {known}.")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "content"),

@@ -127,6 +127,7 @@ def test_bad_input_is_one_line_and_code_2(lippmann, tmp_path):
     assert "the name says another quilt; the quilt's ends in _qs8x6a0.75.png" in refused(
         *render, "-o", tmp_path / "x_qs5x9a0.75.png"
     )
+    assert "q: no ending; known are .png" in refused(*render, "-o", tmp_path / "q")
     assert "unknown ending '.jpg'" in refused(*render, "-o", tmp_path / "x_qs8x6a0.75.jpg")
     assert "unknown display" in refused(*render, "-d", "portrai")
     assert "no quilt is known" in refused(*render, "-d", "panel-4k")

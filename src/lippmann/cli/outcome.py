@@ -110,6 +110,8 @@ def _is_interrupt(error: BaseException | None) -> bool:
 _NOT_LISTED = re.compile(r"Invalid value for '(--[\w-]+)'.*: (?:Value error, )?('.*?') is not one of (.*)\.")
 
 
+#: How typer refuses a group of commands without one of them, and a word that is like none.
+_NO_COMMAND = re.compile(r"Missing command\.|No such command '[^']*'\.")
 _NO_SUCH = re.compile(r"No such option: (--[\w-]+)")
 #: What people ask for by names that other programs have for it.
 _OTHER_NAMES = {
@@ -130,6 +132,8 @@ def _usage(error: BaseException) -> str:
         return str(UsageError.unknown("value", word, known, where=option))
     context = getattr(error, "ctx", None)
     command = getattr(context, "command_path", "lippmann")
+    if " " in command and _NO_COMMAND.fullmatch(message):
+        message += f" Known are {', '.join(context.command.commands)}."
     return f"{message} See '{command} --help'."
 
 

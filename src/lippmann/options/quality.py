@@ -177,7 +177,7 @@ class MachineOptions(Options):
     threads: int | None = _machine(None, "CPU threads; all cores by default.", low=1, high=4096)
     memory: int | None = _machine(
         None,
-        "Memory to use in bytes, or such as 2G; 60 % of the free by default. What is read from files counts, too.",
+        "Memory to use, such as 2G; 60 % of the free by default. What is read from files counts, too.",
         low=1,
         high=2**63,
         read=texts.memory,

@@ -18,11 +18,7 @@ from lippmann.errors import OutputError, UsageError
 if TYPE_CHECKING:
     from lippmann.display.formats.monitor import Monitor
 
-calibrate = typer.Typer(
-    help="Calibrate the pitch, slope and centre of a slanted monitor.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
+calibrate = typer.Typer(help="Calibrate the pitch, slope and centre of a slanted monitor.", rich_markup_mode=None)
 
 
 @calibrate.command("pattern", cls=HelpfulCommand)

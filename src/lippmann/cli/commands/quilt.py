@@ -28,7 +28,7 @@ from lippmann.wording import samples_in_words
 if TYPE_CHECKING:
     from lippmann.quilts.quilt import Quilt, QuiltLayout
 
-quilt = typer.Typer(help="Quilts: all views side by side in one picture.", no_args_is_help=True, rich_markup_mode=None)
+quilt = typer.Typer(help="Quilts: all views side by side in one picture.", rich_markup_mode=None)
 
 Device = Annotated[
     str,
@@ -297,13 +297,13 @@ def weave(
 
 
 def _named(path: Path, ending: str) -> Path:
-    """``path`` with the ending of its quilt's layout."""
+    """``path`` with the ending of its quilt's layout; as it is, to be refused, without an ending of its format."""
     from lippmann.errors import OutputError
     from lippmann.quilts.quilt import ending_of_name
 
     named = ending_of_name(path)
     if not named:
-        return path.with_name(f"{path.stem}{ending}{path.suffix}")
+        return path.with_name(f"{path.stem}{ending}{path.suffix}") if path.suffix else path
     if named != ending:
         rule = f"the quilt's ends in {ending}{path.suffix}"
         raise OutputError("the name says another quilt", where=str(path), rule=rule, fix="leave --output out")
