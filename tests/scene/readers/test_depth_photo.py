@@ -17,7 +17,7 @@ from lippmann.errors import SceneError, UsageError
 from lippmann.options.placement import PlacementOptions
 from lippmann.scene.matrices import transform_points
 from lippmann.scene.placement import place
-from lippmann.scene.readers.depth_layers import split_layers
+from lippmann.scene.readers.depth_layers import EDGE, split_layers
 from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.scene import bounds_of
@@ -381,6 +381,14 @@ def test_a_depth_map_is_for_photographs(tmp_path):
     rule = r"for \.jpg, \.jpeg, \.png, \.webp, \.heic, \.heif, \.hif files"
     with pytest.raises(UsageError, match=rf"depth_map: teapot is no photograph; {rule}"):
         load_scene("teapot", depth_map=tmp_path / "depth.npy")
+
+
+def test_no_view_sees_between_the_layers():
+    clutter = np.kron(np.random.default_rng(3).random((8, 8)), np.ones((5, 5))).astype(np.float32)
+    layers = split_layers(clutter, np.zeros((40, 40, 3), np.float32), "photo.jpg")
+    covered = {*map(tuple, layers.faces), *map(tuple, layers.behind_faces)}
+    assert len(covered) == 2 * 39 * 39
+    assert np.ptp(layers.nearness.ravel()[layers.faces], axis=1).max() <= EDGE
 
 
 def test_a_flat_map_has_one_layer():

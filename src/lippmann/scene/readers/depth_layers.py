@@ -71,13 +71,14 @@ def split_layers(inverse: Plane, colors: Plane, where: str) -> Layers:
     far_edge = ndimage.maximum_filter(nearness, 3) - nearness > EDGE
     behind, behind_colors, hidden = _behind(nearness, colors, near_edge, far_edge)
     faces = _triangles(nearness.shape)
-    continued = hidden.ravel()[faces].any(axis=1)
+    is_cut = np.ptp(nearness.ravel()[faces], axis=1) > EDGE
     return Layers(
         nearness=nearness,
-        faces=faces[np.ptp(nearness.ravel()[faces], axis=1) <= EDGE],
+        faces=faces[~is_cut],
         behind=behind,
         behind_colors=behind_colors,
-        behind_faces=faces[continued & (np.ptp(behind.ravel()[faces], axis=1) <= EDGE)],
+        # Without holes: where the far side is uneven, a steep triangle is better than the black behind both layers.
+        behind_faces=faces[is_cut | hidden.ravel()[faces].any(axis=1)],
         filled=float(1.0 - known.mean()),
     )
 
