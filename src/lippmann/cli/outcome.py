@@ -9,6 +9,7 @@ import errno
 import re
 import sys
 from contextlib import suppress
+from typing import Any
 
 from typer import BadParameter
 
@@ -130,7 +131,7 @@ def _usage(error: BaseException) -> str:
     if listed is not None:
         option, word, known = listed[1], listed[2].strip("'"), listed[3].replace("'", "").split(", ")
         return str(UsageError.unknown("value", word, known, where=option))
-    context = getattr(error, "ctx", None)
+    context: Any = getattr(error, "ctx", None)
     command = getattr(context, "command_path", "lippmann")
     if " " in command and _NO_COMMAND.fullmatch(message):
         message += f" Known are {', '.join(context.command.commands)}."
