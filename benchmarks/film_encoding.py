@@ -1,14 +1,15 @@
 """What a film takes beside its frames: memory as it grows longer, and processor time of a render with and without it.
 
-Time on two cores: about six minutes for the encoders, and half an hour for rendered frames.
+Time on two cores: about six minutes for the encoders, and ten for twelve rendered frames.
 
 python benchmarks/film_encoding.py [--codecs NAME...] [--rendered FRAMES]
 
 Each codec writes a film of ``COUNTS[-1]`` pictures of a Portrait's quilt, made without rendering, in a process of its
 own. Its resident memory is sampled, without what it was before the first picture: the largest of the first so many
 pictures, and what is left while the encoder waits, as it does while a frame is rendered.
-``--rendered``: so many frames of a turntable of the teapot, drafts for a Portrait, as whole commands: files alone,
-files with the film, and one still. Writes ``benchmarks/results/film_encoding.json``, where rows of other codecs stay.
+``--rendered``: whole commands for a Portrait: a still of the teapot as it is by default and as a draft, and so many
+frames of its turntable as drafts, files alone and with their film in H.264.
+Writes ``benchmarks/results/film_encoding.json``, where rows of other codecs stay.
 """
 
 from __future__ import annotations
@@ -106,14 +107,13 @@ def _wait_until_idle() -> None:
 def rendered(count: int) -> dict[str, Any]:
     """Processor seconds and peak of frames in files, of the same with their film, and of a still."""
     checkout, figures = Checkout(HERE), {}
-    words = ["quilt", "render", "teapot", "-d", "portrait", "--effort", "draft", "-q"]
+    words, draft = ["quilt", "render", "teapot", "-d", "portrait", "-q"], ["--effort", "draft"]
     turn = ["--turntable", "48", "--frames", f"0:{count}"]
     with tempfile.TemporaryDirectory() as folder:
-        still = [*words, "-o", f"{folder}/still.png"]
-        checkout.run(_PROGRAM, still)  # compiles the kernels
-        figures["still"] = checkout.run(_PROGRAM, still)
-        figures["files"] = checkout.run(_PROGRAM, [*words, *turn, "-o", f"{folder}/files"])
-        figures["film"] = checkout.run(_PROGRAM, [*words, *turn, "-o", f"{folder}/film.mp4"])
+        figures["still"] = checkout.run(_PROGRAM, [*words, "-o", f"{folder}/still.png"])
+        figures["draft"] = checkout.run(_PROGRAM, [*words, *draft, "-o", f"{folder}/draft.png"])
+        figures["files"] = checkout.run(_PROGRAM, [*words, *draft, *turn, "-o", f"{folder}/files"])
+        figures["film"] = checkout.run(_PROGRAM, [*words, *draft, *turn, "-o", f"{folder}/film.mp4"])
     return {"frames": count, **figures}
 
 
@@ -130,12 +130,18 @@ before; and what the encoder holds while it waits for the next frame.
 
 {chr(10).join(lines)}
 """
-    if drafts := result.get("rendered"):
-        files, film, still = (drafts[name] for name in ("files", "film", "still"))
+    if measured := result.get("rendered"):
+        still, draft, files, film = (measured[name] for name in ("still", "draft", "files", "film"))
+        shares = ", ".join(
+            f"{1 + row['waiting'][str(COUNTS[-1])] / still['peak']:.2f} with `{codec}`"
+            for codec, row in result["codecs"].items()
+        )
         text += f"""
-{drafts["frames"]} frames of a turntable, drafts, take {files["cpu"]:.0f} s of processor time as files and
-{film["cpu"]:.0f} s with their film ({film["cpu"] / files["cpu"]:.3f}). A still's memory is
-{still["peak"] / 1e6:.0f} MB, that of the film {film["peak"] / 1e6:.0f} MB.
+{measured["frames"]} drafts of a turntable take {files["cpu"]:.0f} s of processor time as files alone and
+{film["cpu"]:.0f} s with their film in H.264 ({film["cpu"] / files["cpu"]:.3f} times as much), one run of each on a busy
+machine. A draft takes {draft["peak"] / 1e6:.0f} MB, the film of drafts {film["peak"] / 1e6:.0f} MB. A still as it is by
+default takes {still["peak"] / 1e6:.0f} MB; with what encoders hold while they wait that is, by addition,
+{shares}.
 """
     return text
 
