@@ -1,5 +1,7 @@
 """Coordinates far from the origin, as surveys write them."""
 
+import base64
+import json
 import struct
 
 import numpy as np
@@ -60,6 +62,46 @@ def test_vtks_surfaces_are_moved(tmp_path):
     pyvista.PolyData(CORNERS + UTM, faces=np.hstack([(3, *face) for face in FACES])).save(tmp_path / "a.vtp")
     low, high = load_scene(tmp_path / "a.vtp").bounds
     assert high - low == pytest.approx(np.array([0.1, 0.2, 0.3]), rel=1e-5)
+
+
+@pytest.mark.parametrize("far", [0, 1])
+def test_meshes_that_their_placements_put_far_away_move_with_their_lights_and_cameras(tmp_path, far):
+    offset = far * UTM
+    matrix = np.eye(4)
+    matrix[:3, 3] = offset + 0.25
+    placed = {"matrix": matrix.T.ravel().tolist()}
+    data = CORNERS.astype("<f4").tobytes() + np.array(FACES, "<u4").tobytes()
+    views = [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 48}]
+    accessors = [
+        {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [0.1, 0.2, 0.3]},
+        {"bufferView": 1, "componentType": 5125, "count": 12, "type": "SCALAR"},
+    ]
+    lights = {"KHR_lights_punctual": {"lights": [{"type": "point"}]}}
+    document = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"byteLength": 96, "uri": "data:;base64," + base64.b64encode(data).decode()}],
+        "bufferViews": views,
+        "accessors": accessors,
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}],
+        "extensions": lights,
+        "extensionsUsed": [*lights],
+        "nodes": [
+            {"mesh": 0, **placed},
+            {"camera": 0, **placed},
+            {"extensions": {"KHR_lights_punctual": {"light": 0}}, **placed},
+        ],
+        "scenes": [{"nodes": [0, 1, 2]}],
+        "scene": 0,
+    }
+    (tmp_path / "a.gltf").write_text(json.dumps(document))
+    loaded = load_scene(tmp_path / "a.gltf")
+    scene, (low, high) = loaded.description, loaded.bounds
+    assert high - low == pytest.approx(np.array([0.1, 0.2, 0.3]), rel=1e-5)
+    assert np.abs(low).max() < 1
+    for matrix in (scene.cameras[0].world_from_camera, scene.lights[0].world_from_light):
+        assert matrix[:3, 3] == pytest.approx(low, abs=1e-6)
+    assert any("its shape would be rounded" in note for note in scene.notes) == bool(far)
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,15 @@ At five million metres it tells half a metre.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-#: So many times its extent from the origin, a scene is moved there: 6e-6 of the extent is what single precision tells.
-FAR = 100.0
+from lippmann.scene.values.description import SceneDescription
+
+#: So many times its extent from the origin, a scene is moved there: single precision tells 6e-5 of the extent.
+FAR = 1000.0
 
 #: Points that are looked at.
 _SAMPLE = 1 << 16
@@ -29,6 +33,41 @@ def near_origin(positions: NDArray[np.float64], notes: list[str]) -> NDArray[np.
     if not 0 < FAR * extent < np.abs(middle).max():
         return positions
     offset = np.round(middle) if extent > 1 else middle
-    x, y, z = -offset
-    notes.append(f"moved by {x:.12g}, {y:.12g}, {z:.12g}: so far from the origin its shape would be rounded")
+    notes.append(_note(offset))
     return positions - offset
+
+
+def moved_near_origin(description: SceneDescription) -> SceneDescription:
+    """A scene of meshes with its cameras and lights, moved to the origin where placements put it far away; with a note.
+
+    As buildings and terrains have it, whose meshes lie about their own origin.
+    """
+    if description.splats is not None or description.volume is not None:
+        return description
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for number, worlds in description.fitted_placements.items():
+        positions = description.meshes[number].positions
+        if len(positions) and len(worlds):
+            least, most = (np.asarray(ends, np.float64) for ends in (positions.min(axis=0), positions.max(axis=0)))
+            middles = worlds[:, :3, :3] @ ((least + most) / 2.0) + worlds[:, :3, 3]
+            halves = np.abs(worlds[:, :3, :3]) @ ((most - least) / 2.0)
+            low = np.minimum(low, (middles - halves).min(axis=0))
+            high = np.maximum(high, (middles + halves).max(axis=0))
+    middle, extent = (low + high) / 2, (high - low).max() / 2
+    if not 0 < FAR * extent < np.abs(middle).max():
+        return description
+    offset = np.round(middle) if extent > 1 else middle
+    move = np.eye(4)
+    move[:3, 3] = -offset
+    return replace(
+        description,
+        instances=[replace(each, world_from_mesh=move @ each.world_from_mesh) for each in description.instances],
+        cameras=[replace(each, world_from_camera=move @ each.world_from_camera) for each in description.cameras],
+        lights=[replace(each, world_from_light=move @ each.world_from_light) for each in description.lights],
+        notes=[*description.notes, _note(offset)],
+    )
+
+
+def _note(offset: NDArray[np.float64]) -> str:
+    x, y, z = -offset
+    return f"moved by {x:.12g}, {y:.12g}, {z:.12g}: so far from the origin its shape would be rounded"

@@ -17,6 +17,7 @@ from lippmann.options.scene import LoadKeywords, SceneOptions, Up
 from lippmann.options.texts import settings_of
 from lippmann.runtime.plugins import Plugin, function_of
 from lippmann.scene.parsing.dicom_files import DICOM, holds_dicom
+from lippmann.scene.parsing.far_origin import moved_near_origin
 from lippmann.scene.parsing.files import NamedFiles, read_bytes
 from lippmann.scene.readers.registry import READERS, VTK, MovingScene, Reader, ReaderOption, suffixes_with
 from lippmann.scene.readers.splats.sog_folder import holds_sog
@@ -254,6 +255,7 @@ def _from_name(source: str | Path, allow_outside: bool, asked: SceneOptions) -> 
         description = function_of(reader.read)(path, **keywords)
     if isinstance(description, SceneDescription):
         description = _upright(_with_remarks(check_description(description, path.name)), suffix, reader, asked.up)
+        description = moved_near_origin(description)
         return Scene(description.name, description)
     scene = _of_other_kind(description)
     if scene is None:
