@@ -214,7 +214,7 @@ def test_coloured_glass_takes_its_light():
 
     built = build_description(glass_room())
     features = make_scene_features(built.mitsuba, has_null=built.has_null, absorption=built.absorption)
-    assert features.has_absorption
+    assert features.absorption is not None
     integrator = PathIntegrator(built.mitsuba, features, 5)
     pose = np.eye(4)
     pose[2, 3] = 3.2

@@ -97,7 +97,7 @@ class PathIntegrator:
         self._techniques_without_specular = Techniques(*self._absorption(), *self._sharing(), apart)
 
     def _absorption(self) -> list[Technique]:
-        return [Absorption(self.features)] if self.features.has_absorption else []
+        return [] if self.features.absorption is None else [Absorption(self.features)]
 
     def _sharing(self) -> list[Technique]:
         """Techniques that sample a part of the light in place of, or beside, the plain path."""
@@ -106,7 +106,7 @@ class PathIntegrator:
             techniques.append(PhotonGathering(light.photons, self.depth, self._environment))
         if light.light_vertices is not None:
             techniques.append(
-                LightVertexJoins(light.light_vertices, self.depth, self.features.has_absorption, self._clamp)
+                LightVertexJoins(light.light_vertices, self.depth, self.features.absorption is not None, self._clamp)
             )
         return techniques
 

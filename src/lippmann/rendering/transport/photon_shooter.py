@@ -128,7 +128,7 @@ class PhotonShooter:
         o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
         power, active = mi.Color3f(power), mi.Bool(active)
         events, turn = mi.UInt32(0), mi.UInt32(0)
-        absorption = mi.Color3f(0) if features.has_absorption else None
+        absorption = None if features.absorption is None else mi.Color3f(0)
         while dr.hint(active, label="photon events", exclude=[scene, features, stream, landed, surfaces]):
             si = scene.ray_intersect(mi.Ray3f(o, d), mi.RayFlags.All, False, active)
             active &= si.is_valid()

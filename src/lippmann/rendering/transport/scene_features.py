@@ -32,11 +32,6 @@ class SceneFeatures:
     has_null: bool = False
     absorption: Color3f | None = None
 
-    @property
-    def has_absorption(self) -> bool:
-        """Whether some shape absorbs."""
-        return self.absorption is not None
-
     def absorption_of(self, shape: ShapePtr) -> Color3f:
         """Absorption coefficients per world unit inside ``shape``."""
         return dr.gather(mi.Color3f, self.absorption, dr.reinterpret_array(mi.UInt32, shape))
