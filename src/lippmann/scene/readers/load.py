@@ -57,6 +57,7 @@ _PAPER_DEPTH = 2
 
 _BLENDER = "open it in Blender, then File > Export > glTF 2.0 (.glb)"
 _FREECAD = "open it in FreeCAD, then File > Export > glTF (.glb)"
+_CLOUD_COMPARE = "save it as .ply, in CloudCompare for instance"
 _SLICER_3D = "save it as .nii.gz, in 3D Slicer for instance"
 _MAYA = "export it from Maya as FBX, and that from Blender as glTF 2.0 (.glb)"
 _TRIMESH = "convert it, in Python by trimesh: trimesh.load_mesh('a.off').export('a.ply')"
@@ -80,13 +81,15 @@ _ELSEWHERE = {
     ".vtm": "save its blocks as one data set, in PyVista by: pyvista.read('a.vtm').combine().save('a.vtu')",
     ".pvd": "name one of the files that it lists",
     **dict.fromkeys((".nrrd", ".nhdr", ".mha", ".mhd"), _SLICER_3D),
+    **dict.fromkeys((".mgz", ".mgh"), "convert it by FreeSurfer: mri_convert in.mgz out.nii.gz"),
+    ".mtl": "it holds the materials of an .obj file: name that",
     ".hdr": "save it as .nii or .nii.gz, which hold header and voxels in one file",
     ".3mf": "save it as .stl in the slicer, or with trimesh and lxml: trimesh.load_mesh('a.3mf').export('a.stl')",
     ".amf": "save it as .stl in the slicer",
     **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar"), "unpack it, and name the scene file inside"),
     ".zae": "unzip it, open the .dae in Blender, then File > Export > glTF 2.0 (.glb)",
     **dict.fromkeys((".splat", ".ksplat", ".lcc"), "open it in SuperSplat (superspl.at/editor), export it as .ply"),
-    **dict.fromkeys((".las", ".laz", ".e57", ".pcd", ".pts", ".ptx"), "save it as .ply, in CloudCompare for instance"),
+    **dict.fromkeys((".las", ".laz", ".e57", ".pcd", ".pts", ".ptx", ".xyzrgb"), _CLOUD_COMPARE),
     **dict.fromkeys((".mrc", ".map", ".ccp4"), "save it as .npy: numpy.save('a.npy', mrcfile.read('a.mrc'))"),
     ".xyz": "save molecules as .pdb, by: obabel in.xyz -O out.pdb; clouds of points as .ply, in CloudCompare",
     **{kind: _OPEN_BABEL.format(kind) for kind in (".sdf", ".mol", ".mol2", ".cube", ".gro")},
