@@ -181,7 +181,7 @@ def _chain(
         else:
             crossings += 1
         active = continues & (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
-        pi = scene.ray_intersect_preliminary(onward, coherent=False, active=active)
+        pi = scene.ray_intersect_preliminary(onward, coherent=True, active=active)  # neighbours mirror much the same
         rays += dr.select(active, mi.UInt32(1), mi.UInt32(0))
         # A chain that leaves the scene counts as sky, but not before its first event.
         active &= _may_show_light(pi) | (integrator.has_surroundings & ~pi.is_valid() & (depth > 0))
