@@ -207,9 +207,9 @@ def test_whatever_is_left_open_has_a_reason():
     planned = resolve(RenderRequest(), SCENE, load_display("looking-glass-portrait"))
     plan = planned.plan
     assert all(choice.reason and choice.reason != ASKED for choice in plan.entries.values())
-    assert (plan.samples.value, plan.reserve.value, plan.subpixels.value) == (4, 20, True)
-    assert plan.to_dict()["samples"] == {"value": 4, "reason": plan.samples.reason}
-    assert f"samples: 4 ({plan.samples.reason})" in plan.lines()
+    assert (plan.samples.value, plan.reserve.value, plan.subpixels.value) == (3, 21, True)
+    assert plan.to_dict()["samples"] == {"value": 3, "reason": plan.samples.reason}
+    assert f"samples: 3 ({plan.samples.reason})" in plan.lines()
     # A picture may be planned again, as a sequence's frames are: its values are asked for then.
     again = resolve(planned, SCENE, load_display("looking-glass-portrait"))
     assert again == planned
@@ -226,6 +226,12 @@ def test_samples_and_reserve_follow_the_size(width, samples, reserve):
     assert foreseen == plan
     tiled = resolve(RenderRequest(), SCENE, load_display("seed-lenticular"), "tiles", size=(width, width)).plan
     assert (tiled.samples.value, tiled.reserve.value) == (samples, None)
+
+
+@pytest.mark.parametrize(("width", "samples"), [(64, 16), (512, 3), (2048, 3), (4096, 2)])
+def test_sub_pixels_with_rays_of_their_own_take_fewer_samples(width, samples):
+    display = load_display("looking-glass-portrait")
+    assert resolve(RenderRequest(), SCENE, display, size=(width, width)).spp == samples
 
 
 def test_a_pilots_results_take_the_place_of_what_it_decides():

@@ -268,7 +268,8 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
     request = facts.request
     classic = facts.scene.classic if facts.integrator == "classic" else None
     of_file = 1 + (classic.camera.antialiasing if classic is not None and facts.form == "preview" else 0)
-    fewest = TUNING.fewest // 2 if subpixels and (values or 0) > TUNING.many else TUNING.fewest
+    is_large = (values or 0) > TUNING.many
+    fewest = TUNING.fewest - subpixels * (1 + is_large)
     of_budget = 1 << max(round(math.log2(TUNING.values / (values or TUNING.values))), 0)
     pooled = f"about a million for the picture, but {fewest} to {TUNING.usual} of each pixel"
     is_final = request.effort == "final"

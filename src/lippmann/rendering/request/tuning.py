@@ -17,10 +17,10 @@ class RequestTuning:
         that of 12 rays per pixel for 0.7 dB on the average (``docs/background/denoising.md``). With fewer, all samples
         may miss rare light such as mirrored emitters.
     fewest:
-        Least samples per pixel (or sub-pixel) of a pooled picture: with fewer the worst micro-images are noisy, and
-        outliers cannot be told apart. Half of it for pictures of more than ``many`` sub-pixels.
+        Least samples per pixel of a pooled picture: with fewer the worst micro-images are noisy, and outliers cannot be
+        told apart. One less per sub-pixel with rays of its own, two less of more than ``many`` sub-pixels.
     many:
-        See ``fewest``.
+        See ``fewest``, and ``docs/research/adaptive-sampling.md``.
     values:
         Samples of a pooled picture, of all its pixels together: half a second of two cores (``defaults.py``).
     reserve, most_in_reserve:
