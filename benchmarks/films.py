@@ -153,7 +153,10 @@ def main() -> None:
         raise SystemExit(f"no such film: {', '.join(sorted(unknown))}; there are: {', '.join(known)}")
     checkouts = {"other": Checkout(options.other), "today": Checkout(options.today)}
     commits = {name: checkout.commit() for name, checkout in checkouts.items()}
-    rows = saved("films").get("rows", [])
+    kept = saved("films")
+    rows = kept.get("rows", [])
+    if options.films is not None:
+        missing = kept.get("missing", {})  # of all films, which were not asked for
     for name in wanted:
         with tempfile.TemporaryDirectory() as folder:
             found = measure(checkouts, known[name], options.display, options.cache, not options.time_only, Path(folder))

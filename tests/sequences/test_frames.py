@@ -91,6 +91,13 @@ def test_a_camera_of_the_file_is_followed(moving_ball, display):
     assert moved == pytest.approx([1, 0, 0], abs=1e-6)
 
 
+def test_a_frame_is_read_once_in_a_row(moving_ball):
+    motion = open_motion(moving_ball)
+    frame = motion.scene(3)
+    assert motion.scene(3) is frame
+    assert motion.scene(4).bounds[0, 0] != frame.bounds[0, 0]
+
+
 @pytest.mark.long
 def test_a_frame_alone_is_the_same_as_among_others(engine, moving_ball):
     motion = open_motion(moving_ball)

@@ -112,6 +112,8 @@ class AnimatedFile(Motion):
         # Surroundings and background are read once, with the first frame.
         plain = replace(asked, variants=None, reader_options=None)
         self._first = read_scene(self._moving.at(0.0), plain, light)
+        #: The last frame that was asked for: its placement, its camera and its picture all ask for it.
+        self._last: tuple[int, Scene] | None = None
 
     @property
     def count(self) -> int:
@@ -122,7 +124,10 @@ class AnimatedFile(Motion):
         return self._first, self._moving.content, self._fps
 
     def scene(self, frame: int) -> Scene:
-        return self._at(frame / self._fps)
+        if self._last is None or self._last[0] != frame:
+            self._last = None  # two scenes may not fit the memory
+            self._last = frame, self._at(frame / self._fps)
+        return self._last[1]
 
     def camera(self, frame: int, name: str | None) -> Camera | None:
         return None if name is None else find_camera(self.scene(frame).cameras, name)
