@@ -29,7 +29,7 @@ def display():
     return load_display("seed-lenticular").resized(32, 32)
 
 
-def asked_of(motion, display, frames, estimate=ESTIMATE, finished=(), **options):
+def asked_of(motion, display, frames, estimate=ESTIMATE, **options):
     """``(seed, samples, whether it has halves)`` of all that is rendered, whose pictures took 8 samples."""
     asked = []
 
@@ -39,7 +39,7 @@ def asked_of(motion, display, frames, estimate=ESTIMATE, finished=(), **options)
             return Preview(np.zeros((2, 2, 3), np.float32), Provenance(method="pooled", spp=8, estimate=estimate))
 
     where, request = find_stand(motion, display, PlacementOptions()), RenderRequest(**options)
-    made = list(render_frames(motion, display, frames, where, request, Form(), lambda _: None, finished))
+    made = list(render_frames(motion, display, frames, where, request, Form(), lambda _: None))
     assert [frame for frame, _ in made] == list(frames)
     return asked
 
@@ -54,14 +54,16 @@ def test_frames_after_a_key_frame_take_its_samples_in_one_stream(motion, display
     assert len({seed for seed, *_ in asked}) == 6
 
 
-def test_a_key_frame_that_an_earlier_run_finished_is_rendered_first(motion, display):
-    every = asked_of(motion, display, range(8))
-    assert asked_of(motion, display, [6, 7], finished=range(6)) == [every[4], every[6], every[7]]
+@pytest.mark.parametrize(("frames", "rendered"), [([6, 7], [4, 6, 7]), (range(3, 12, 3), [0, 3, 4, 6, 8, 9])])
+def test_a_frame_is_the_same_alone_and_among_others(motion, display, frames, rendered):
+    every = asked_of(motion, display, range(12))
+    assert asked_of(motion, display, frames) == [every[number] for number in rendered]
 
 
-def test_no_frame_is_rendered_that_was_not_asked_for(motion, display):
-    has_halves = [each[2] for each in asked_of(motion, display, range(0, 16, 3))]
-    assert has_halves == [True, False, True, True, True, False]  # 0, 3 after it, 6, 9, 12, 15 after it
+def test_no_key_frame_is_rendered_for_a_frame_after_a_cut(motion, display, monkeypatch):
+    monkeypatch.setattr("lippmann.sequences.key_frames.is_cut", lambda before, after, display: before.number == 4)
+    asked = asked_of(motion, display, [3, 6, 7])
+    assert [has_halves for *_, has_halves in asked] == [True, False, True, True]  # 0 and 3, 6, 7
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -134,8 +134,7 @@ def saved_sequence(
         if missing:
             sweep_beside(path_of(missing[0]))  # which an interrupted run may have left half written
         if runner is None:
-            finished = set(frames) - set(missing)
-            made = _whole(motion, display, missing, finished, where, path_of, bits, progress, request, form)
+            made = _whole(motion, display, missing, where, path_of, bits, progress, request, form)
         else:
             files = render_tiled_frames(motion, display, missing, where, path_of, request, runner, bits, progress)
             made = ((number, written.provenance) for number, written in files)
@@ -168,7 +167,6 @@ def _whole(
     motion: Motion,
     display: Display,
     frames: Sequence[int],
-    finished: Iterable[int],
     where: Stand,
     path_of: Callable[[int], Path],
     bits: int | None,
@@ -177,7 +175,7 @@ def _whole(
     form: Form[Any],
 ) -> Iterator[_Made]:
     """Frames rendered in one piece, and saved."""
-    for number, image in render_frames(motion, display, frames, where, request, form, progress, finished):
+    for number, image in render_frames(motion, display, frames, where, request, form, progress):
         form.write(image, path_of(number), bits)
         provenance = image.provenance
         del image  # while the next is rendered

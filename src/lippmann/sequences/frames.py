@@ -2,12 +2,12 @@
 
 The display's place is held fixed over all frames: where the scene is fitted to it, the box around all that the motion
 ever fills is; where it follows a camera, it stays in the same place in front of that camera. So nothing
-jumps from frame to frame, and a frame shows the same whether it is rendered alone or with all others.
+jumps from frame to frame, and a frame is the same whether it is rendered alone or with all others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -305,12 +305,8 @@ def render_frames(
     request: RenderRequest,
     form: Form[Shown],
     progress: ProgressCallback,
-    finished: Iterable[int] = (),
 ) -> Iterator[tuple[int, Shown]]:
-    """The frames of :func:`render_sequence`, in any form, once it is known where the display stands.
-
-    ``finished`` are frames of the sequence that an earlier run rendered.
-    """
+    """The frames of :func:`render_sequence`, in any form, once it is known where the display stands."""
     kept = KeptScene()
     request = hold_exposure(request, motion, display, where, kept.build)
 
@@ -320,9 +316,7 @@ def render_frames(
     def trace(now: Moment, request: RenderRequest, report: ProgressCallback) -> Shown:
         return form.render(now.scene, display, replace(request, placement=now.placement), report, kept.build)
 
-    keys = KeyFrames(
-        {*frames, *finished}, display, moment, lambda key: trace(key, of_frame(request, key.number), silent).provenance
-    )
+    keys = KeyFrames(display, moment, lambda key: trace(key, of_frame(request, key.number), silent).provenance)
 
     def render(position: int, frame: int) -> Shown:
         now, own = moment(frame), of_frame(request, frame)

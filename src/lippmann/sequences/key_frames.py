@@ -4,13 +4,13 @@ The halves of a frame are denoised one by one, as each judges the other. Their m
 are of one stream and are denoised together: 0.3 to 0.7 dB (``docs/research/films.md``). So the frames after a key frame
 have no halves. They take as many samples, and the estimate of the error is the key frame's.
 
-Which frames are key frames follows from their numbers, unless there is a cut between: a frame that shows another scene
-than its key frame has halves itself, and so has one whose key frame is not asked for.
+Which frames are key frames follows from their numbers, so that a frame is the same whether it is rendered alone or with
+all others. A frame that shows another scene than its key frame, as after a cut, has halves itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable
 from dataclasses import replace
 
 from lippmann.display import Display
@@ -27,8 +27,6 @@ class KeyFrames:
 
     Parameters
     ----------
-    asked:
-        The numbers of all its frames, those among them that an earlier run finished.
     display:
         The display.
     moment:
@@ -39,12 +37,10 @@ class KeyFrames:
 
     def __init__(
         self,
-        asked: Container[int],
         display: Display,
         moment: Callable[[int], Moment],
         render: Callable[[Moment], Provenance],
     ) -> None:
-        self._asked = asked
         self._display = display
         self._moment = moment
         self._render = render
@@ -59,19 +55,21 @@ class KeyFrames:
         """How the key frame was made that stands for the error of a frame; None where the frame tells its own.
 
         Frames tell their own error where the samples, a quality or a time were asked for, where noise stands still,
-        where the key frame's picture is no denoised one or is not asked for, and after a cut.
+        where the key frame's picture is no denoised one, and after a cut. A key frame that is missing is rendered.
         """
         key = key_of(moment.number)
         is_open = request.spp is None and not request.is_open_ended and request.effort == "normal"
-        if key == moment.number or key not in self._asked or not is_open or request.fixed_noise:
+        if key == moment.number or not is_open or request.fixed_noise:
             return None
-        if self._last is None or self._last[0].number != key:
-            finished = self._moment(key)  # by an earlier run
-            self.add(finished, self._render(finished))
-        assert self._last is not None
-        last, made = self._last
-        is_judged = made.estimate is not None and "by_chance" in made.estimate
-        return made if is_judged and not is_cut(last, moment, self._display) else None
+        last, made = self._last or (None, None)
+        if last is None or last.number != key:
+            last, made = self._moment(key), None
+        if is_cut(last, moment, self._display):
+            return None
+        if made is None:
+            made = self._render(last)
+            self.add(last, made)
+        return made if made.estimate is not None and "by_chance" in made.estimate else None
 
 
 def key_of(frame: int) -> int:
