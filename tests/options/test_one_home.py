@@ -48,7 +48,7 @@ def sample(each, its):
     if float in kinds:
         return min(max(its.low, 0.5), its.high)
     if int in kinds:
-        return 2
+        return 2048 if each.name == "memory" else 2
     if bool in kinds:
         return not default
     parts = next((get_args(kind) for kind in kinds if get_origin(kind) is tuple), None)
@@ -62,6 +62,8 @@ def words_of(each, its, value):
     flag = its.flag_of(each.name)
     if isinstance(value, bool):
         return [flag]
+    if each.name == "memory":
+        return [flag, f"{value >> 10}K"]
     if isinstance(value, dict):
         return [flag, *(f"{name}={choice}" for name, choice in value.items())]
     return [flag, ",".join(map(str, value)) if isinstance(value, tuple) else str(value)]
