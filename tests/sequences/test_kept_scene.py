@@ -106,6 +106,14 @@ class Cut(Motion):
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
 
+def test_a_scene_that_stays_as_it_is_is_built_once(engine, display, builds):
+    """As in a flight, with a light source that is a shape."""
+    scene = teapot(lights=[light_source(radius=1.0)])
+    first, second = render_sequence(Cut(scene, scene), display, [0, 1], fixed_noise=True, **QUICK)
+    assert len(builds) == 1
+    assert np.array_equal(first[1].pixels, second[1].pixels)
+
+
 @pytest.mark.parametrize("change", ["surfaces", "object", "light", "dark"])
 def test_a_film_after_a_cut_is_one_that_begins_there(engine, display, change):
     scene = teapot(environment=sky(), lights=[light_source()])

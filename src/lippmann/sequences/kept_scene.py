@@ -29,6 +29,8 @@ class KeptScene:
 
         if self._last is None:
             built = build(scene, engine, memory=memory)
+        elif self._last[0] is scene:
+            built = self._last[1]
         elif _differs_by_light(self._last[0], scene):
             built = self._last[1]
             environment = scene.environment
@@ -45,8 +47,6 @@ class KeptScene:
 
 def _differs_by_light(one: Scene, other: Scene) -> bool:
     """Whether two scenes are alike but for the places of their light: none that a shape gives, which is built in."""
-    if one is other:
-        return True
     return one.physical is other.physical and one.light == other.light and not any(light.radius for light in one.lights)
 
 
