@@ -7,7 +7,6 @@ stands behind the lens, not the colour behind its middle.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields, replace
 
 from lippmann.display import Display
@@ -93,9 +92,8 @@ class WholeLensDisplay(Display):
         (origin_x, origin_y, origin_z), direction = super().light_ray(x, y, ops)
         _, v = self.pixel_coordinates(x, y)
         aside = (v - ops.floor(v) - 0.5) * self.lens_array.pitch
-        slant = math.radians(self.lens_array.slant)
-        origin = origin_x + aside * math.cos(slant), origin_y - aside * math.sin(slant), origin_z
-        return origin, direction
+        aside_x, aside_y = self.lattice.from_axes(aside, 0.0)
+        return (origin_x + aside_x, origin_y + aside_y, origin_z), direction
 
 
 def finer_display(display: Display) -> WholeLensDisplay:

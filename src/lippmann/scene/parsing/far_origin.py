@@ -30,9 +30,9 @@ def near_origin(positions: NDArray[np.float64], notes: list[str]) -> NDArray[np.
         return positions
     middle = np.median(sample, axis=0)
     extent = np.percentile(np.abs(sample - middle).max(axis=1), 90)
-    if not 0 < FAR * extent < np.abs(middle).max():
+    offset = _far_offset(middle, extent)
+    if offset is None:
         return positions
-    offset = np.round(middle) if extent > 1 else middle
     notes.append(_note(offset))
     return positions - offset
 
@@ -53,10 +53,9 @@ def moved_near_origin(description: SceneDescription) -> SceneDescription:
             halves = np.abs(worlds[:, :3, :3]) @ ((most - least) / 2.0)
             low = np.minimum(low, (middles - halves).min(axis=0))
             high = np.maximum(high, (middles + halves).max(axis=0))
-    middle, extent = (low + high) / 2, (high - low).max() / 2
-    if not 0 < FAR * extent < np.abs(middle).max():
+    offset = _far_offset((low + high) / 2, (high - low).max() / 2)
+    if offset is None:
         return description
-    offset = np.round(middle) if extent > 1 else middle
     move = np.eye(4)
     move[:3, 3] = -offset
     return replace(
@@ -66,6 +65,13 @@ def moved_near_origin(description: SceneDescription) -> SceneDescription:
         lights=[replace(each, world_from_light=move @ each.world_from_light) for each in description.lights],
         notes=[*description.notes, _note(offset)],
     )
+
+
+def _far_offset(middle: NDArray[np.float64], extent: float) -> NDArray[np.float64] | None:
+    """``middle``, in whole units where ``extent`` is larger than one; None where it is not far from the origin."""
+    if not 0 < FAR * extent < np.abs(middle).max():
+        return None
+    return np.round(middle) if extent > 1 else middle
 
 
 def _note(offset: NDArray[np.float64]) -> str:

@@ -49,8 +49,9 @@ def main() -> None:
 def _read(request: dict[str, Any]) -> dict[str, NDArray[np.generic]]:
     notes: list[str] = []
     elements, positions = _atoms(request["path"], notes)
-    of_each = [gemmi.Element(int(number)) for number in elements]
-    radii = np.array([(each.covalent_r, each.vdw_r) for each in of_each], np.float64)
+    numbers, of_atoms = np.unique(elements, return_inverse=True)
+    kinds = [gemmi.Element(int(number)) for number in numbers]
+    radii = np.array([(each.covalent_r, each.vdw_r) for each in kinds], np.float64).reshape(-1, 2)[of_atoms]
     return {"elements": elements, "positions": positions, "radii": radii, "notes": np.array(notes, np.str_)}
 
 
