@@ -29,7 +29,7 @@ LinearRows = Callable[[int, int], FloatArray]
 
 @dataclass(frozen=True)
 class Finish:
-    """What is done to a picture for its print.
+    """Steps that prepare a picture for print.
 
     Parameters
     ----------

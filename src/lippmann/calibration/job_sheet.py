@@ -23,7 +23,7 @@ _INCH = 25.4
 #: A4 in inches: portrait.
 _PAGE = (210 / _INCH, 297 / _INCH)
 
-#: Where the table's values begin, and the page's text, in shares of its width.
+#: Left edges of the page's text and of the table's values, in shares of its width.
 _LEFT, _VALUES = 0.1, 0.36
 
 #: Points; and lines a page over the height of one.
@@ -66,7 +66,7 @@ def job_facts(display: Display, file: str) -> list[tuple[str, str]]:
 
 
 def job_steps(sheet: Sheet) -> list[str]:
-    """What is done with a sheet, in order: ink on paper behind the lenses, or on the back of the lenses themselves."""
+    """Steps of making the print, in order: ink on paper behind the lenses, or on the back of the lenses themselves."""
     dark = "until the strips above and below the picture are evenly dark" if sheet.margin else "until no bars are seen"
     cut = ["Cut at the cutting lines."] if sheet.margin else ["Cut the bleed away."] if sheet.bleed else []
     if sheet.mirrored:

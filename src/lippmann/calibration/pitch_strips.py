@@ -32,7 +32,7 @@ _LABEL = 6.0
 #: Width of the white margin in mm: more than desktop printers leave out; at most so much of the print's shorter side.
 _MARGIN, _MARGIN_SHARE = 5.0, 0.1
 
-#: What the label of the expected strip says after its pitch.
+#: Word after the pitch in the label of the expected strip.
 _EXPECTED = "expected"
 
 #: Height of the white line between strips over that of a strip.

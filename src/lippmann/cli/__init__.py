@@ -37,7 +37,7 @@ def main(arguments: list[str] | None = None) -> None:
     ends = [number for number, default in _ENDS if _signal.getsignal(number) == default]
     _hear(ends, _leave_early)
     code = 1  # of a traceback, with --debug
-    # What is registered first is called last: no one else has to hear of the end, and no caller goes on.
+    # The function registered first is called last: no one else has to hear of the end, and no caller goes on.
     if arguments is None and atexit._ncallbacks() == 0:
         atexit.register(lambda: _end_at_once(code))
     # NumPy's threads would wait for work with the processor at full load, and what they are given is small.

@@ -1,4 +1,4 @@
-"""What a command ends with: its exit code, and one line for an error.
+"""The end of a command: its exit code, and one line for an error.
 
 0 is success, 1 a failure of the program or the machine, 2 bad input, 130 Ctrl-C.
 """
@@ -70,7 +70,7 @@ def _report_error(error: Exception) -> int:
     return _leave(f"internal error: {what}; run again with --debug and report it", 1)
 
 
-#: What libraries say where no memory is left, beside MemoryError.
+#: Messages of libraries where no memory is left, beside MemoryError.
 _NO_MEMORY = re.compile(
     r"bad_alloc|can't start new thread|cannot allocate memory|failed to map segment|out of memory", re.IGNORECASE
 )
@@ -114,7 +114,7 @@ _NOT_LISTED = re.compile(r"Invalid value for '(--[\w-]+)'.*: (?:Value error, )?(
 #: How typer refuses a group of commands without one of them, and a word that is like none.
 _NO_COMMAND = re.compile(r"Missing command\.|No such command '[^']*'\.")
 _NO_SUCH = re.compile(r"No such option: (--[\w-]+)")
-#: What people ask for by names that other programs have for it.
+#: Options by the names that other programs give them.
 _OTHER_NAMES = {
     "--dpi": "it is called --ppi here, pixels per inch",
     "--samples": "it is called --spp here, samples per pixel",

@@ -43,7 +43,7 @@ _LARGEST_FREE_TILE = 1 << 20
 
 @dataclass(frozen=True)
 class ExrHeader:
-    """What an EXR says of itself.
+    """The header of an EXR.
 
     Attributes
     ----------
@@ -207,7 +207,7 @@ def _in_display_window(plane: Pixels, header: ExrHeader) -> Pixels:
 
 
 def _overlap(first: int, count: int, size: int) -> tuple[slice, slice]:
-    """What ``count`` stored places from number ``first`` on share with 0 to ``size``: there, and in store."""
+    """Overlap of ``count`` stored places from number ``first`` on with 0 to ``size``: in the picture, and in store."""
     start = min(max(first, 0), size)
     stop = max(min(first + count, size), start)
     return slice(start, stop), slice(start - first, stop - first)

@@ -1,4 +1,4 @@
-"""What of a picture file is not shown, in one line each."""
+"""Notes on parts of a picture file that are not shown, one line each."""
 
 from __future__ import annotations
 

@@ -35,13 +35,13 @@ FORMATS = {
     "TGA": "TGA",
 }
 
-#: What Pillow calls a JPEG file with several pictures, of which the first is taken.
+#: Pillow's name for a JPEG file with several pictures, of which the first is taken.
 _SEVERAL = "MPO"
 
 #: The tag of PhotometricInterpretation.
 _PHOTOMETRIC = 262
 
-#: What Pillow holds of a pixel in four channels, and as much again in the array that is made of it.
+#: Bytes of a pixel: four channels in Pillow's memory, and as much again in the array that is made of them.
 BYTES_PER_PIXEL = 8
 
 #: The rule that a refusal quotes.

@@ -43,7 +43,7 @@ _CHANNELS = {0: 1, 2: 3, 3: 3, 4: 2, 6: 4}
 
 @dataclass(frozen=True)
 class PngHeader:
-    """What a PNG says of itself beside its pixels.
+    """Facts in a PNG beside its pixels.
 
     Attributes
     ----------

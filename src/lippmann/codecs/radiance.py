@@ -32,7 +32,7 @@ _PRIMARIES = (0.640, 0.330, 0.290, 0.600, 0.150, 0.060, 1.0 / 3.0, 1.0 / 3.0)
 
 @dataclass(frozen=True)
 class RadianceHeader:
-    """What a Radiance picture says of itself.
+    """The header of a Radiance picture.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the name of a picture with colour beside depth says of it: ``photo_rgbd.png``, ``photo_rgbd-half-far.png``."""
+"""Forms of colour beside depth in files' names: ``photo_rgbd.png``, ``photo_rgbd-half-far.png``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-#: What is white: near or far.
+#: The end of the depth range that is white: near or far.
 White = Literal["near", "far"]
 
 _NAME = re.compile(r"_rgbd(-half)?(-far)?$", re.IGNORECASE)

@@ -41,7 +41,7 @@ _QUICK_LEVEL = 1
 #: Bytes compressed at a time, shared out over the cores.
 _BUFFER = 1 << 26
 
-#: What the library stumbles with over damaged tags, beside its own error.
+#: Exceptions of the library for damaged tags, beside its own.
 _LIBRARY_ERRORS = (
     ArithmeticError,
     AttributeError,

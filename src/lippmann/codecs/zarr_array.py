@@ -23,7 +23,7 @@ ENDING = ".zarr"
 MARKS = ("zarr.json", ".zarray", ".zgroup")
 
 DIMENSIONS = ["row", "column", "color"]
-#: What other programs call an axis that runs across the picture, and so cannot be the first.
+#: Other programs' names for an axis that runs across the picture, and so cannot be the first.
 _ACROSS = ("x", "column", "columns", "width")
 
 #: Compression: higher levels save little of rendered pictures.

@@ -59,7 +59,7 @@ _FIELDS_3 = (
 
 @dataclass(frozen=True)
 class ArrayMetadata:
-    """What an array says of itself, admitted.
+    """Checked metadata of an array.
 
     Attributes
     ----------
@@ -181,7 +181,7 @@ def _version_3(values: Document, check: _Check) -> ArrayMetadata:
 
 
 def _codecs_3(value: object, chunks: tuple[int, ...], check: _Check, *, inside: bool = False) -> tuple[str, int]:
-    """What unpacks a chunk first, and how many chunks it holds; ``inside`` that of a shard."""
+    """Name of the compressor, empty without one, and number of chunks in a file; ``inside``: codecs of a shard."""
     packing, count = "", 1
     for entry in check.list_of("codecs", value):
         name, settings = check.named("codec", entry, CODECS)

@@ -24,7 +24,7 @@ from lippmann.runtime.machine import check_input
 
 #: Bytes of a file of metadata; a light field of ours has some thousand.
 _MOST_METADATA = 1 << 22
-#: What a packed chunk may have beyond its values: headers, check sums, the places of 16 bytes in a shard.
+#: Bytes that a packed chunk may have beyond its values: headers, check sums, the places of 16 bytes in a shard.
 _SLACK = 1 << 16
 _SLACK_PER_CHUNK = 64
 
@@ -85,7 +85,7 @@ def read_attributes(folder: Path) -> Attributes:
 
 
 def read_array_metadata(folder: Path, root: Path | None = None) -> ArrayMetadata:
-    """What an array says of itself, admitted by :func:`lippmann.codecs.zarr_metadata.admitted`.
+    """Metadata of an array, checked by :func:`lippmann.codecs.zarr_metadata.admitted`.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def _buffer(data: bytes) -> Any:
 
 
 class _Files(MutableMapping[str, Any]):
-    """What the library sees of an array's folder, by name; it cannot be changed."""
+    """The files of an array's folder by name, as the library sees them; they cannot be changed."""
 
     def __init__(self, folder: Path, metadata: ArrayMetadata, root: Path, wrapped: Callable[[bytes], Any]) -> None:
         self._folder = folder

@@ -111,7 +111,7 @@ def linear_levels(dtype: np.dtype[np.uint8] | np.dtype[np.uint16], transfer: Tra
 
 #: Reflectance of a surface of index 1.5 head on.
 FRESNEL = 0.04
-#: Where compression begins, after that is taken off, and how fast bright colours turn white.
+#: Value, after that is taken off, at which compression begins; and how fast bright colours turn white.
 COMPRESSED_FROM = 0.8 - FRESNEL
 DESATURATION = 0.15
 #: Share of a value by which it is changed for the slope of the tone map; the least change that says anything.

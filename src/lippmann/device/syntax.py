@@ -51,7 +51,7 @@ def _transform(kernel: FunctionType) -> Callable[..., Any]:
     code = _read(kept, key)
     if code is None:
         made = cast("FunctionType", transform_syntax(kernel))
-        # Where nothing can be kept, each process transforms the kernel.
+        # Each process transforms the kernel anew if no file can be written.
         with contextlib.suppress(OutputError):
             if not sys.dont_write_bytecode:
                 with replacing(kept) as unfinished:

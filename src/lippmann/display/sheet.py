@@ -13,7 +13,7 @@ SRGB = "sRGB"
 
 @dataclass(frozen=True)
 class Sheet:
-    """What lies around a finished print, and how the sheet is printed.
+    """The margin of a finished print, and how the sheet is printed.
 
     Parameters
     ----------

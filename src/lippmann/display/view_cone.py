@@ -81,7 +81,7 @@ def view_window(corners: NDArray[np.float64], display: Display, view_size: tuple
     """
     if not np.isfinite(corners).all():
         return None
-    # What stands in front of where rays begin is not seen.
+    # Rays begin at the aperture: they cannot meet what stands in front of it.
     z = np.minimum(corners[:, 2], display.aperture_distance)
     nearness = 1 - z / display.viewing_distance
     side = cone_tangent(display) * np.array([[-1.0], [1.0]])

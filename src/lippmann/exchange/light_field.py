@@ -34,7 +34,7 @@ Shape = tuple[int, int, int, int]
 
 #: Limit on pixels of all views together: a light field is held in memory as a whole.
 MOST_PIXELS = 1 << 29
-#: What a light field takes at least, while it is read: colours of one byte.
+#: Least memory of a light field while it is read: colours of one byte.
 _BYTES_PER_PIXEL = 3
 
 #: Name of the map with the confidence weight of each value, 0 to 1: the fourth channel of LFToolbox and ESLF.

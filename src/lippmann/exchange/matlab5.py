@@ -146,7 +146,7 @@ def _tag(content: bytes | memoryview, at: int, order: str) -> tuple[int, int, in
 
 
 def _after(start: int, size: int) -> int:
-    """Where the next element begins: elements are padded to eight bytes."""
+    """Offset of the next element: elements are padded to eight bytes."""
     return -(-(start + size) // 8) * 8
 
 

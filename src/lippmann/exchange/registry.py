@@ -19,7 +19,7 @@ FilmOption = Literal["codec", "quilt", "place"]
 
 
 class Export(Extension):
-    """What an entry point of ``lippmann.exports`` names: a :class:`Layout` or a :class:`Film`."""
+    """The object that an entry point of ``lippmann.exports`` names: a :class:`Layout` or a :class:`Film`."""
 
     group: ClassVar[str] = "lippmann.exports"
 

@@ -64,7 +64,7 @@ def similarity_sum(
     mean_a, mean_b, squares, products = (_windowed(each, windows) for each in (a, b, a * a + b * b, a * b))
     centred = None
     if mask is not None:
-        # What does not exist weighs nothing. A window without any weight is not centred on a value and does not count.
+        # Missing values weigh nothing. A window without any weight is not centred on a value and does not count.
         centred = mask[_centres(mask, windows)]
         weights = np.where(centred, _windowed(mask.astype(np.float64), windows), 1.0)[..., None]
         mean_a, mean_b, squares, products = (each / weights for each in (mean_a, mean_b, squares, products))

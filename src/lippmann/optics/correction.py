@@ -103,7 +103,7 @@ class LensCorrection:
         return self._rows.squared_errors(pictures, _clipped(parts), first, there)
 
     def describe(self, pixels: Floats, parts: Sequence[Floats], first: int = 0) -> tuple[dict[str, object], str]:
-        """What a file says of corrected ``pixels``, and a line for people."""
+        """Metadata of corrected ``pixels``, and a line for people."""
         gains = self.gains(pixels, parts, first)
         limited = float(np.mean((pixels <= 0.0) | (pixels >= 1.0)))
         options: dict[str, object] = {"correct": "lens", "correction_limited": limited}

@@ -94,7 +94,7 @@ def true_directions(lens: Lens) -> TrueDirections:
 
 @lru_cache(maxsize=64)
 def distortion_of(profile: LensProfile, lenses: LensArray, gap: float) -> Distortion:
-    """What such lenses do to the directions of a pinhole at the gap."""
+    """The change that such lenses make to the directions of a pinhole at the gap."""
     directions = true_directions(Lens(profile, lenses))
     places = directions.places[_PLACES:]
     factors = -gap * directions.slopes[_PLACES:] / places

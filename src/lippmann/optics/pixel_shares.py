@@ -1,4 +1,4 @@
-"""What an eye sees through real lenses: the pixels under each lens, weighted by the light that they send to it."""
+"""An eye's picture through real lenses: the pixels under each lens, weighted by the light that they send to it."""
 
 from __future__ import annotations
 

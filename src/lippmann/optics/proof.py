@@ -27,7 +27,7 @@ THICKER = 1.03
 #: Dot gain that is tried on prints: standard deviation of the blur, in pixels.
 DOT_GAIN = 0.5
 
-#: Where crosstalk is given beside the middle: share of half the zone.
+#: Place beside the middle for which crosstalk is given: share of half the zone.
 _ASIDE = 0.5
 
 
@@ -43,7 +43,7 @@ class ThickerSheet:
 
 @dataclass(frozen=True)
 class PrintTolerances:
-    """What goes wrong with prints.
+    """Production errors of prints.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class PrintTolerances:
 
 @dataclass(frozen=True)
 class Proof:
-    """What a display will show. Lengths in millimetres, angles in degrees, crosstalk as a share of the light.
+    """The proof of a display. Lengths in millimetres, angles in degrees, crosstalk as a share of the light.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class Proof:
     advice: str
 
     def in_words(self) -> dict[str, str]:
-        """What people want to know of it, by name, in the order of a table."""
+        """The proof's results by name, in the order of a table."""
         rule = "" if self.rule_of_depth is None else f" (rule of the trade: {self.rule_of_depth:.3g} mm)"
         extreme = self.field_of_extreme_ray
         words = {
@@ -259,7 +259,7 @@ def _tolerances(display: Display, depth: float) -> PrintTolerances:
 
 
 def _advice(display: Display, straight: float, depth: float, tolerances: PrintTolerances | None) -> str:
-    """What to change, in one line: crosstalk first, then pixels that the lens does not tell apart or could."""
+    """Advice in one line: on crosstalk first, then on pixels that the lens does not tell apart, or could."""
     keep = f"keep the scene within {0.5 * depth:.3g} mm before and behind the lenses"
     if display.lens is None:
         return f"{keep}; with the table [lens] of a display file, or thickness= of a print, the true lens is proved"

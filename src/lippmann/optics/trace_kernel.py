@@ -19,7 +19,7 @@ Real = NDArray[np.float64]
 def _light_through(
     x: float, y: float, slope_x: float, slope_y: float, shape: Real, crests: Real
 ) -> tuple[float, float, float]:
-    """Where a ray through a point of the lens lands, relative to its axis, and its light.
+    """Landing place of a ray through a point of the lens, relative to the lens's axis, and the ray's light.
 
     ``shape`` holds crest radius, thickness, index, conic constant, reach and rim of the crest, and whether it bends
     light along y. ``crests`` are the centres of the lens and its neighbours.

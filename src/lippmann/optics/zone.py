@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ViewingZone:
-    """Where the whole display shows one set of views.
+    """Region from which the whole display shows one set of views.
 
     Attributes
     ----------

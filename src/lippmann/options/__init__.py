@@ -1,1 +1,1 @@
-"""What a render can be asked for, each option once: command line, Python, studio and files are made from these."""
+"""Options of a render, each defined once: command line, Python, studio and files are made from these."""

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Literal
 
-#: What is made of a request: a picture in one piece, one in tiles, a quilt, a forecast, a camera's plain picture.
+#: The form of a request's result: a picture in one piece, one in tiles, a quilt, a forecast, a camera's plain picture.
 Form = Literal["picture", "tiles", "quilt", "forecast", "preview"]
 
 _GOALS = ("quality", "quality_worst", "max_time")

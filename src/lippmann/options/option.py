@@ -31,7 +31,7 @@ _OPTION = re.compile(r"`(\w+)`")
 
 @dataclass(frozen=True)
 class Option:
-    """What is known of an option beside its name, its type and its default.
+    """Facts of an option beside its name, its type and its default.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def _own_number(value: object) -> object:
 class Options:
     """Base of what is asked for: every option is checked by itself."""
 
-    #: What they are options of, and the keyword that takes them all, for errors.
+    #: Name of the thing that the options belong to, and the keyword that takes them all, for errors.
     noun: ClassVar[str] = "render"
     keyword: ClassVar[str] = ""
 

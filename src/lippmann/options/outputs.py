@@ -1,4 +1,4 @@
-"""What is written, what moves in it, and which machines render it."""
+"""Options of the output: its files, the motion in it, and the machines that render it."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -8,7 +8,7 @@ from typing import Literal
 from lippmann.errors import UsageError
 from lippmann.options.option import Options, option
 
-#: What a film shows of each frame.
+#: The part of each frame that a film shows.
 Shows = Literal["eye", "native", "rgbd", "rgbd-half", "hololuminescent"]
 
 #: Endings of outputs that are films themselves; ``.png`` stays a picture's.
@@ -20,7 +20,7 @@ _cluster = partial(option, default=None, group="Cluster")
 
 @dataclass(frozen=True)
 class AccessOptions(Options):
-    """What a scene's file may do. No file of settings can say it."""
+    """Permissions of a scene's file. No file of settings can give them."""
 
     allow_outside: bool = option(False, "Let a scene file refer to files outside its own folder.", group="Scene")
 
@@ -92,7 +92,7 @@ class SequenceOptions(Options):
         return False
 
     def with_film(self, output: Path) -> tuple["SequenceOptions", Path]:
-        """Where ``output`` is a film, it becomes the film of frames in a folder beside it, ``NAME-frames``.
+        """An ``output`` that is a film becomes the film of frames in a folder beside it, ``NAME-frames``.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Where a display stands in a scene."""
+"""Options of the display's place in the scene."""
 
 import contextlib
 from dataclasses import dataclass

@@ -33,7 +33,7 @@ class PrintOptions(Options):
 
 @dataclass(frozen=True)
 class FinishOptions(Options):
-    """What is done to the picture of a print."""
+    """Steps that prepare a picture for print."""
 
     bleed: str | None = _print(
         help="Of a print: go on by this width beyond every edge, such as 3mm; it is cut off.", first=True

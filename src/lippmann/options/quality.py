@@ -165,7 +165,7 @@ class QualityOptions(Options):
 
 @dataclass(frozen=True)
 class MachineOptions(Options):
-    """What a render runs on.
+    """Resources that a render runs on.
 
     Raises
     ------

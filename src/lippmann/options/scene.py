@@ -1,4 +1,4 @@
-"""What is read of a scene, and what stands around it."""
+"""Options of a scene: the parts that are read of it, and its surroundings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ _light = partial(option, group="Light")
 
 @dataclass(frozen=True)
 class SceneOptions(Options):
-    """What is read of a scene's file, and what stands around it. The reader checks what goes with which file."""
+    """Options of a scene's file and of its surroundings. Each reader checks which of them its files have."""
 
     noun = "scene"
 
@@ -127,6 +127,6 @@ class SceneKeywords(TypedDict, total=False):
 
 
 class LoadKeywords(SceneKeywords, total=False):
-    """What :func:`lippmann.load_scene` takes."""
+    """Options of :func:`lippmann.load_scene`."""
 
     allow_outside: bool

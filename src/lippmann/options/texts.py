@@ -40,7 +40,7 @@ def toml_of(value: object) -> str:
 
 
 def settings_of(options: Options) -> list[str]:
-    """What a picture's metadata say of options: ``name = value`` in TOML, without defaults and folders of files."""
+    """Options as a picture's metadata hold them: ``name = value`` in TOML, without defaults and folders of files."""
     lines = []
     for each, its in options_of(type(options)):
         value = getattr(options, each.name)

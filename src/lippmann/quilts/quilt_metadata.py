@@ -13,7 +13,7 @@ from lippmann.quilts.quilt import Quilt, QuiltLayout, checked_layout
 
 
 class QuiltMetadata(NamedTuple):
-    """What a quilt's file says of itself.
+    """A quilt's metadata, as its file holds them.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Where the views of a folder belong, by the numbers in their files' names.
+"""Places of a folder's views, by the numbers in their files' names.
 
 Numbers that all names share say nothing. Of the others the last one counts the views, or the last two side by side are
 row and column, where rows and columns repeat. Folders of the 4D Light Field Benchmark count row by row, in rows as long

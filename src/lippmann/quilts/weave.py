@@ -173,7 +173,7 @@ class Weaving:
         return self._correction.rows(self._parts(start, stop), start)[first - start : last - start]
 
     def describe_correction(self) -> tuple[dict[str, object], tuple[str, ...]]:
-        """What a file says of the correction, and lines for people: of the rows about the middle."""
+        """Metadata of the correction, and lines for people: both of the rows about the middle."""
         if self._correction is None:
             return {}, ()
         from lippmann.optics.correction import report_rows

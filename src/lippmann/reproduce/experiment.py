@@ -17,7 +17,7 @@ from lippmann.image import IntegralImage
 from lippmann.metrics import Comparison, compare
 from lippmann.progress import Progress, ProgressCallback, silent
 
-#: What progress reports call this work.
+#: Name of this work in progress reports.
 STAGE = "reproducing the paper"
 
 
@@ -63,7 +63,7 @@ class Variant:
 #: The methods that reuse points.
 METHODS = ("lens-view", "interpolated")
 
-#: What all others are compared with.
+#: The variant with which all others are compared.
 REFERENCE = Variant("full")
 
 #: Every way that is measured.
@@ -77,7 +77,7 @@ Renderer = Callable[[str, Variant], IntegralImage]
 
 @dataclass(frozen=True)
 class Experiment:
-    """What is rendered, and how often.
+    """The experiment: its pictures, and how often each is rendered.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ def _conditions(results: Results) -> str:
 
 
 def _facts(results: Results, manner: Manner) -> Markup:
-    """What one wants to know first of interpolation in one manner."""
+    """Main results of interpolation in one manner."""
     runs = [results.of(scene, Variant("interpolated", manner).key) for scene in results.runs]
     qualities = [tables.comparison(run) for run in runs]
     least = min(one.paper.mean_psnr for one in qualities)
@@ -126,7 +126,7 @@ def _promise(results: Results) -> list[Markup]:
 
 
 def _slowdowns(results: Results) -> Markup:
-    """What each way of reusing points did to the time, said as it is."""
+    """The change in time by each way of reusing points, gains and losses alike."""
     lines = []
     for variant in COMPARED:
         shares = [results.of(scene, variant.key).time_share for scene in results.runs]

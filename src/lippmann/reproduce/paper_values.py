@@ -1,4 +1,4 @@
-"""What the 2014 paper prints, as far as this project knows it. Nothing here is measured."""
+"""Values that the 2014 paper prints, as far as this project knows them. Nothing here is measured."""
 
 from __future__ import annotations
 

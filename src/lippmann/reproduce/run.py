@@ -23,7 +23,7 @@ from lippmann.scene.scene import Scene
 if TYPE_CHECKING:
     from lippmann.options.choices import Device, Method, Order
 
-#: What :func:`reproduce` writes.
+#: Files that :func:`reproduce` writes.
 PAGE, FIGURES = "report.html", "results.json"
 TABLE_CSV, TABLE_LATEX = "results.csv", "results.tex"
 

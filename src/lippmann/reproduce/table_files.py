@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from lippmann.reproduce.experiment import Results
 from lippmann.reproduce.tables import comparison, decibels, in_words
 
-#: What LaTeX reads as more than a character.
+#: Characters with a meaning in LaTeX, escaped.
 _LATEX = str.maketrans({"&": r"\&", "%": r"\%", "_": r"\_", "#": r"\#", "$": r"\$", "{": r"\{", "}": r"\}"})
 
 HEAD = (

@@ -115,7 +115,7 @@ def quality_table(results: Results, manner: Manner) -> Markup:
 
 
 def gloss_table(results: Results, method: str) -> Markup:
-    """What respecting gloss costs and gains in the default order, for one method."""
+    """Cost and gain of respecting gloss in the default order, for one method."""
     keys = [Variant(method, manner).key for manner in (Manner.DEFAULT, Manner.GLOSS)]
     rows = []
     for scene in results.runs:

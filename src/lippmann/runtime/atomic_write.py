@@ -34,14 +34,14 @@ from lippmann.runtime.folder_list import CONTENTS_FILE, listed, write_list
 #: Bytes of a name that are kept.
 _KEPT = 64
 
-#: What names of files cannot hold.
+#: Characters that names of files cannot hold.
 _NOT_ON_DISK = dict.fromkeys(map(ord, '/\\:*?"<>|' if os.name == "nt" else "/"), "_")
 
 #: The number, for patterns: machine, process, random digits.
 NUMBER = "[0-9a-f]{20}"
 
 
-#: What is begun and not finished, and how to undo it.
+#: Work that is begun and not finished, and how to undo it.
 _undos: dict[object, Callable[[], None]] = {}
 _remark = ""
 
@@ -87,7 +87,7 @@ def remark(text: str) -> None:
 
 
 def last_remark() -> str:
-    """What was noted last; empty if nothing was."""
+    """The last remark; empty if there was none."""
     return _remark
 
 
@@ -396,7 +396,7 @@ def _reported(path: Path, temporary: Path) -> Iterator[None]:
 
 
 def reason_and_fix(error: OSError) -> tuple[str, str]:
-    """What a system's error means in words, and what helps; empty if nothing is known to."""
+    """Meaning of a system's error in words, and its remedy; empty if none is known."""
     said = str(error).lower()  # libraries quote the system in errors without a number
     number = error.errno or next((each for each in _REASONS if os.strerror(each).lower() in said), 0)
     return _REASONS.get(number, (error.strerror or str(error), ""))

@@ -295,7 +295,7 @@ def diagnose(device: DeviceChoice = "auto") -> Diagnosis:
 
 
 def _check_extras() -> list[Check]:
-    """What the package's extras add: installed, or how to install it."""
+    """Packages of the extras: the installed version of each, or how to install it."""
     from importlib.metadata import PackageNotFoundError, requires, version  # slow to import
 
     missing: dict[str, list[str]] = {}

@@ -88,7 +88,7 @@ class HelperProcess:
                 raise
 
     def ask_arrays(self, path: Path, **request: object) -> dict[str, NDArray[np.generic]]:
-        """What a process of :func:`serve_arrays` finds in a file, by name; errors as of :meth:`ask`."""
+        """Arrays that a process of :func:`serve_arrays` reads from a file, by name; errors as of :meth:`ask`."""
         import numpy as np
 
         message = {"path": str(path.resolve()), "memory": input_memory_left(), **request}
@@ -196,7 +196,7 @@ def serve_arrays(read: Callable[[dict[str, Any]], Mapping[str, NDArray[np.generi
 
 
 def _words(error: Exception, path: str) -> str:
-    """What an error says in one line, without the folder of the file."""
+    """An error's text in one line, without the folder of the file."""
     if isinstance(error, MemoryError):
         return "it takes more memory than is left"
     try:

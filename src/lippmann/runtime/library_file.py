@@ -1,4 +1,4 @@
-"""Where LLVM's libraries may lie, and what the head and the name of such a file say."""
+"""Places where LLVM's libraries may lie, and the facts in the head and the name of such a file."""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ def inspect(path: Path) -> Library:
         return Library(path, problem=f"cannot be read ({error.strerror})")
     if sys.platform.startswith("linux") and kind != elf_head():
         return Library(path, problem="is not a shared library for this processor")
-    # What its name does not say is asked of the library.
+    # The library is asked for the version that its name does not give.
     match = VERSION_IN_NAME.match(path.name)
     version = tuple(int(part) for part in match[1].split(".")) if match else _ask(path)
     if not version:

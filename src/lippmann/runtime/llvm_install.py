@@ -50,7 +50,7 @@ class Remedy:
 
 @dataclass(frozen=True)
 class Tools:
-    """What a remedy depends on beside the host.
+    """Facts beside the host on which a remedy depends.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What this process may use: cores, memory, what input files may take of it, and an NVIDIA GPU."""
+"""Resources of this process: cores, memory, the part of it that input files may take, and an NVIDIA GPU."""
 
 from __future__ import annotations
 

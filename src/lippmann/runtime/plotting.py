@@ -47,7 +47,7 @@ def import_matplotlib() -> None:
 
 
 def _own_settings() -> Path:
-    """Where Matplotlib's own settings lie, found without importing it."""
+    """Folder of Matplotlib's own settings, located without importing it."""
     package = importlib.util.find_spec("matplotlib")
     assert package is not None
     assert package.origin is not None

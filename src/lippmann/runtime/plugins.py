@@ -20,7 +20,7 @@ P = TypeVar("P", bound="Extension")
 
 
 class Extension:
-    """What an entry point names."""
+    """The object that an entry point names."""
 
     #: Its group of entry points.
     group: ClassVar[str]
@@ -30,7 +30,7 @@ class Extension:
         return (name,)
 
     def fault(self) -> str:
-        """What is wrong with its fields; nothing if all is well."""
+        """The fault in its fields; empty if all is well."""
         return ""
 
 
@@ -134,7 +134,7 @@ class Door(Generic[P]):
 
     @property
     def problems(self) -> str:
-        """What broken plugins of other packages suffer from, for the error of an unknown word."""
+        """Problems of other packages' broken plugins, for the error of an unknown word."""
         broken = [f"the plugin {each} is broken ({each.problem})" for each in self.plugins if each.problem]
         return ", and ".join(broken)
 

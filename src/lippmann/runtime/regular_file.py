@@ -16,12 +16,12 @@ _KINDS = (
     (stat.S_ISSOCK, "a socket"),
 )
 
-#: What a file begins with that Git Large File Storage has not fetched, and how large such a pointer can be, bytes.
+#: First bytes of a pointer that Git Large File Storage left in a file's place, and a pointer's largest size in bytes.
 _LFS_POINTER, _LFS_MOST = b"version https://git-lfs.github.com/spec/", 1024
 
 
 def other_kind(path: str | os.PathLike[str]) -> str | None:
-    """What ``path`` is, wherever links lead, in place of a plain file; None for such a file, or for nothing at all.
+    """The kind of ``path``, wherever links lead, if it is no plain file; None for a plain file, or for nothing at all.
 
     It is not opened: that alone would wait for whoever writes into a pipe.
     """

@@ -1,4 +1,4 @@
-"""Where a display stands that is placed by a camera, so that it shows all that the camera sees.
+"""Placement of a display by a camera, so that it shows all that the camera sees.
 
 Recorded rays begin at the display's aperture distance in front of the lens plane. What a camera sees nearer than that
 would be cut open; the lens plane therefore moves toward the eye until nothing is.
@@ -31,7 +31,7 @@ FILL, _LEAST_FILL, _FRAMINGS = 0.95, 0.85, 4
 
 @dataclass(frozen=True, eq=False)
 class CameraView:
-    """What a display placed by a camera shows from its viewing point.
+    """The view of a display placed by a camera, from its viewing point.
 
     ``half_width`` and ``half_height`` are slopes, or for a parallel view world units.
     """
@@ -144,7 +144,7 @@ def _refuse_pop_out(pop_out: float, most: float, display: Display) -> None:
 
 
 def _view(camera: Camera, frame: Matrix, focus: float, display: Display, scale: float) -> CameraView:
-    """What the middle of the viewing zone shows."""
+    """The view from the middle of the viewing zone."""
     half_width, half_height = (side / 2.0 / scale for side in display.size_mm)
     if camera.fov_y is not None and np.isfinite(display.viewing_distance):
         distance = display.viewing_distance

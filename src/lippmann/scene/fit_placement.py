@@ -33,8 +33,8 @@ _LARGEST_NOISE = 1e-3
 _LARGEST_SIZE = 2.0
 #: In so many rounds, each of which divides what is left into so many parts: to a millionth of a pixel.
 _ROUNDS, _PARTS = 8, 16
-#: What covers the panel in all views reaches beyond them by this share of its size, and is at most so many times as
-#: large as the panel: a depth that is scaled up a lot would need any size.
+#: Content that covers the panel in all views reaches beyond them by this share of its size, and is at most so many
+#: times as large as the panel: a depth that is scaled up a lot would need any size.
 _BEYOND, _MOST_ENLARGED = 1e-3, 4.0
 #: The centre is found by so many steps at most, and once none moves by more than this share of the scene's extent.
 _CENTERINGS, _CENTERED = 12, 1e-13
@@ -98,7 +98,7 @@ def fit_scene(
     share = POP_OUT if pop_out is None else pop_out
     resolved = _largest_in_depth(depth, share, display)
     middle = np.array([(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, high[2]])
-    # Where there is no extent, rounding noise must not count as one.
+    # Rounding noise must not count as an extent.
     offsets = (points - middle) * (np.array([width, height, depth]) > 0.0)
 
     def depths(sizes: Bounds) -> tuple[Bounds, Bounds]:
@@ -180,7 +180,7 @@ def _least_covering(extents: tuple[float, float], at: Callable[[float], Fit], di
 
 
 def _spans(offsets: Bounds, sizes: Bounds, heights: Bounds, display: Display) -> tuple[Bounds, Bounds]:
-    """Where all views together show points, for m sizes: the middle ``(m, 2)`` and the span ``(m, 2)``.
+    """Extent over which all views together show points, for m sizes: its middle ``(m, 2)`` and its span ``(m, 2)``.
 
     The eye of slope s sees the point (x, y, z) of the display's frame in the lens plane at ``(x - s z) / (1 - z / D)``,
     and so for y. The middle, in world units, is that which the panel's middle is to show: what lies farthest to either

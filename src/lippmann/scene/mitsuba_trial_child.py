@@ -8,7 +8,7 @@ from typing import Any
 
 from lippmann.runtime.helper_process import limit_memory, serve
 
-#: What C++ calls it when memory is short, in messages of Mitsuba's.
+#: C++ messages of a lack of memory, within Mitsuba's.
 NO_ROOM = re.compile("bad_alloc|bad_array_new_length|length_error")
 NO_MEMORY = "more memory than there is would be needed"
 
@@ -48,7 +48,7 @@ def _try(variant: str, text: str, memory: int) -> dict[str, str]:
 
 
 def fault_of_meshes(mi: Any, scene: Any) -> str | None:
-    """What is wrong with the triangles of a loaded scene, those of shape groups included; None if nothing is."""
+    """The fault in the triangles of a loaded scene, those of shape groups included; None if there is none."""
     import numpy as np
 
     values = mi.traverse(scene)

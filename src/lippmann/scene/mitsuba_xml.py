@@ -35,7 +35,7 @@ MOST_ELEMENTS = 1_000_000
 MOST_LEVELS = 100
 
 _ESCAPED_DOLLAR = "\\$"
-#: What stands in an attribute's quotes for other characters; xml.sax.saxutils loads all of urllib.
+#: Entities for characters that cannot stand in an attribute's quotes; xml.sax.saxutils loads all of urllib.
 _ENTITIES = str.maketrans(
     {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
 )
@@ -45,7 +45,7 @@ _PARAMETER = re.compile(r"(?<!\\)\$(\w*)", re.ASCII)
 _NAMES = ("alias", "ref")
 #: Elements whose plugins do not count here, and what stands for those that Mitsuba has no more.
 _UNCOUNTED = {"film": "hdrfilm", "integrator": "path", "sampler": "independent"}
-#: What of a film counts: the shape of the camera's picture.
+#: Parameters of a film that count: the shape of the camera's picture.
 _FILM_SIZE = ("width", "height")
 
 

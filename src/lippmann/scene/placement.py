@@ -68,7 +68,7 @@ class Placement:
 
 
 def placement_of(value: object) -> PlacementOptions | Placement:
-    """What stands for a placement in calls: itself, a mapping of its options, or None for the defaults.
+    """A placement's options from a call's argument: options themselves, a mapping of them, or None for the defaults.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from lippmann.studio_app.state import StudioState
 #: Settings that are no options of a render.
 _OTHERS = ("scene", "eye")
 
-#: What commands assume where a setting is not said: a new studio may differ.
+#: Defaults of the commands, from which a new studio's may differ.
 _ASSUMED = {
     each.name: default_of(each)
     for kind in (SceneOptions, PlacementOptions, LightOptions, QualityOptions)

@@ -269,7 +269,7 @@ class LiveSocket:
         }
 
     def _facts(self, result: LiveResult) -> dict[str, Any] | None:
-        """What is to be said of a frame beside it; None if it has been."""
+        """Remarks on a frame; None if they were sent before."""
         session, state, frame = self._session, self._state, result.frame
         display = session.display(state)
         # Of the frame too: one of an older view may come after the state has changed.

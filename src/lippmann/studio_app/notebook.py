@@ -117,7 +117,7 @@ class NotebookStudio:
 
     @property
     def state(self) -> StudioState:
-        """What the page has set last: :class:`~lippmann.studio_app.state.StudioState`."""
+        """The last state that the page has set: :class:`~lippmann.studio_app.state.StudioState`."""
         return self._session.state
 
     @property

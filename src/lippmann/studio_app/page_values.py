@@ -58,7 +58,7 @@ def state_of_values(values: object) -> StudioState:
 
 
 def facts_of_view(display: Display, placement: Placement, exposure: float) -> dict[str, object]:
-    """What the page displays of a picture beside it: depth (mm toward the viewer), warnings, automatic values."""
+    """Values that the page displays beside a picture: depth (mm toward the viewer), warnings, automatic values."""
     return {
         "depth": {
             "scene": _pair(placement.depth_range),

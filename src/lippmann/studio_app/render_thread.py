@@ -65,7 +65,7 @@ class Renderer(Protocol):
 
 @dataclass(frozen=True)
 class ViewRequest:
-    """What a watcher wants to see.
+    """The picture that a watcher asks for.
 
     Attributes
     ----------

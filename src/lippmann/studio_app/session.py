@@ -1,4 +1,4 @@
-"""What a studio is about: its state, the files that it was given, the thread that renders, and full renders."""
+"""A studio's session: its state, the files that it was given, the thread that renders, and full renders."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from lippmann.rendering.live.live_view import LiveView
     from lippmann.scene.scene import Scene
 
-#: What to do with a scene that has no file.
+#: Remedy for a scene that has no file.
 WITHOUT_FILE = "call lippmann.render with it, or open the studio with a file"
 
 #: Width and height of the picture that warms kernels up.
@@ -175,7 +175,7 @@ class StudioSession:
         return list(groups.items())
 
     def request_view(self, number: int, state: StudioState, view: LiveView) -> ViewRequest:
-        """What to render for a view of a state."""
+        """The scene to render for a view of a state."""
         key = (state.scene, SceneOptions.part_of(state))
 
         def load() -> Scene:

@@ -18,7 +18,7 @@ from lippmann.rendering.live.live_view import LiveView
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.scene import Scene
 
-#: What the studio shows where nothing is said.
+#: Scene and display of a studio that is opened without any.
 FIRST_SCENE, FIRST_DISPLAY = "teapot", "seed-lenticular"
 
 #: Settings by which one scene is placed: another one begins without them.
@@ -75,7 +75,7 @@ class StudioState(QualityOptions, LightOptions, PlacementOptions, SceneOptions):
             raise UsageError(f"{self.eye!r}", parameter="eye", rule="three finite numbers in mm, z above 0")
 
     def placement(self) -> PlacementOptions:
-        """Where the display stands in the scene."""
+        """Options of the display's place in the scene."""
         return PlacementOptions.part_of(self)
 
     def light(self) -> LightOptions:
@@ -89,7 +89,7 @@ class StudioState(QualityOptions, LightOptions, PlacementOptions, SceneOptions):
         return RenderRequest.from_options(QualityOptions.part_of(self), placement=self.placement(), tone_map=tone_map)
 
     def view(self, eye: Vector, size: tuple[int, int], eye_map: Callable[..., EyeMap] = EyeMap) -> LiveView:
-        """What an eye sees, as a picture of ``size`` (width, height); see :class:`LiveView`."""
+        """An eye's view, as a picture of ``size`` (width, height); see :class:`LiveView`."""
         return LiveView(eye, size, eye_map, request=self.request(), light=self.light())
 
     def native_view(self, window: PixelWindow | None = None) -> LiveView:

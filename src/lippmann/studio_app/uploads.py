@@ -209,7 +209,7 @@ def _short(name: str) -> str:
 
 
 def _refusal(error: Exception) -> Exception:
-    """What the page is told of an error while a drop was received."""
+    """Answer to the page for an error while a drop was received."""
     if isinstance(error, ClientDisconnect):
         return ConnectionAbortedError()
     if isinstance(error, FileExistsError):

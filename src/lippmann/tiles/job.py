@@ -43,13 +43,13 @@ FEWEST_TILES = 32
 FEWEST_WINDOWS = 4
 #: The most memory that tiles with surroundings are planned for where no limit is given.
 MOST_MEMORY = 4 << 30
-#: What of a request changes nothing in the picture.
+#: Fields of a request that change nothing in the picture.
 _IMMATERIAL = ("device", "threads", "memory", "began", "plan")
 
 
 @dataclass(frozen=True, eq=False)
 class TileJob:
-    """What is to be rendered, in tiles. Make one with :func:`make_job`; it can be pickled.
+    """A picture to be rendered in tiles. Make one with :func:`make_job`; it can be pickled.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class TileJob:
 
     @property
     def surroundings(self) -> Surroundings | None:
-        """What is rendered around tiles; None where each pixel stands for itself."""
+        """Margin that is rendered around tiles; None where each pixel stands for itself."""
         return surroundings_of(self.display, self.request)
 
     def window(self, index: int) -> PixelWindow:
@@ -194,7 +194,7 @@ def made_by(device: str, llvm: str | None = None, denoiser: str | None = None) -
 
 
 def bytes_of_tile(side: int, display: Display, request: RenderRequest) -> int:
-    """What rendering a tile takes in memory; small ones are given enough for wavefronts that are worth starting."""
+    """Bytes that rendering a tile takes; small tiles are given enough for wavefronts that are worth starting."""
     around = surroundings_of(display, request)
     if around is None:
         return max(side, 256) ** 2 * memory_model.TILE

@@ -40,7 +40,7 @@ class Surroundings:
         return -(-(side + 2 * self.margin + self.step - 1) // self.step) * self.step
 
     def window(self, tile: PixelWindow, side: int, size: tuple[int, int]) -> PixelWindow:
-        """What is rendered for ``tile`` of a grid of tiles with this ``side`` on a panel of ``size`` (width, height).
+        """The window rendered for ``tile``: tiles have this ``side``, the panel this ``size`` (width, height).
 
         All windows that the panel's edges do not cut are equally large, so that they share their kernels.
         """
@@ -56,7 +56,7 @@ class Surroundings:
 
 
 def surroundings_of(display: Display, request: RenderRequest) -> Surroundings | None:
-    """What has to be rendered around tiles of a picture; None where every pixel stands for itself."""
+    """Margin that has to be rendered around tiles of a picture; None where every pixel stands for itself."""
     if not request.denoises:
         return None
     lens = max(1, round(display.pixels_per_lens[0]))

@@ -54,7 +54,7 @@ class Prepared:
 
     @property
     def options(self) -> dict[str, object]:
-        """What the picture's file says of how it was made in tiles."""
+        """How the picture was made in tiles, for its file."""
         job = self.job
         if job.surroundings is None:
             return {}

@@ -64,7 +64,7 @@ _MOST_REPAIRS = 3
 
 @dataclass(frozen=True, eq=False)
 class Rendered:
-    """What was written.
+    """The written picture.
 
     ``tiles`` the picture has; ``resumed`` of them lay there already. ``provenance`` has the seconds of this run, which
     the file has not.

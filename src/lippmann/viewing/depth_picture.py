@@ -30,6 +30,6 @@ def shades_of_depth(image: IntegralImage) -> tuple[IntegralImage, tuple[float, f
 
 
 def legend(shades: IntegralImage, heights: tuple[float, float]) -> NDArray[np.float32]:
-    """What the central eye sees of :func:`shades_of_depth`, ``(height, width, 3)``, beside a bar with heights in mm."""
+    """The central eye's view of :func:`shades_of_depth`, ``(height, width, 3)``, beside a bar with heights in mm."""
     picture = shades.replay()
     return np.ascontiguousarray(np.concatenate([picture, height_legend(len(picture), heights)], axis=1))

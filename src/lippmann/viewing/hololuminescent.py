@@ -11,7 +11,7 @@ from lippmann.codecs.types import Pixels
 
 #: Width and height of the display in pixels; the file is turned to the left, so that it is as wide as this is high.
 WIDTH, HEIGHT = 2160, 3840
-#: What stays black, in pixels: above, below, and on either side.
+#: Margins that stay black, in pixels: above, below, and on either side.
 TOP, BOTTOM, SIDE = 355, 100, 108
 #: Frames per second that the player takes.
 RATES = (30.0, 60.0)

@@ -1,4 +1,4 @@
-"""What an eye or a camera in front of a display sees of a quilt's views, without the display's lenses.
+"""A quilt's views as an eye or a camera in front of a display sees them, without the display's lenses.
 
 View k of N is that of the camera in the middle of the k-th of N equal parts of the field of view, counted from the
 left, even in the tangent. A view shows the panel's rectangle in the lens plane. The direction in which an eye looks
@@ -75,7 +75,7 @@ def replay_quilt(
     picture = np.empty((height, width, 3), dtype=np.float32)
     for rows, x, y in lens_plane_points(display, width, height):
         across = lattice.across(x, y)
-        # Where under its lens the eye sees the panel, in micro-images from the middle: right of it from the left.
+        # Place under each lens that the eye sees, in micro-images from the middle: right of it from the left.
         place = (across - lattice.across(eye[0], eye[1])) / eye[2] - across * convergence
         place *= display.gap / (display.micro_image_pitch * display.edge_factor)
         position = np.clip((0.5 - place) * count - 0.5, 0.0, count - 1.0)

@@ -178,7 +178,7 @@ def _shift(text: str | None) -> Shift:
 
 
 def fit_note(cropped: tuple[float, float], fit: str | None) -> list[str]:
-    """What becomes of pictures' edges, in one line, by the shares of their width and height that are cut off."""
+    """One line on the pictures' edges, by the shares of their width and height that are cut off."""
     if fit == "stretch":
         return ["the pictures are stretched to the panel's proportions"]
     parts = [

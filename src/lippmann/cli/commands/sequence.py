@@ -34,7 +34,7 @@ _FOLDER_PATTERN = "frame_%04d"
 
 @dataclass(frozen=True)
 class Files:
-    """What is written: the output, its bits per value, maps, and whether to go on with an interrupted run."""
+    """Files to write: the output, its bits per value, maps, and whether to go on with an interrupted run."""
 
     output: Path
     bits: int | None
@@ -165,7 +165,7 @@ def render_frames(
 
 
 def open_moving(source: SceneSource, spec: SequenceOptions, request: RenderRequest) -> Motion:
-    """What moves."""
+    """The motion of the options."""
     if spec.turns:
         from lippmann.options.placement import PlacementOptions
         from lippmann.runtime import engine
@@ -197,7 +197,7 @@ def open_moving(source: SceneSource, spec: SequenceOptions, request: RenderReque
 def _filming(
     spec: SequenceOptions, motion: Motion, display: Display, request: RenderRequest, form: Form[Any] | None, count: int
 ) -> Filming | None:
-    """What the film shows of each frame."""
+    """The part of each frame that the film shows."""
     if spec.video is None:
         return None
     from lippmann.sequences.films import film_of_pictures, film_of_quilts
@@ -239,7 +239,7 @@ def frame_range(text: str) -> FrameRange:
 
 
 def numbered(output: Path, frames: int, ending: str = "") -> Callable[[int], Path]:
-    """Where each frame goes: ``output`` has one ``%d`` or ``%04d`` in its name, or is a folder.
+    """Path of each frame: ``output`` has one ``%d`` or ``%04d`` in its name, or is a folder.
 
     The stems of the files in a folder end in ``ending``.
 

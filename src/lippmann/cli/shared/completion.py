@@ -1,4 +1,4 @@
-"""What the shell offers for names that are half typed."""
+"""Names that the shell offers for half-typed ones."""
 
 from __future__ import annotations
 

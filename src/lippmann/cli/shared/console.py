@@ -1,4 +1,4 @@
-"""What the commands say: results on standard output, remarks and progress on standard error.
+"""Output of the commands: results on standard output, remarks and progress on standard error.
 
 Of a picture: the object of ``--json``, remarks, depths and seconds.
 """
@@ -55,7 +55,7 @@ class Console:
 
 
 def estimate_in_words(estimate: Mapping[str, object], part: str = "micro-image") -> str:
-    """What a picture says of its own error, as :attr:`Provenance.estimate` holds it; a quilt's parts are views."""
+    """A picture's own error in words, as :attr:`Provenance.estimate` holds it; a quilt's parts are views."""
     from lippmann.rendering.estimate.psnr import Estimate
 
     words = Estimate.from_dict(estimate).in_words(part)
@@ -67,7 +67,7 @@ def estimate_in_words(estimate: Mapping[str, object], part: str = "micro-image")
 
 
 def remarks(console: Console, made: Provenance) -> None:
-    """What is to be known of a picture beside its figures."""
+    """Print the remarks on a picture."""
     console.remark(depth_line(made))
     if "auto" in made.options:
         console.remark(f"auto: {made.options['auto']}")
@@ -77,7 +77,7 @@ def remarks(console: Console, made: Provenance) -> None:
 
 
 def report(output: Path, size: tuple[int, int], provenance: Provenance) -> dict[str, object]:
-    """What ``--json`` says of a render."""
+    """The object that ``--json`` prints of a render."""
     return {
         "output": str(output),
         "size": list(size),
@@ -97,7 +97,7 @@ def report(output: Path, size: tuple[int, int], provenance: Provenance) -> dict[
 
 
 def depth_line(made: Provenance) -> str:
-    """Where the scene lies, beside what the display can resolve."""
+    """Range of depth of the scene, beside the range that the display can resolve."""
     ranges = (cast("tuple[float, float]", made.options[key]) for key in ("depth_range", "resolvable_range"))
     (back, front), (far, near) = ranges
     return f"scene {depths_in_words(back, front)}; the display resolves {depths_in_words(far, near)}"

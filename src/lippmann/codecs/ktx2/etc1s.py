@@ -16,7 +16,7 @@ from lippmann.runtime.numba_jit import compiled
 
 __all__ = ["Codebooks", "DamagedError", "decode_slice"]
 
-# What is added to all channels of a block's colour, by table and selector.
+# Amounts added to all channels of a block's colour, by table and selector.
 _MODIFIERS = np.array(
     [
         (-8, -2, 2, 8),
@@ -43,7 +43,7 @@ _DAMAGED = 1
 
 @dataclass(frozen=True, eq=False)
 class Codebooks:
-    """What all slices of a file share.
+    """Tables that all slices of a file share.
 
     ``endpoints`` ``(n, 4)``: RGB in 5 bits and the table of brightness. ``selectors`` ``(m, 16)``, by rows of a block.
     ``history`` is the length of the list of selectors that were used last.

@@ -12,7 +12,7 @@ from lippmann.runtime.numba_jit import compiled
 
 Bytes = NDArray[np.uint8]
 
-#: What each next 16 bits begin with: the length of a code above bit 16, its symbol below; 0 where they begin with none.
+#: Table over 16 bits of the stream: length of the code with which they begin above bit 16, its symbol below; 0: none.
 Code = NDArray[np.uint32]
 
 # Symbols of code lengths beyond 16: runs of zeros and of the last length, with bits that tell how long, and the least.

@@ -97,7 +97,7 @@ class _Emitter:
 
 
 def _name(emitter: Emitter) -> str:
-    """What the scene's builder called an emitter, or the sphere that it makes shine."""
+    """The builder's name for an emitter, or for the sphere that it makes shine."""
     shape = emitter.get_shape()
     return str(emitter.id() if shape is None else shape.id())
 

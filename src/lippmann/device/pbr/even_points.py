@@ -48,7 +48,7 @@ class Triangles:
 
 
 def evenly(shape: mi.Shape) -> tuple[PointOf | None, float]:
-    """What spreads points evenly over a shape, and the shape's area; None for shapes that give no points."""
+    """A function that spreads points evenly over a shape, and its area; None for shapes that give no points."""
     if not _gives_points(shape):
         return None, 0.0
     triangles = Triangles(shape) if shape.is_mesh() else None

@@ -52,7 +52,7 @@ WIDE_LOBES = "wide_lobes"
 #: any, wide ones hardly ever. The weight of a sample goes by that; its pdf is that of plain sampling all the same, as
 #: MIS with emitters that plain paths sample needs it.
 SHARP_FIRST = 1 << 30
-#: What is left of a wide lobe's chance then: without it, what narrow lobes hardly reach would be rare and bright.
+#: Factor of a wide lobe's chance then. With 0, directions that narrow lobes hardly reach would be rare and bright.
 _WIDE_CHANCE = 0.1
 #: A lobe is wide whose GGX widths are above this.
 WIDE_ALPHA = 0.04

@@ -1,4 +1,4 @@
-"""What one kind of surface evaluates at a point: glTF's material on the device, and what it comes to there."""
+"""Parameters of one kind of surface: glTF's material on the device, and its values at a point."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class Structure:
-    """What of a material decides the plugin's structure, as against its numbers."""
+    """Properties of a material that decide its plugin's structure, as against its numbers."""
 
     kind: Kind
     metal: Literal["all", "none", "some"]

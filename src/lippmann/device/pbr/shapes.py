@@ -121,7 +121,7 @@ def make_shapes(
 def _choose_round(
     placements: Sequence[tuple[Dress, Matrix]],
 ) -> tuple[RoundPieces, list[tuple[Dress, Matrix]]]:
-    """What stands for round bodies that can be traced as such, by body and finish; and the placements that are left."""
+    """Pieces of round bodies that can be traced as such, by body and finish; and the placements that are left."""
     round_pieces: RoundPieces = {}
     left: list[tuple[Dress, Matrix]] = []
     for dress, matrices in placements:
@@ -142,7 +142,7 @@ def _choose_round(
 
 
 def _bytes_of_round(round_pieces: RoundPieces, memory: int, name: str) -> int:
-    """What round bodies take; a :class:`SceneError` where that is more than ``memory``."""
+    """Bytes that round bodies take; a :class:`SceneError` where that is more than ``memory``."""
     counts = {key: sum(len(piece.world_from_mesh) for piece in pieces) for key, pieces in round_pieces.items()}
     need, count = sum(BYTES[body] * each for (body, _), each in counts.items()), sum(counts.values())
     if need > memory:
@@ -241,7 +241,7 @@ def _device(parts: Sequence[FloatArray]) -> Float:
 
 
 def _attributes(pieces: Sequence[Piece], finish: Finish) -> Mapping[str, FloatArray]:
-    """What finish and meshes say per vertex or face beyond position, normal and the first uv set."""
+    """Attributes per vertex or face beyond position, normal and the first uv set."""
     attributes: dict[str, FloatArray] = {}
     if finish.tinted:
         attributes[COLOR_ATTRIBUTE] = np.concatenate([_colors(piece)[:, :3] for piece in pieces])

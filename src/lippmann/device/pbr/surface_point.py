@@ -1,4 +1,4 @@
-"""What a glTF surface is at one point: lobes, normals, reflectances, and the light that microfacets give back.
+"""A glTF surface at one point: lobes, normals, reflectances, and the light that microfacets give back.
 
 Imports Mitsuba, and so only once its variant is set.
 """

@@ -1,4 +1,4 @@
-"""What a material reads at a surface point: numbers, and texels as glTF's samplers say.
+"""A material's look-ups at a surface point: numbers, and texels as glTF's samplers say.
 
 A :class:`Signal` is a factor times a lookup, either of which may be absent. Materials that are alike but for their
 numbers and pictures form a family with one plugin; which member a triangle has, it says by a mesh attribute.

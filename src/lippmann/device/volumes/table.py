@@ -27,7 +27,7 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class VolumeTable:
-    """What rays need of a volume.
+    """A volume's data for rays.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What lies behind and between the surfaces: background and fog."""
+"""Background behind the surfaces, and fog between them."""
 
 from __future__ import annotations
 

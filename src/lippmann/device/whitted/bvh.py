@@ -151,7 +151,7 @@ def _per_run(reduce: np.ufunc, values: Numbers, start: Whole, stop: Whole) -> Nu
 
 
 def _cuts(boxes: Numbers, start: Whole, stop: Whole) -> tuple[Whole, Numbers]:
-    """Where to cut each run of sorted members ``boxes (m, 2, 3)``, and the cost of that: area times members, summed.
+    """Best cut of each run of sorted members ``boxes (m, 2, 3)``, and its cost: area times members, summed.
 
     The place is that of the second part's first member.
     """

@@ -1,4 +1,4 @@
-"""What a ray meets among exact shapes: a walk through the hierarchy of the many, and a list of the few."""
+"""Nearest crossings of rays with exact shapes: a walk through the hierarchy of the many, and a list of the few."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class ShapeTracer:
         return t, index
 
     def passing(self, o: Point3f, d: Vector3f, t: Float, light: Float, source: UInt32 | None = None) -> Float:
-        """What remains of ``light`` past all shapes crossed before ``t``.
+        """The part of ``light`` that passes all shapes crossed before ``t``.
 
         ``source``: the number of the light source that the rays end at; None where they end elsewhere.
         """
@@ -146,7 +146,7 @@ class ShapeTracer:
         while dr.hint((place < end) & (light > 0), label="shadows by the light buffer"):
             near, number = buffer.entry(place)
             light = self._past_row(kinds, number, o, d, t, light)
-            # What lies behind the ray's start casts no shadow on it, nor does all that follows.
+            # Shapes behind the ray's start cast no shadow on it, nor do all that follow.
             place = dr.select(near < depth, place + 1, end)
         return light
 

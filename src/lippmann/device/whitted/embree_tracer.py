@@ -1,4 +1,4 @@
-"""What the engine's own tracer (Embree, OptiX) finds: triangles, and spheres where they are many.
+"""Hits by the engine's own tracer (Embree, OptiX): triangles, and spheres where they are many.
 
 Triangles that let light pass or that are clipped ("airy") are kept apart from the solid ones: a ray goes on behind
 them. On the CPU the shadows of solid things are tested by themselves, which needs one question instead of one per
@@ -120,7 +120,7 @@ class EngineTracer:
         return distance, index, uv
 
     def passing(self, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
-        """What remains of ``light`` past all surfaces before ``t``."""
+        """The part of ``light`` that passes all surfaces before ``t``."""
         if self._all is None:
             return light
         if not (self._airy and self._on_gpu) and self._solid is not None:

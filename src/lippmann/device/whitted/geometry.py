@@ -61,7 +61,7 @@ class Surface:
     colored: Bool
 
     def start(self, direction: Vector3f) -> Point3f:
-        """Where a ray into ``direction`` begins: just off the surface, on the side that it leaves to."""
+        """Origin of a ray into ``direction``: just off the surface, on the side that it leaves to."""
         return self.p + self.face * dr.copysign(self.lift, dr.dot(self.face, direction))
 
 

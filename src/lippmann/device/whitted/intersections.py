@@ -1,4 +1,4 @@
-"""Where rays cross exact shapes: the formulas of :mod:`lippmann.device.whitted.shape_table` on the device.
+"""Crossings of rays with exact shapes: the formulas of :mod:`lippmann.device.whitted.shape_table` on the device.
 
 A ray is an origin and a unit direction; distances are along it. A shape's numbers come either from a table on the
 device (:func:`fetch`) or are written into the kernel (:func:`literal`), which makes a handful of shapes cheaper than

@@ -18,7 +18,7 @@ from lippmann.json_values import JsonObject
 #: The name of the panel that Bridge finds; with a colon and a serial number, that of one among several.
 NAME = "bridge"
 
-#: Where Bridge listens.
+#: Address at which Bridge listens.
 HOST, PORT = "localhost", 33334
 
 #: Seconds to wait for an answer: a running Bridge answers from memory, and nobody waits for one that hangs.

@@ -203,7 +203,7 @@ class Displays(Extension):
         return (*self.presets, *self.suffixes)
 
     def fault(self) -> str:
-        """What is wrong with its fields."""
+        """The fault in its fields; empty if all is well."""
         if self.suffixes and self.read is None:
             return "it has suffixes, and no function reads such files"
         try:

@@ -1,4 +1,4 @@
-"""Where DICOM files lie: told by their first bytes, since their names tell nothing."""
+"""Search for DICOM files, by their first bytes, since their names tell nothing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
-#: What stands after the first 128 bytes of a file.
+#: The mark after the first 128 bytes of a file.
 DICOM = b"DICM"
 
 #: Files and levels of folders that are looked at.

@@ -59,7 +59,7 @@ class Element:
 
 @dataclass
 class Header:
-    """What a PLY file says of itself: elements, textures, byte order, where its numbers begin, and notes.
+    """The header of a PLY file: elements, textures, byte order, where its numbers begin, and notes.
 
     ``order`` is "<" or ">" of a binary file, None of text; ``end`` is the first byte of the numbers; ``up`` is the
     direction that a comment says is up.

@@ -97,7 +97,7 @@ _ELSEWHERE = {
     **dict.fromkeys((".tif", ".tiff", ".bmp", ".avif"), "save photographs with depth as .png or .jpg"),
 }
 
-#: What files that are none of a scene's begin with, in small letters, and what to do about it.
+#: First bytes, in small letters, of files that hold no scene, and what to do about each.
 _NO_SCENES = {
     b"pk\3\4": ("is a ZIP archive", "unpack it, and name the scene file inside"),
     **dict.fromkeys((b"<!doctype html", b"<html"), ("is a web page, no scene", "download the file itself")),
@@ -279,7 +279,7 @@ def _of_other_kind(content: object) -> Scene | None:
 
 
 def _keywords(reader: Reader, path: Path, asked: SceneOptions, allow_outside: bool) -> dict[str, object]:
-    """What a reader's functions take of what is asked for."""
+    """The given options that a reader's functions take."""
     values = {
         "files": NamedFiles(path.parent, allow_outside),
         "variants": asked.variants,

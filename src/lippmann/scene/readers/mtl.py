@@ -54,11 +54,11 @@ _OPTIONS = {
 }
 # Models of light (``illum``) in which transparency refracts or mirrors.
 _GLASS = {4, 6, 7, 9}
-# What begins the libraries that MeshLab writes.
+# First line of the libraries that MeshLab writes.
 _MESHLAB = "Converted by Meshlab Group"
 _NUMERIC_OPTIONS = {"-bm", "-boost", "-mm", "-o", "-s", "-t"}
 
-#: What Blender's exporters write for a texture without a file.
+#: Name that Blender's exporters write for a texture without a file.
 _NO_FILE = "."
 
 

@@ -188,7 +188,7 @@ def _mesh(
     per_corner = _corner_uvs(face, outline, keep)
     face_colors = _colors(face, elements["face"]) if face else None
     if per_corner is not None or (face_colors is not None and colors is None):
-        # What belongs to a corner or a face needs vertices that no other face shares.
+        # Values of corners or faces need vertices that no other face shares.
         flat = faces.ravel()
         positions, normals = positions[flat], None if normals is None else normals[flat]
         colors = None if colors is None else colors[flat]

@@ -96,7 +96,7 @@ class Reader(Extension):
         return self.suffixes
 
     def fault(self) -> str:
-        """What is wrong with its fields."""
+        """The fault in its fields; empty if all is well."""
         for each in self.suffixes:
             if not _SUFFIX.fullmatch(each):
                 return f"its suffix '{each}' is no dot and letters in lower case"
@@ -108,7 +108,7 @@ class Reader(Extension):
         return ""
 
     def values_of(self, asked: Mapping[str, object], file: str) -> dict[str, Setting]:
-        """What ``read`` takes of :attr:`settings` that were asked for, as values of the defaults' types.
+        """The given :attr:`settings` that ``read`` takes, as values of the defaults' types.
 
         Raises
         ------

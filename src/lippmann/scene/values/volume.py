@@ -13,7 +13,7 @@ Numbers = NDArray[np.float64]
 #: Kinds of numbers that a grid may hold.
 STORED = (np.uint8, np.int16, np.uint16, np.float32)
 
-#: What opacities count over: a millimetre of the scene, or a hundredth of the grid's longest side.
+#: Length over which opacities count: a millimetre of the scene, or a hundredth of the grid's longest side.
 Per = Literal["mm", "percent"]
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import decode_srgb
 from lippmann.scene.values.volume import Numbers, Per, TransferFunction
 
-#: What a volume's numbers are known to be: Hounsfield units, or the signal of magnetic resonance.
+#: Known meanings of a volume's numbers: Hounsfield units, or the signal of magnetic resonance.
 Kind = Literal["ct", "mr"]
 
 #: A value, its colour in sRGB codes and its opacity.

@@ -141,7 +141,7 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
 
 
 def _outcome(path: Path, where: str) -> dict[str, Any] | None:
-    """What the script told; None if it told nothing that can be read."""
+    """The script's report; None if it wrote none that can be read."""
     if not path.is_file() or path.stat().st_size > _MOST_OUTCOME:
         return None
     try:

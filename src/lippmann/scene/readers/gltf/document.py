@@ -329,7 +329,7 @@ def check_extensions(document: Document) -> None:
 
 
 def _remark(extension: str) -> str:
-    """What becomes of an extension that the file uses, does not require, and that is not understood."""
+    """Consequence, in words, of an extension that the file uses, does not require, and that is not understood."""
     if extension in _FORMER_MATERIALS:
         return f"materials of the glTF extension {extension} are shown as plain ones; {_UPGRADE}"
     if extension == _POINTER:

@@ -16,7 +16,7 @@ _POINTS, _LINES = 1, 2  # vertices each
 
 @dataclass
 class ThinWidth:
-    """What the width of points and lines goes by: the diagonal of the scene's box, as it is when first drawn.
+    """Length to which the width of points and lines is proportional: the diagonal of the scene's box when first drawn.
 
     All times of an animation share that of the scene at rest, for points that grow with a box would pulsate.
     """

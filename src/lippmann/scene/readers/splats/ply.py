@@ -218,7 +218,7 @@ def _packed(rows: Mapping[str, Rows], where: str) -> tuple[Splats, tuple[str, ..
     own = np.arange(len(vertex)) // _CHUNK
 
     def within(names: Sequence[str], shares: FloatArray) -> FloatArray:
-        """What lies at ``shares`` between the bounds of each splat's chunk."""
+        """Values at ``shares`` between the bounds of each splat's chunk."""
         bounds = _floats(chunk, names)
         low, high = bounds[:, :3][own], bounds[:, 3:][own]
         return low + shares * (high - low)

@@ -81,7 +81,7 @@ class _Files:
         check_input(size, f"'{name[:60]}'", where=self.where)
 
     def meta(self) -> _Meta:
-        """What meta.json holds."""
+        """The object in meta.json."""
         try:
             values = json.loads(self.read(META, _LARGEST_META))
         except (ValueError, RecursionError) as error:

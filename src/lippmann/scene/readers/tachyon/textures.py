@@ -17,7 +17,7 @@ from lippmann.scene.values.whitted_surfaces import TEXTURE_KINDS, ClassicImage, 
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
 
 DEFAULT_MATERIAL = ClassicMaterial()
-"""What an undefined texture name stands for: white, ambient 0.1, diffuse 0.9."""
+"""Material of an undefined texture name: white, ambient 0.1, diffuse 0.9."""
 
 _MOST_NAMES = 5  # in one note
 _HEX = re.compile(r"[0-9a-fA-F]+").fullmatch

@@ -89,7 +89,7 @@ class LightReader:
     def _add_sphere(self, record: Record, world: Matrix) -> None:
         scale = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
         radius = max(record["radius"], 0.0)
-        # What a sphere sends along any direction is its radiance times the area of its shadow.
+        # A sphere's intensity in any direction is its radiance times the area of its shadow.
         area = math.pi * radius**2
         if record["normalize"]:
             area = 0.25
@@ -151,7 +151,7 @@ class LightReader:
 
 
 def _world(record: Record, scene_from_stage: Matrix) -> Matrix:
-    """Where a record stands in the scene; numbers of damaged files need not be finite."""
+    """A record's place in the scene; numbers of damaged files need not be finite."""
     with np.errstate(invalid="ignore", over="ignore"):
         return np.asarray(scene_from_stage @ np.array(record["world"], np.float64).reshape(4, 4), np.float64)
 

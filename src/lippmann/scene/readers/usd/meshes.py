@@ -176,7 +176,7 @@ class MeshReader:
             self.notes["meshes of Loop subdivision are shown as their cages, shaded smoothly"] = None
         check_input(_BYTES_PER_CORNER * len(indices), f"mesh {record['name']}", where=self._where)
         plain = _Polygons(points, counts, indices, faces, None, None)
-        # What bilinear subdivision makes of a polygon lies in it.
+        # Bilinear subdivision adds vertices inside a polygon, which leave its surface as it is.
         if not len(counts) or scheme in ("none", "bilinear"):
             return plain
         cage = self._cage(record, len(points), counts, indices)

@@ -25,7 +25,7 @@ _process = HelperProcess("from lippmann.scene.readers.usd.stage_child import mai
 def ask_stage(
     path: Path, variants: Mapping[str, str], seconds: float | None, named: NamedFiles
 ) -> tuple[Record, list[NDArray[np.generic]]]:
-    """What a stage shows: records, and the arrays that they refer to by number.
+    """The visible content of a stage: records, and the arrays to which they refer by number.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a stage holds on its way between two processes: JSON, and the arrays that it refers to by number."""
+"""A stage's content on its way between two processes: JSON, and the arrays to which it refers by number."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from lippmann.scene.readers.usd.records import Arrays, Record, pack
 from lippmann.scene.readers.usd.stage_layers import StageError, check_layers, choose_variants, used_files
 from lippmann.scene.readers.usd.stage_traversal import Traversal
 
-#: What C++ calls it when memory is short.
+#: C++ messages of a lack of memory.
 _NO_ROOM = re.compile("bad_alloc|bad_array_new_length|length_error")
 
 #: The stage that was asked for last, with what it was opened by: frames of a sequence share it.

@@ -24,7 +24,7 @@ _INPUTS = {
 }
 
 
-#: What changes a light source and is not read: attributes, and relationships.
+#: Properties of a light source that are not read: attributes, and relationships.
 _IGNORED = (
     *("inputs:diffuse", "inputs:specular"),
     *("inputs:shadow:enable", "inputs:shadow:color", "inputs:shadow:distance", "inputs:shadow:falloff"),

@@ -57,7 +57,7 @@ class MaterialTable:
         return {"name": name, "inputs": {key: value for key, value in inputs.items() if value is not None}}
 
     def _source(self, shader_input: UsdShade.Input, depth: int) -> Record | None:
-        """What feeds an input: a ``value``, a ``texture`` or a ``primvar``; None where nothing does."""
+        """The source of an input: a ``value``, a ``texture`` or a ``primvar``; None where nothing does."""
         attributes = UsdShade.Utils.GetValueProducingAttributes(shader_input)
         if not attributes or depth == 0:
             return None

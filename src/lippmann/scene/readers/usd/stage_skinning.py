@@ -11,7 +11,7 @@ from pxr import Usd, UsdSkel, Vt
 
 @dataclass(frozen=True)
 class Skin:
-    """What moves a mesh: its skinning query, and the skeleton's prim and query."""
+    """A mesh's skinning: its query, and the skeleton's prim and query."""
 
     skinning: UsdSkel.SkinningQuery
     skeleton: Usd.Prim
@@ -28,7 +28,7 @@ class Skinning:
                 self._cache.Populate(UsdSkel.Root(prim), predicate)
 
     def of(self, prim: Usd.Prim) -> Skin | None:
-        """What moves a mesh; None where nothing does."""
+        """The mesh's skinning; None for a mesh without any."""
         skinning = self._cache.GetSkinningQuery(prim)
         if not skinning or not (skinning.HasJointInfluences() or skinning.HasBlendShapes()):
             return None
@@ -48,7 +48,7 @@ def skinned_points(skin: Skin, prim: Usd.Prim, points: Any, time: Usd.TimeCode) 
 
 
 def skinned_turns(skin: Skin, prim: Usd.Prim, points: Any, time: Usd.TimeCode) -> np.ndarray:
-    """What skinning does to directions at each point: matrices ``(n, 3, 3)``, by points moved along each axis."""
+    """Skinning of directions at each point: matrices ``(n, 3, 3)``, by points moved along each axis."""
     rest = np.asarray(points, np.float64)
     step = float(np.abs(rest).max()) or 1.0  # as long as the mesh, for the sake of single precision
     moved = [

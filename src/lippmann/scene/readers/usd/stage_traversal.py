@@ -1,4 +1,4 @@
-"""What a stage shows at a time: its prims in order, with the places of all copies."""
+"""The visible prims of a stage at a time, in order, with the places of all copies."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from lippmann.scene.readers.volumes.dicom_slices import (
 )
 
 _LENGTH = struct.Struct("<Q")
-#: What is read of a file before its pixels: nothing that tells of the patient.
+#: Tags that are read of a file before its pixels: none that tells of the patient.
 _TAGS = [
     *("SeriesInstanceUID", "SeriesDescription", "SeriesNumber", "Modality", "InstanceNumber", "Rows", "Columns"),
     *("ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing", "SliceThickness", "SamplesPerPixel"),

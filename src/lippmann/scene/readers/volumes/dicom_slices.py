@@ -192,7 +192,7 @@ def _usual(distances: Numbers) -> float:
 
 
 def _gaps(places: Numbers, step: float, unit: str) -> str:
-    """Where slices are missing among sorted places that lie a step apart; empty if none is."""
+    """Gaps of missing slices among sorted places that lie a step apart, in words; empty if there is none."""
     missing = np.rint(np.diff(places) / step).astype(int) - 1
     gaps = [f"{places[at]:g} and {places[at + 1]:g}" for at in np.flatnonzero(missing > 0)]
     if not gaps:

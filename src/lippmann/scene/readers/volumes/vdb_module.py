@@ -9,7 +9,7 @@ from pathlib import Path
 #: The module's names, the newer one first.
 _NAMES = ("openvdb", "pyopenvdb")
 
-#: Where Blender's Python module ``bpy`` keeps those of other libraries: on Windows, and elsewhere.
+#: Folders in which Blender's Python module ``bpy`` keeps other libraries' modules: on Windows, and elsewhere.
 _BUNDLED = ("*/python/lib/site-packages", "*/python/lib/python3.*/site-packages")
 
 

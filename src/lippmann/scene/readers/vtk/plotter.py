@@ -117,7 +117,7 @@ def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
 
 
 def _left_out(actor: Any, mapper: Any) -> list[str]:
-    """What changes an actor's picture in the plotter and is not shown."""
+    """Features of an actor that change its picture in the plotter and are not shown here."""
     features = []
     if mapper.GetClippingPlanes() is not None and mapper.GetClippingPlanes().GetNumberOfItems():
         features.append("clipping planes")

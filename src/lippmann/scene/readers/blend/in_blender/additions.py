@@ -1,4 +1,4 @@
-"""What Blender's exporter leaves out of a glTF document, or says otherwise: lights, focus, and the unit of length."""
+"""Values that Blender's exporter leaves out of a glTF document, or changes: lights, focus, and the unit of length."""
 
 from __future__ import annotations
 

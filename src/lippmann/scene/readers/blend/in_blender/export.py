@@ -30,7 +30,7 @@ SCENE, WORLD = "scene.glb", "world.exr"
 
 @dataclass(frozen=True)
 class Exported:
-    """What :func:`export_scene` wrote.
+    """The result of :func:`export_scene`.
 
     Attributes
     ----------

@@ -48,7 +48,7 @@ def focus_distances(scene: Any) -> dict[str, float]:
 
 
 def camera_frames(scene: Any) -> dict[str, tuple[float, ...]]:
-    """What each camera's picture holds: its middle, right of the camera's axis and up, and half its width and height.
+    """Extent of each camera's picture: its middle, right of the camera's axis and up, and half its width and height.
 
     Slopes; of orthographic cameras lengths in Blender's units. By the camera's name, for pictures of the scene's size.
     """

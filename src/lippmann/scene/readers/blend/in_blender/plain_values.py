@@ -117,7 +117,7 @@ def _light_of(image: Any) -> Any:
 
 
 def _uses(node: Any, visited: set[str]) -> set[str]:
-    """What a node's colour is taken for: ``color``, ``number``, both or nothing."""
+    """The use of a node's colour: ``color``, ``number``, both or nothing."""
     visited.add(node.name)
     uses: set[str] = set()
     for link in (link for output in node.outputs if output.name != "Alpha" for link in output.links):

@@ -1,4 +1,4 @@
-"""What a Blender scene shows and glTF cannot say."""
+"""Features of a Blender scene that glTF cannot express, in words."""
 
 from __future__ import annotations
 
