@@ -146,6 +146,13 @@ def test_glass_and_lamps_stay_triangles(material):
     assert shapes_of(scene_of(ball(), [np.eye(4)])) == ["Ellipsoids"]
 
 
+@pytest.mark.parametrize("count", range(1, 6))
+def test_balls_of_any_number_are_built_without_a_word(count, capfd):
+    places = [placed(np.eye(3), (3.0 * number, 0, 0)) for number in range(count)]
+    assert shapes_of(scene_of(ball(), places)) == ["Ellipsoids"]
+    assert capfd.readouterr().err == ""
+
+
 @pytest.mark.slow
 def test_a_picture_of_round_bodies_is_that_of_fine_triangles():
     """Each of its own colour, by its material or its vertices, in every micro-image."""

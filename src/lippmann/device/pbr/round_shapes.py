@@ -67,7 +67,9 @@ def ellipsoids(matrices: Matrix, bsdf: BSDF, attributes: Mapping[str, FloatArray
         "quaternions": Rotation.from_matrix(turn).as_quat(),  # x, y, z, w
         **attributes,
     }
-    tensors = {name: mi.TensorXf(np.ascontiguousarray(values, np.float32)) for name, values in numbers.items()}
+    # Of three rows Mitsuba first tries to make a colour, and complains on standard error: the last ball stands twice.
+    rows = [0, 1, 2, 2] if len(matrices) == 3 else slice(None)
+    tensors = {name: mi.TensorXf(np.ascontiguousarray(values[rows], np.float32)) for name, values in numbers.items()}
     return mi.load_dict({"type": "ellipsoids", "extent": 1.0, "bsdf": bsdf, **tensors})
 
 

@@ -15,8 +15,9 @@ POINT_RADIUS, LINE_RADIUS = 0.01, 0.005
 #: More points or lines than that are not drawn: each is six or eight triangles.
 MOST = 1 << 18
 
-# Up to so many, points are balls of 32 triangles, and lines have 6 sides; of more, which are thinner, 8 and 3.
-_MOST_ROUND = 20_000
+# Up to so many, points are balls of 32 triangles, and lines have 6 sides; of more, which are thinner, 8 and 3. A few
+# points, which may be wide, are balls of 512.
+_MOST_ROUND, _FEW = 20_000, 500
 
 Points = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -88,7 +89,7 @@ def thinned(thin: Mesh, step: int) -> Mesh:
     )
 
 
-def as_mesh(thin: Mesh, world_from_mesh: Points, width: float, material: int) -> Mesh:
+def as_mesh(thin: Mesh, world_from_mesh: Points, width: float | FloatArray, material: int) -> Mesh:
     """The mesh of solids, in the world, of a mesh whose ``faces`` are points ``(m, 1)`` or lines ``(m, 2)``.
 
     Parameters
@@ -96,7 +97,7 @@ def as_mesh(thin: Mesh, world_from_mesh: Points, width: float, material: int) ->
     world_from_mesh:
         ``(k, 4, 4)``, one for each copy.
     width:
-        Radius in the world.
+        Radius in the world, or that of each position of a single copy.
     material:
         Index of the solids' material.
     """
@@ -119,20 +120,20 @@ def as_mesh(thin: Mesh, world_from_mesh: Points, width: float, material: int) ->
     )
 
 
-def balls(points: Points, elements: Integers, width: float) -> Solids:
+def balls(points: Points, elements: Integers, width: float | FloatArray) -> Solids:
     """A ball of radius ``width`` about each of ``points`` ``(n, 3)`` that ``elements`` ``(m, 1)`` names."""
-    corners, triangles = _ball(2 if len(elements) <= _MOST_ROUND else 1)
+    corners, triangles = _ball(4 if len(elements) <= _FEW else 2 if len(elements) <= _MOST_ROUND else 1)
     sources = np.repeat(elements[:, 0], len(corners))
     normals: FloatArray = np.tile(corners.astype(np.float32), (len(elements), 1))
     return Solids(
-        points.astype(np.float32)[sources] + np.float32(width) * normals,
+        points.astype(np.float32)[sources] + _radii(width, sources) * normals,
         normals,
         _repeated(triangles, len(elements), len(corners)),
         sources,
     )
 
 
-def rods(points: Points, elements: Integers, width: float) -> Solids:
+def rods(points: Points, elements: Integers, width: float | FloatArray) -> Solids:
     """An open prism of radius ``width`` about each line ``elements`` ``(m, 2)`` between two of ``points`` ``(n, 3)``.
 
     Lines of no length are left out.
@@ -157,11 +158,16 @@ def rods(points: Points, elements: Integers, width: float) -> Solids:
         [np.stack([here, ahead, ahead + sides], axis=1), np.stack([here, ahead + sides, here + sides], axis=1)]
     )
     return Solids(
-        points.astype(np.float32)[sources] + np.float32(width) * normals,
+        points.astype(np.float32)[sources] + _radii(width, sources) * normals,
         normals,
         _repeated(triangles, len(elements), 2 * sides),
         sources,
     )
+
+
+def _radii(width: float | FloatArray, sources: Integers) -> FloatArray:
+    radii = np.asarray(width, np.float32)
+    return radii[sources, None] if radii.ndim else radii
 
 
 def _repeated(triangles: Integers, count: int, step: int) -> IndexArray:

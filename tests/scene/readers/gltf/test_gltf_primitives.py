@@ -54,7 +54,7 @@ def test_points_are_balls_with_the_colours_of_their_vertices(writer, read):
     colors = writer.accessor([[1, 0, 0], [0, 1, 0], [0, 0, 1]])
     scene = read(writer.triangle(mode=0, attributes={"COLOR_0": colors}))
     (mesh,) = scene.meshes
-    assert mesh.faces.shape == (3 * 32, 3)
+    assert mesh.faces.shape == (3 * 512, 3)
     for color, place in zip(np.eye(3), [[0, 0, 0], [1, 0, 0], [0, 1, 0]], strict=True):
         mine = mesh.positions[(mesh.colors == color).all(axis=1)]
         np.testing.assert_allclose(np.linalg.norm(mine - place, axis=1), 0.01 * 2**0.5, rtol=1e-4)

@@ -291,8 +291,8 @@ def test_copies_beyond_all_bounds_are_refused(read):
 
 
 def test_what_is_not_drawn_is_named(read):
-    curve = 'def BasisCurves "c" {\nint[] curveVertexCounts = [2]\npoint3f[] points = [(0, 0, 0), (1, 0, 0)]\n}\n'
-    assert read(triangle() + curve).notes == ["1 prim(s) of type BasisCurves are not drawn"]
+    curve = 'def HermiteCurves "c" {\nint[] curveVertexCounts = [2]\npoint3f[] points = [(0, 0, 0), (1, 0, 0)]\n}\n'
+    assert read(triangle() + curve).notes == ["1 prim(s) of type HermiteCurves are not drawn"]
 
 
 def test_schemas_that_change_what_is_shown_are_named(read):

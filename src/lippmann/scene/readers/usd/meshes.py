@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
 from lippmann.runtime.machine import check_input
+from lippmann.scene.parsing.points_lines import MOST, as_mesh
 from lippmann.scene.parsing.triangulation import triangulate
+from lippmann.scene.point_clouds import draw_thin
 from lippmann.scene.readers.gltf.nodes import normal_matrices
 from lippmann.scene.readers.gltf.skinning import unit_normals
+from lippmann.scene.readers.usd.curves import Curves, Points
 from lippmann.scene.readers.usd.materials import Surface
 from lippmann.scene.readers.usd.primitives import primitive_polygons, unit_ball
 from lippmann.scene.readers.usd.records import Record
@@ -82,6 +85,8 @@ class MeshReader:
         """
         if "primitive" in record:
             return self._primitive(record)
+        if "thin" in record:
+            return self._thin(record)
         counts, indices = self._integers(record, "counts"), self._integers(record, "indices")
         points = self._array(record, "points").astype(np.float64)
         self._check(record, points, counts, indices)
@@ -121,6 +126,50 @@ class MeshReader:
         if colors is not None:
             mesh = replace(mesh, colors=np.broadcast_to(colors, (len(mesh.positions), colors.shape[1])))
         return [Part(record["material"], mesh, scale)]
+
+    def _thin(self, record: Record) -> list[Part]:
+        """Balls about points, rods along curves: of the widths that the stage gives, else as other formats have them.
+
+        Texture coordinates of them are not read.
+        """
+        name, points = record["name"], self._array(record, "thin").astype(np.float64)
+        if not np.isfinite(points).all():
+            raise self._error(name, "has points that are not finite")
+        thin: Points | Curves = Points(len(points))
+        if "counts" in record:
+            thin = Curves(self._integers(record, "counts"), record["basis"], record["wrap"])
+            if thin.counts.min(initial=0) < 0 or thin.counts.sum() != len(points):
+                raise self._error(name, f"has {len(points)} points where its curves say {int(thin.counts.sum())}")
+        pieces = thin.pieces(MOST)
+        elements = thin.elements(pieces)
+        if not len(elements):
+            return []
+
+        def values(primvar: Record, what: str) -> FloatArray:
+            given = np.asarray(self._array(primvar, "values"), np.float64)
+            return self._fitting(thin.sample(given, primvar["interpolation"], pieces), primvar, name, what)
+
+        positions = thin.sample(points, "vertex", pieces)
+        assert positions is not None
+        colors = self._colors(record, record["material"], values)
+        if colors is not None:
+            colors = np.broadcast_to(colors, (len(positions), colors.shape[1]))
+        radii = None
+        if record["widths"] is not None:
+            radii = np.broadcast_to(np.maximum(values(record["widths"], "widths")[:, 0] / 2.0, 0.0), len(positions))
+        step = -(-len(elements) // MOST)
+        if step > 1:
+            self.notes[f"{name}: of {len(elements)} points or pieces of curves one in {step} is drawn"] = None
+        mesh = Mesh(name, positions.astype(np.float32), elements[::step].astype(np.uint32), 0, colors=colors)
+        if radii is not None and radii.any():
+            drawn = [as_mesh(mesh, np.eye(4)[None], radii, 0)]
+        else:
+            drawn, width = draw_thin([mesh])
+            self.notes[width.note] = None
+        for uv_name in self._surface(record["material"]).uv_names:
+            self._note_no_uvs(record, uv_name)
+            drawn = [replace(each, uvs=(*each.uvs, np.zeros((len(each.positions), 2), np.float32))) for each in drawn]
+        return [Part(record["material"], each) for each in drawn]
 
     def _note_no_uvs(self, record: Record, uv_name: str) -> None:
         self.notes[f"mesh {record['name']} has no texture coordinates '{uv_name}': its textures show one texel"] = None
@@ -299,10 +348,14 @@ class MeshReader:
 
     def _values(self, sampler: _Sampler, primvar: Record, name: str, what: str) -> FloatArray:
         values = np.asarray(self._arrays[primvar["values"]], np.float32)
-        taken = sampler.at_corners(values, primvar["interpolation"])
+        return self._fitting(sampler.at_corners(values, primvar["interpolation"]), primvar, name, what)
+
+    def _fitting(self, taken: NDArray[np.floating] | None, primvar: Record, name: str, what: str) -> FloatArray:
+        """Values that a sampler has taken of a primvar, if they fit their prim."""
         if taken is None:
-            raise self._error(name, f"has {len(values)} {what}, {primvar['interpolation']}, which do not fit it")
-        return taken
+            count = len(self._array(primvar, "values"))
+            raise self._error(name, f"has {count} {what}, {primvar['interpolation']}, which do not fit it")
+        return np.asarray(taken, np.float32)
 
 
 @dataclass(frozen=True, eq=False)

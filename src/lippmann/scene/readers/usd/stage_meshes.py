@@ -24,6 +24,9 @@ PRIMITIVES = {
     "Plane": ("width", "length", "axis"),
 }
 
+#: Types whose points are drawn as balls or rods.
+THIN = ("Points", "BasisCurves")
+
 _UV_TYPES = ("texCoord2f[]", "texCoord2d[]", "texCoord2h[]", "float2[]", "double2[]", "half2[]")
 _MOST_UV_SETS = 8
 
@@ -69,6 +72,27 @@ def primitive_record(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Reco
     values = {name: prim.GetAttribute(name).Get(time) for name in PRIMITIVES[kind]}
     numbers = {name: str(value) if name == "axis" else float(value) for name, value in values.items()}
     return {**_visible(prim, time, arrays), "primitive": kind, "numbers": numbers}
+
+
+def thin_record(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Record:
+    """Points, or curves, with the widths that are given."""
+    thin = UsdGeom.PointBased(prim)
+    widths = _primvar(UsdGeom.PrimvarsAPI(prim).GetPrimvar("widths"), 1, time, arrays)
+    attribute = UsdGeom.Points(prim) if prim.IsA(UsdGeom.Points) else UsdGeom.Curves(prim)
+    if widths is None and (values := attribute.GetWidthsAttr().Get(time)):
+        widths = {"values": arrays.add(_floats(values, 1)), "interpolation": str(attribute.GetWidthsInterpolation())}
+    record = {
+        **_visible(prim, time, arrays),
+        "thin": arrays.add(_floats(thin.GetPointsAttr().Get(time), 3)),
+        "widths": widths,
+    }
+    if prim.IsA(UsdGeom.BasisCurves):
+        curves = UsdGeom.BasisCurves(prim)
+        is_linear = curves.GetTypeAttr().Get(time) == UsdGeom.Tokens.linear
+        record["counts"] = arrays.add(np.asarray(curves.GetCurveVertexCountsAttr().Get(time) or [], np.int64))
+        record["basis"] = "linear" if is_linear else str(curves.GetBasisAttr().Get(time))
+        record["wrap"] = str(curves.GetWrapAttr().Get(time))
+    return record
 
 
 def _visible(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Record:

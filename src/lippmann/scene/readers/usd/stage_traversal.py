@@ -11,7 +11,7 @@ from pxr import Usd, UsdGeom, UsdLux, UsdSkel
 from lippmann.scene.readers.usd.records import Arrays, Record
 from lippmann.scene.readers.usd.stage_layers import StageError
 from lippmann.scene.readers.usd.stage_lights import camera_record, light_record
-from lippmann.scene.readers.usd.stage_meshes import PRIMITIVES, mesh_record, primitive_record
+from lippmann.scene.readers.usd.stage_meshes import PRIMITIVES, THIN, mesh_record, primitive_record, thin_record
 from lippmann.scene.readers.usd.stage_shading import MaterialTable
 from lippmann.scene.readers.usd.stage_skinning import Skinning
 from lippmann.scene.readers.usd.stage_splats import PARTICLES, splat_record
@@ -104,7 +104,7 @@ class Traversal:
             if prim.IsA(UsdGeom.PointInstancer):
                 self._add_instancer(UsdGeom.PointInstancer(prim), base @ place, depth)
                 prims.PruneChildren()
-            elif prim.IsA(UsdGeom.Mesh) or kind in PRIMITIVES:
+            elif prim.IsA(UsdGeom.Mesh) or kind in PRIMITIVES or kind in THIN:
                 self._add_mesh(prim, base, place)
             elif kind.startswith(PARTICLES):
                 self._add_splats(prim, base @ place)
@@ -142,7 +142,8 @@ class Traversal:
     def _add_mesh(self, prim: Usd.Prim, base: Matrices, place: Matrices) -> None:
         if prim.HasAPI(UsdLux.LightAPI):
             self.notes[f"{prim.GetPath()}: the light that its surface sends out (MeshLightAPI) is not read"] = None
-        skin = self._skinning.of(prim)
+        kind = str(prim.GetTypeName())
+        skin = self._skinning.of(prim) if prim.IsA(UsdGeom.Mesh) else None
         if skin is not None:
             place = self._world(skin.skeleton)
         material = self._materials.bound(prim)
@@ -152,7 +153,9 @@ class Traversal:
         worlds = base @ place
         self._count(len(worlds))
         if key not in self._meshes:
-            if prim.IsA(UsdGeom.Mesh):
+            if kind in THIN:
+                record = thin_record(prim, self._time, self._arrays)
+            elif prim.IsA(UsdGeom.Mesh):
                 record = mesh_record(UsdGeom.Mesh(prim), self._time, self._arrays, self._materials, skin)
             else:
                 record = primitive_record(prim, self._time, self._arrays)
