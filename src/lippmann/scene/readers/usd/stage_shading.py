@@ -1,4 +1,4 @@
-"""Records of materials: the inputs of ``UsdPreviewSurface``, with the values and textures that feed them."""
+"""Records of materials: the inputs of their surfaces, with the values and textures that feed them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 from pxr import Gf, Sdf, Usd, UsdShade
 
 from lippmann.scene.readers.usd.records import Record
+from lippmann.scene.readers.usd.stage_surfaces import as_preview, is_read, materialx_node, surface_of
 
-_SURFACE = "UsdPreviewSurface"
 #: Nodes between a surface and what it reads.
 _DEEPEST = 8
 
@@ -47,14 +47,14 @@ class MaterialTable:
 
     def _read(self, material: UsdShade.Material) -> Record | None:
         name = str(material.GetPath())
-        surface = material.ComputeSurfaceSource()[0]
-        kind = str(surface.GetShaderId()) if surface else ""
-        if kind != _SURFACE:
-            what = f"its surface is '{kind}'" if kind else "it has no surface"
-            self._notes[f"material {name}: {what}, not {_SURFACE}: display colours are taken"] = None
+        surface, kind = surface_of(material)
+        if not is_read(kind):
+            what = f"its surface is '{kind}', which is not read" if kind else "it has no surface"
+            self._notes[f"material {name}: {what}: display colours are taken"] = None
             return None
         inputs = {each.GetBaseName(): self._source(each, _DEEPEST) for each in surface.GetInputs()}
-        return {"name": name, "inputs": {key: value for key, value in inputs.items() if value is not None}}
+        given = {key: value for key, value in inputs.items() if value is not None}
+        return {"name": name, "inputs": as_preview(kind, given)}
 
     def _source(self, shader_input: UsdShade.Input, depth: int) -> Record | None:
         """The source of an input: a ``value``, a ``texture`` or a ``primvar``; None where nothing does."""
@@ -72,9 +72,13 @@ class MaterialTable:
         node_kind = str(node.GetShaderId()) if node else ""
         inputs = {each.GetBaseName(): self._source(each, depth - 1) for each in node.GetInputs()} if node else {}
         given = {key: value for key, value in inputs.items() if value is not None}
-        if node_kind == "UsdUVTexture":
+        own = materialx_node(node_kind, name, given, attribute.GetPrim())
+        if own is not None:
+            return own
+        node_kind = node_kind.removeprefix("ND_")
+        if node_kind.startswith("UsdUVTexture"):
             return {"texture": given, "channel": name}
-        if node_kind == "UsdTransform2d":
+        if node_kind.startswith("UsdTransform2d"):
             return {"transform": given}
         if node_kind.startswith("UsdPrimvarReader_"):
             return {"primvar": given.get("varname", {}).get("value", ""), "fallback": given.get("fallback")}

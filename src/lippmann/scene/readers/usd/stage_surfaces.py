@@ -1,0 +1,266 @@
+"""Surfaces of other models by the inputs of ``UsdPreviewSurface``: MaterialX's and OmniPBR.
+
+Names and defaults are those of MaterialX's definitions of nodes (``libraries/bxdf``, 1.39), which also has the
+translation to ``UsdPreviewSurface``, and of NVIDIA's OmniPBR.mdl.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from pxr import Usd, UsdShade
+
+from lippmann.scene.readers.usd.records import Record
+
+PREVIEW = "UsdPreviewSurface"
+#: Contexts of rendering whose surfaces are looked at where that for all of them is not read.
+_CONTEXTS = ("mtlx", "mdl")
+
+
+@dataclass(frozen=True)
+class _Model:
+    """Inputs by those of ``UsdPreviewSurface``: name and default; and what multiplies them, with its default."""
+
+    inputs: dict[str, tuple[str, Any]]
+    weights: dict[str, tuple[str, float]] = field(default_factory=dict)
+    coat_color: str = ""
+
+
+_WHITE, _LIGHT_GREY = [1.0, 1.0, 1.0], [0.8, 0.8, 0.8]
+_MODELS = {
+    "ND_standard_surface_surfaceshader": _Model(
+        {
+            "diffuseColor": ("base_color", _LIGHT_GREY),
+            "metallic": ("metalness", 0.0),
+            "roughness": ("specular_roughness", 0.2),
+            "ior": ("specular_IOR", 1.5),
+            "clearcoat": ("coat", 0.0),
+            "clearcoatRoughness": ("coat_roughness", 0.1),
+            "emissiveColor": ("emission_color", _WHITE),
+            "opacity": ("opacity", 1.0),
+            "normal": ("normal", None),
+            "transmission": ("transmission", 0.0),
+        },
+        {"diffuseColor": ("base", 1.0), "emissiveColor": ("emission", 0.0)},
+        "coat_color",
+    ),
+    "ND_open_pbr_surface_surfaceshader": _Model(
+        {
+            "diffuseColor": ("base_color", _LIGHT_GREY),
+            "metallic": ("base_metalness", 0.0),
+            "roughness": ("specular_roughness", 0.3),
+            "ior": ("specular_ior", 1.5),
+            "clearcoat": ("coat_weight", 0.0),
+            "clearcoatRoughness": ("coat_roughness", 0.0),
+            "emissiveColor": ("emission_color", _WHITE),
+            "opacity": ("geometry_opacity", 1.0),
+            "normal": ("geometry_normal", None),
+            "transmission": ("transmission_weight", 0.0),
+        },
+        {"diffuseColor": ("base_weight", 1.0), "emissiveColor": ("emission_luminance", 0.0)},
+        "coat_color",
+    ),
+    "ND_gltf_pbr_surfaceshader": _Model(
+        {
+            "diffuseColor": ("base_color", _WHITE),
+            "metallic": ("metallic", 1.0),
+            "roughness": ("roughness", 1.0),
+            "ior": ("ior", 1.5),
+            "clearcoat": ("clearcoat", 0.0),
+            "clearcoatRoughness": ("clearcoat_roughness", 0.0),
+            "emissiveColor": ("emissive", [0.0, 0.0, 0.0]),
+            "opacity": ("alpha", 1.0),
+            "normal": ("normal", None),
+            "transmission": ("transmission", 0.0),
+        },
+        {"emissiveColor": ("emissive_strength", 1.0)},
+    ),
+    # Its emissive_intensity counts for a camera's exposure: the colour alone is taken.
+    "OmniPBR": _Model(
+        {
+            "diffuseColor": ("diffuse_color_constant", [0.2, 0.2, 0.2]),
+            "metallic": ("metallic_constant", 0.0),
+            "roughness": ("reflection_roughness_constant", 0.5),
+            "emissiveColor": ("emissive_color", [1.0, 0.1, 0.1]),
+            "opacity": ("opacity_constant", 1.0),
+        },
+        {"emissiveColor": ("enable_emission", 0.0)},
+    ),
+}
+#: Pictures of OmniPBR that stand for its constants: their channel, and what must be set for them to count.
+_OMNI_PICTURES = {
+    "diffuseColor": ("diffuse_texture", "rgb", None),
+    "normal": ("normalmap_texture", "rgb", None),
+    "metallic": ("metallic_texture", "r", "metallic_texture_influence"),
+    "roughness": ("reflectionroughness_texture", "r", "reflection_roughness_texture_influence"),
+    "opacity": ("opacity_texture", "r", "enable_opacity_texture"),
+    "emissiveColor": ("emissive_color_texture", "rgb", "enable_emission"),
+}
+_OMNI_PACKED = {"roughness": "g", "metallic": "b"}  # of ORM_texture
+
+
+def surface_of(material: UsdShade.Material) -> tuple[UsdShade.Shader, str]:
+    """The surface that is read, and its kind; of a kind that is not read, if there is no other."""
+    surfaces = [material.ComputeSurfaceSource(context)[0] for context in ("", *_CONTEXTS)]
+    kinds = [_kind_of(surface) if surface else "" for surface in surfaces]
+    best = next((number for number, kind in enumerate(kinds) if is_read(kind)), None)
+    if best is None:
+        best = next((number for number, kind in enumerate(kinds) if kind), 0)
+    return surfaces[best], kinds[best]
+
+
+def is_read(kind: str) -> bool:
+    """Whether surfaces of a kind are read."""
+    return kind == PREVIEW or kind in _MODELS
+
+
+def _kind_of(surface: UsdShade.Shader) -> str:
+    kind = str(surface.GetShaderId() or surface.GetSourceAssetSubIdentifier("mdl") or "")
+    return PREVIEW if kind == f"ND_{PREVIEW}_surfaceshader" else kind.split("(")[0]
+
+
+def as_preview(kind: str, given: Record) -> Record:
+    """The inputs of a surface of any kind that is read, by the names of ``UsdPreviewSurface``."""
+    if kind == PREVIEW:
+        return given
+    model = _MODELS[kind]
+    inputs: Record = {}
+    for preview, (name, default) in model.inputs.items():
+        source = given.get(name, None if default is None else {"value": default})
+        if source is not None:
+            inputs[preview] = source
+    if kind == "OmniPBR":
+        inputs.update(_omni_pictures(given))
+        if not _number(given, "enable_opacity", 0.0):
+            inputs.pop("opacity")
+    if kind == "ND_gltf_pbr_surfaceshader":
+        mode = _number(given, "alpha_mode", 0.0)
+        if mode == 0.0:
+            inputs.pop("opacity")
+        elif mode == 1.0:
+            inputs["opacityThreshold"] = given.get("alpha_cutoff", {"value": 0.5})
+    for preview, (name, usual) in model.weights.items():
+        weight = _number(given, name, usual)
+        inputs[preview] = _scaled(inputs[preview], [weight, weight, weight])
+    coat, tint = _number(inputs, "clearcoat", 0.0), given.get(model.coat_color)
+    if coat > 0.0 and tint is not None:
+        inputs["diffuseColor"] = _under_coat(inputs["diffuseColor"], tint, coat)
+    if isinstance(opacity := inputs.get("opacity", {}).get("value"), list):
+        inputs["opacity"] = {"value": sum(opacity) / len(opacity)}
+    return inputs
+
+
+def _omni_pictures(given: Record) -> Record:
+    inputs: Record = {}
+    for preview, (name, channel, switch) in _OMNI_PICTURES.items():
+        asset = given.get(name)
+        if asset is not None and asset.get("asset", {}).get("name") and (switch is None or _number(given, switch, 0.0)):
+            inputs[preview] = _picture(asset, channel, preview)
+    packed = given.get("ORM_texture")
+    if packed is not None and packed.get("asset", {}).get("name") and _number(given, "enable_ORM_texture", 0.0):
+        inputs |= {preview: _picture(packed, channel, preview) for preview, channel in _OMNI_PACKED.items()}
+    return inputs
+
+
+def _picture(asset: Record, channel: str, preview: str) -> Record:
+    repeat = {"value": "repeat"}
+    texture: Record = {"file": asset, "wrapS": repeat, "wrapT": repeat}
+    if preview == "normal":
+        texture |= _AS_DIRECTIONS
+    elif channel != "rgb":
+        texture["sourceColorSpace"] = {"value": "raw"}
+    return {"texture": texture, "channel": channel}
+
+
+_AS_DIRECTIONS: Record = {"scale": {"value": [2.0, 2.0, 2.0, 1.0]}, "bias": {"value": [-1.0, -1.0, -1.0, 0.0]}}
+
+
+def _under_coat(base: Record, tint: Record, coat: float) -> Record:
+    """A base colour below a coloured coat, which light passes; where both are pictures, the base alone."""
+    if isinstance(color := tint.get("value"), list):
+        return _scaled(base, [1.0 + coat * (number - 1.0) for number in color])
+    if coat == 1.0 and isinstance(color := base.get("value"), list):
+        return _scaled(tint, color)
+    return base
+
+
+def _scaled(source: Record, factors: list[float]) -> Record:
+    """A colour times a factor of each channel."""
+    if "texture" in source:
+        return {**source, "texture": {**source["texture"], "scale": {"value": [*factors, 1.0]}}}
+    value = source.get("value")
+    return {"value": [a * b for a, b in zip(value, factors, strict=True)]} if isinstance(value, list) else source
+
+
+def _number(given: Record, name: str, default: float) -> float:
+    value = given.get(name, {}).get("value", default)
+    return float(value) if isinstance(value, (bool, int, float)) else default
+
+
+_WRAPS = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror", "constant": "black"}
+
+
+def materialx_node(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+    """What a node of MaterialX gives, in terms of the nodes of ``UsdPreviewSurface``; None of one that is not read."""
+    for beginning, read in _NODES.items():
+        if kind.startswith(beginning):
+            return read(kind, channel, given, node)
+    return None
+
+
+def _image(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record:
+    """An image: codes of sRGB where its file says so; others by what kind of values it gives."""
+    attribute = node.GetAttribute("inputs:file")
+    space = str(attribute.GetColorSpace()) if attribute else ""
+    is_color = "color" in kind
+    texture: Record = {
+        "file": given.get("file", {}),
+        "sourceColorSpace": {"value": "sRGB" if "srgb" in space else "auto" if is_color and not space else "raw"},
+        "wrapS": {"value": _WRAPS.get(given.get("uaddressmode", {}).get("value", ""), "repeat")},
+        "wrapT": {"value": _WRAPS.get(given.get("vaddressmode", {}).get("value", ""), "repeat")},
+        "st": given.get("texcoord", {"primvar": "st"}),
+    }
+    if "uvtiling" in given or "uvoffset" in given:
+        shift = given.get("uvoffset", {}).get("value", [0.0, 0.0])
+        translation = {"value": [-number for number in shift]}
+        texture["st"] = {"transform": {"in": texture["st"], "scale": given.get("uvtiling"), "translation": translation}}
+    return {"texture": texture, "channel": "rgb" if is_color or "vector" in kind else "r"}
+
+
+def _normal_map(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+    source = given.get("in", {})
+    if "texture" not in source:
+        return None
+    return {**source, "texture": {**source["texture"], **_AS_DIRECTIONS}}
+
+
+def _passed_on(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+    return given.get("in", given.get("value"))
+
+
+def _separated(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+    source = given.get("in", {})
+    index = {"outr": "r", "outg": "g", "outb": "b", "outa": "a", "outx": "r", "outy": "g", "outz": "b"}.get(channel)
+    index = index or "rgba"[int(_number(given, "index", 0.0)) % 4]
+    return {**source, "channel": index} if "texture" in source else None
+
+
+def _coordinates(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record:
+    name = (given.get("geomprop") or given.get("varname") or {}).get("value", "st")
+    return {"primvar": name, "fallback": given.get("default")}
+
+
+_NODES: dict[str, Callable[[str, str, Record, Usd.Prim], Record | None]] = {
+    "ND_image_": _image,
+    "ND_tiledimage_": _image,
+    "ND_normalmap": _normal_map,
+    "ND_convert_": _passed_on,
+    "ND_dot_": _passed_on,
+    "ND_constant_": _passed_on,
+    "ND_extract_": _separated,
+    "ND_separate": _separated,
+    "ND_texcoord_": _coordinates,
+    "ND_geompropvalue_": _coordinates,
+}

@@ -1,0 +1,136 @@
+"""Surfaces of MaterialX and OmniPBR: their plain inputs and images, as ``UsdPreviewSurface`` has them."""
+
+import numpy as np
+import pytest
+
+from .test_stage_materials import PICTURE, png, surface
+
+STANDARD, OPEN_PBR = "ND_standard_surface_surfaceshader", "ND_open_pbr_surface_surfaceshader"
+
+
+def material_x(kind, inputs, nodes=""):
+    body = surface(inputs, nodes).replace('"UsdPreviewSurface"', f'"{kind}"')
+    return body.replace("outputs:surface.connect", "outputs:mtlx:surface.connect")
+
+
+@pytest.mark.parametrize(
+    ("kind", "names"),
+    [
+        (STANDARD, ("base", "base_color", "metalness", "specular_roughness", "emission", "emission_color")),
+        (
+            OPEN_PBR,
+            (
+                "base_weight",
+                "base_color",
+                "base_metalness",
+                "specular_roughness",
+                "emission_luminance",
+                "emission_color",
+            ),
+        ),
+    ],
+)
+def test_plain_inputs(read, kind, names):
+    weight, color, metal, rough, glow, glow_color = names
+    inputs = f"""float inputs:{weight} = 0.5
+        color3f inputs:{color} = (0.8, 0.4, 0.2)
+        float inputs:{metal} = 0.75
+        float inputs:{rough} = 0.25
+        float inputs:{glow} = 2
+        color3f inputs:{glow_color} = (0.1, 0.2, 0.3)"""
+    scene = read(material_x(kind, inputs))
+    material = scene.materials[0]
+    assert material.base_color == pytest.approx((0.4, 0.2, 0.1))
+    assert (material.metallic, material.roughness) == (0.75, 0.25)
+    assert material.emission == pytest.approx((0.2, 0.4, 0.6))
+    assert material.alpha == 1.0
+    assert scene.notes == []
+
+
+def test_what_is_not_given_is_as_the_surface_has_it(read):
+    material = read(material_x(STANDARD, "")).materials[0]
+    assert material.base_color == pytest.approx((0.8, 0.8, 0.8))
+    assert (material.roughness, material.metallic, material.emission) == (0.2, 0.0, (0.0, 0.0, 0.0))
+
+
+def test_opacity_of_three_channels_and_transmission(read):
+    material = read(
+        material_x(STANDARD, "color3f inputs:opacity = (0.5, 0.5, 0.5)\nfloat inputs:transmission = 1")
+    ).materials[0]
+    assert (material.alpha, material.alpha_mode) == (0.5, "blend")
+    assert (material.transmission, material.thickness) == (1.0, 1.0)
+
+
+def test_a_coloured_coat_tints_the_base(read):
+    inputs = (
+        "color3f inputs:base_color = (1, 0.5, 0.5)\n float inputs:coat = 0.5\n color3f inputs:coat_color = (1, 1, 0)"
+    )
+    assert read(material_x(STANDARD, inputs)).materials[0].base_color == pytest.approx((1.0, 0.5, 0.25))
+
+
+def test_images_repeat_and_are_decoded_by_their_colour_space(read):
+    nodes = """
+    def Shader "t" {
+        uniform token info:id = "ND_image_color3"
+        asset inputs:file = @t.png@ (colorSpace = "srgb_texture")
+        color3f outputs:out
+    }
+    def Shader "r" {
+        uniform token info:id = "ND_image_float"
+        asset inputs:file = @t.png@
+        float outputs:out
+    }
+"""
+    inputs = "color3f inputs:base_color.connect = </mat/t.outputs:out>\n"
+    inputs += "float inputs:specular_roughness.connect = </mat/r.outputs:out>"
+    scene = read(material_x(STANDARD, inputs, nodes), files={"t.png": png(PICTURE)})
+    material = scene.materials[0]
+    texture = material.base_color_texture
+    assert (texture.srgb, texture.wrap_u, texture.wrap_v) == (True, "repeat", "repeat")
+    rough = material.metallic_roughness_texture.image.pixels[..., 1]
+    np.testing.assert_allclose(rough, np.asarray(PICTURE)[..., 0] / 255, atol=1 / 255)
+    assert scene.notes == []
+
+
+def test_the_surface_for_all_wins_over_those_of_one_renderer(read):
+    body = material_x(STANDARD, "color3f inputs:base_color = (1, 0, 0)")
+    preview = """
+    token outputs:surface.connect = </mat/p.outputs:surface>
+    def Shader "p" {
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:diffuseColor = (0, 1, 0)
+        token outputs:surface
+    }
+"""
+    scene = read(body.replace("    token outputs:mtlx", preview + "    token outputs:mtlx", 1))
+    assert scene.materials[0].base_color == (0.0, 1.0, 0.0)
+
+
+def test_omni_pbr(read):
+    inputs = """color3f inputs:diffuse_color_constant = (0.5, 0.25, 0.125)
+        float inputs:metallic_constant = 1
+        float inputs:reflection_roughness_constant = 0.3
+        float inputs:opacity_constant = 0.2"""
+    body = surface(inputs).replace(
+        'uniform token info:id = "UsdPreviewSurface"',
+        'uniform token info:implementationSource = "sourceAsset"\n uniform asset info:mdl:sourceAsset = @OmniPBR.mdl@\n'
+        ' uniform token info:mdl:sourceAsset:subIdentifier = "OmniPBR"',
+    )
+    body = body.replace("outputs:surface.connect", "outputs:mdl:surface.connect")
+    material = read(body).materials[0]
+    assert material.base_color == (0.5, 0.25, 0.125)
+    assert (material.metallic, material.roughness) == (1.0, pytest.approx(0.3))
+    assert material.alpha == 1.0  # its opacity counts where enable_opacity says so
+    assert material.emission == (0.0, 0.0, 0.0)
+    clear = read(
+        body.replace("float inputs:metallic", "bool inputs:enable_opacity = 1\n float inputs:metallic")
+    ).materials[0]
+    assert clear.alpha == pytest.approx(0.2)
+
+
+def test_an_omni_picture_stands_for_the_constant(read):
+    inputs = "asset inputs:diffuse_texture = @t.png@\n color3f inputs:diffuse_color_constant = (1, 0, 0)"
+    body = surface(inputs).replace('"UsdPreviewSurface"', '"OmniPBR"')
+    material = read(body, files={"t.png": png(PICTURE)}).materials[0]
+    assert material.base_color == (1.0, 1.0, 1.0)
+    assert material.base_color_texture.srgb
