@@ -45,12 +45,23 @@ def test_a_path_of_another_machine_means_the_file_beside_the_scene(folder):
 
 
 def test_a_missing_file_is_named_with_its_likely_meaning(folder):
-    with pytest.raises(SceneError, match=r"scene\.obj:3: texture 'bark\.png' not found; is 'Bark\.PNG' meant\?"):
-        find(folder, "bark.png")
+    with pytest.raises(SceneError, match=r"scene\.obj:3: texture 'bork\.png' not found; is 'Bark\.PNG' meant\?"):
+        find(folder, "bork.png")
     with pytest.raises(SceneError, match=r"texture 'maps' not found"):
         find(folder, "maps")
     with pytest.raises(SceneError, match="not found"):
         find(folder, "a" * 5000)
+
+
+@pytest.mark.parametrize("name", ["bark.png", "textures\\bark.PNG", "C:\\work\\BARK.png", "Maps/leaf.png", "leaf.png"])
+def test_the_one_file_that_differs_in_case_or_folder_is_meant(folder, name):
+    (folder / "maps").mkdir(exist_ok=True)
+    (folder / "maps" / "Leaf.png").touch()
+    assert find(folder, name).name.casefold() == name.replace("\\", "/").rpartition("/")[2].casefold()
+    (folder / "BARK.PNG").touch()
+    (folder / "maps" / "LEAF.png").touch()
+    with pytest.raises(SceneError, match=r"not found|lies outside"):
+        find(folder, name)
 
 
 def test_a_scene_file_is_not_the_answer_to_a_missing_asset(folder):

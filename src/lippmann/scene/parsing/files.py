@@ -92,8 +92,9 @@ def decode_text(data: bytes, where: str) -> str:
 class NamedFiles:
     """The files that a scene file may name: those of its folder and below, links followed.
 
-    Exporters on Windows write backslashes and absolute paths; a path that leads out of the folder is taken to mean the
-    file of that name inside it. Errors tell nothing of what lies outside.
+    Exporters on Windows write backslashes, absolute paths and names in another case, and files are sorted into folders
+    afterwards: a path that leads nowhere, or out of the folder, means the one file of that name in the folder or in the
+    folders directly below. Errors tell nothing of what lies outside.
 
     Attributes
     ----------
@@ -137,11 +138,11 @@ class NamedFiles:
         for candidate in allowed:
             if is_file(candidate):
                 return candidate
-        if absolute or not inside:
-            for folder in folders:
-                beside = folder / PurePosixPath(plain).name
-                if is_file(beside) and self.admits(beside):
-                    return beside
+        for folder in folders:
+            meant = None if absolute else _in_any_case(folder, PurePosixPath(plain).parts)
+            meant = meant or _by_name(folder, PurePosixPath(plain).name)
+            if meant is not None and self.admits(meant):
+                return meant
         if not allowed and any(_lies_in(candidate, self.folder) is False for candidate in candidates):
             raise _outside(name, where, what)
         raise MissingFileError(
@@ -216,6 +217,33 @@ def is_folder(path: Path) -> bool:
         return path.is_dir()
     except (OSError, ValueError):  # as above
         return False
+
+
+def _in_any_case(folder: Path, parts: Sequence[str]) -> Path | None:
+    """The one file at a path below ``folder``, in letters of any case; None where there are several, or none."""
+    for part in parts:
+        matches = [folder / part] if part in (".", "..") else _entries(folder, part)
+        if len(matches) != 1:
+            return None
+        folder = matches[0]
+    return folder if is_file(folder) else None
+
+
+def _by_name(folder: Path, name: str) -> Path | None:
+    """The file of a name in ``folder``; else, in letters of any case, the one in it or in a folder of it."""
+    if is_file(folder / name):
+        return folder / name
+    places = [folder, *(entry for entry in _entries(folder) if is_folder(entry))]
+    matches = [entry for place in places for entry in _entries(place, name) if is_file(entry)]
+    return matches[0] if len(matches) == 1 else None
+
+
+def _entries(folder: Path, name: str | None = None) -> list[Path]:
+    """What a folder holds, or what of it has a name in letters of any case."""
+    try:
+        return [entry for entry in folder.iterdir() if name is None or entry.name.casefold() == name.casefold()]
+    except (OSError, ValueError):
+        return []
 
 
 def _near_miss(path: Path, *, asset: bool = False) -> str:
