@@ -12,7 +12,8 @@ from lippmann.display import load_display
 from lippmann.options.placement import PlacementOptions
 from lippmann.scene.matrices import scaling, translation
 from lippmann.scene.placement import Placement
-from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
+from lippmann.scene.turntable import turn_about
+from lippmann.scene.values.description import Image, Instance, Light, Material, Mesh, SceneDescription, Texture
 from lippmann.sequences.cuts import Moment, is_cut
 from lippmann.sequences.frames import find_stand
 from lippmann.sequences.motion import open_motion
@@ -46,6 +47,20 @@ def places(*matrices):
     return [Instance(0, matrix) for matrix in matrices]
 
 
+def light(matrix, kind="point"):
+    return {"lights": [Light(kind, (1, 1, 1), matrix)]}
+
+
+def turned(degrees):
+    return turn_about((0.0, 1.0, 0.0), np.zeros(3), degrees)
+
+
+def painted(code):
+    """The square's material with a texture of one colour."""
+    image = Image("paint", np.full((2, 2, 3), code, np.uint8))
+    return {"materials": [Material(base_color_texture=Texture(image, srgb=True))]}
+
+
 def test_a_scene_read_anew_is_the_same():
     assert not is_cut(moment(), moment(), DISPLAY)
 
@@ -60,6 +75,7 @@ def test_a_scene_read_anew_is_the_same():
         {"background": (1, 1, 1)},
         {"instances": places(translation([0, 0.4, 0]))},
         {"instances": places(scaling(2))},
+        light(translation([0, 0, 0.4])),
     ],
 )
 def test_what_appears_is_switched_or_jumps(changed):
@@ -70,6 +86,22 @@ def test_smooth_motion():
     assert not is_cut(moment(), moment(instances=places(translation([0.3, 0, 0]))), DISPLAY)
     assert not is_cut(moment(), moment(translation([0, 0, 0.3])), DISPLAY)
     assert is_cut(moment(), moment(translation([0, 0, 0.4])), DISPLAY)
+
+
+def test_light_sources_move_smoothly_or_go_along_with_the_display():
+    assert not is_cut(moment(), moment(**light(translation([0.3, 0, 0]))), DISPLAY)
+    assert not is_cut(moment(**light(np.eye(4), "directional")), moment(**light(turned(30.0), "directional")), DISPLAY)
+    assert is_cut(moment(**light(np.eye(4), "directional")), moment(**light(turned(50.0), "directional")), DISPLAY)
+    far = translation([0, 0, 100])
+    assert not is_cut(moment(**light(far)), moment(turned(10.0), **light(turned(10.0) @ far)), DISPLAY)
+    assert is_cut(moment(**light(far)), moment(turned(10.0), **light(turned(-10.0) @ far)), DISPLAY)
+    assert not is_cut(moment(**light(far)), moment(turned(10.0), **light(far)), DISPLAY)
+
+
+def test_a_texture_is_changed():
+    assert not is_cut(moment(**painted(100)), moment(**painted(100)), DISPLAY)
+    assert is_cut(moment(**painted(100)), moment(**painted(101)), DISPLAY)
+    assert is_cut(moment(**painted(100)), moment(), DISPLAY)
 
 
 @pytest.mark.parametrize("name", ["teapot", "gears", "room"])  # the last two are Whitted tracers'

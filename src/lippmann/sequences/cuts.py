@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.scene.matrices import Bounds, transform_points
@@ -28,22 +30,31 @@ class Moment(NamedTuple):
 def is_cut(before: Moment, after: Moment, display: Display) -> bool:
     """Whether two frames differ by more than smooth motion.
 
-    They do where meshes, materials or light sources are others, their textures aside, or where the display or any mesh
-    has moved farther than a third of the display's width.
+    They do where meshes, materials, textures or light sources are others, or where the display, any mesh or any light
+    source has moved farther than a third of the display's width. Light sources may go along with the display instead.
     """
     width, height = display.size_mm
     panel = box_corners(np.array([[-width / 2, -height / 2, 0], [width / 2, height / 2, 0]]))
-    moved = [(_in_world(panel, before), _in_world(panel, after))]
-    farthest = _FARTHEST * np.linalg.norm(before.placement.world_from_display[:3, 0]) * width
+    moved = [_distances(_in_world(panel, before), _in_world(panel, after))]
+    reach = float(np.linalg.norm(before.placement.world_from_display[:3, 0])) * width
     one, other = before.scene.description, after.scene.description
     # Scenes of Whitted tracers have none: nothing moves in them.
     if one is not other or before.scene.name != after.scene.name:
         if not (isinstance(one, SceneDescription) and isinstance(other, SceneDescription)):
             return True
-        if _content(one) != _content(other):
+        if _content(one) != _content(other) or not _has_same_texels(one, other):
             return True
-        moved.append((_corners(one), _corners(other)))
-    return any(np.linalg.norm(a - b, axis=1).max(initial=0.0) > farthest for a, b in moved)
+        moved.append(_distances(_corners(one), _corners(other)))
+        lights = _lights(one, reach), _lights(other, reach)
+        # A turntable's display goes round with them.
+        along = transform_points(before.placement.world_from_display @ after.placement.display_from_world, lights[1])
+        moved.append(np.minimum(_distances(*lights), _distances(lights[0], along)))
+    return any(distances.max(initial=0.0) > _FARTHEST * reach for distances in moved)
+
+
+def _distances(one: Bounds, other: Bounds) -> NDArray[np.float64]:
+    """Distances ``(n,)`` between points ``(n, 3)``."""
+    return np.asarray(np.linalg.norm(one - other, axis=1))
 
 
 def _in_world(points: Bounds, moment: Moment) -> Bounds:
@@ -55,12 +66,32 @@ def _content(description: SceneDescription) -> object:
     return (
         {mesh: len(places) for mesh, places in description.placements.items()},
         [
-            [value for value in vars(material).values() if not isinstance(value, Texture)]
+            [Texture if isinstance(value, Texture) else value for value in vars(material).values()]
             for material in description.materials
         ],
         [(light.kind, light.color) for light in description.lights],
         (description.environment, description.background, description.splats, description.volume),
     )
+
+
+def _has_same_texels(one: SceneDescription, other: SceneDescription) -> bool:
+    """Whether the textures of as many materials have the same images."""
+    pairs = zip(_textures(one), _textures(other), strict=True)
+    return all(a is b or a.image is b.image or np.array_equal(a.image.pixels, b.image.pixels) for a, b in pairs)
+
+
+def _textures(description: SceneDescription) -> Iterator[Texture]:
+    for material in description.materials:
+        yield from (value for value in vars(material).values() if isinstance(value, Texture))
+
+
+def _lights(description: SceneDescription, reach: float) -> Bounds:
+    """Two points ``(2 n, 3)`` of each light source: its place, and half of ``reach`` from there along its axis."""
+    ends = []
+    for light in description.lights:
+        place, axis = light.world_from_light[:3, 3], light.world_from_light[:3, 2]
+        ends += [place, place + reach / 2 * axis / (np.linalg.norm(axis) or 1.0)]
+    return np.array(ends).reshape(-1, 3)
 
 
 def _corners(description: SceneDescription) -> Bounds:
