@@ -199,3 +199,15 @@ def test_version_and_help(lippmann):
     assert lippmann("--version").out.strip() == f"lippmann {package.__version__}"
     for words in ((), *((name,) for name in ("render", "preview", "info", "views", "compose", "replay", "refocus"))):
         assert "--help" in lippmann(*words, "--help").out
+
+
+def test_what_is_split_or_refocused_is_named_after_the_picture(lippmann, picture, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for words, name in (
+        (("views",), "views"),
+        (("micro-images",), "micro-images"),
+        (("refocus", "--plane", "0"), "refocused.png"),
+        (("refocus", "--planes", "-5:5:2"), "planes"),
+    ):
+        assert lippmann(words[0], picture, *words[1:]).code == 0
+        assert (tmp_path / f"{picture.stem}-{name}").exists()

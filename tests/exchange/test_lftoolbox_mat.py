@@ -73,10 +73,12 @@ def test_older_versions_are_read(tmp_path, dtype, compressed):
     np.testing.assert_array_equal(found.values, values.astype(np.float32) if dtype == np.float64 else values)
 
 
-def test_another_program_s_version_7_3_is_read(tmp_path):
+@pytest.mark.parametrize("name", ["LF", "LF/LF"])
+def test_another_program_s_version_7_3_is_read(tmp_path, name):
+    """The 4D Light Field Benchmark's ``LF.mat`` keeps the views in a structure."""
     values = np.random.default_rng(0).integers(0, 255, (2, 3, 4, 5, 4), dtype=np.uint8)
     with h5py.File(tmp_path / "x.mat", "w", userblock_size=512) as file:
-        file["LF"] = values.transpose()
+        file[name] = values.transpose()
         file.create_group("#refs#")
     with (tmp_path / "x.mat").open("r+b") as file:
         file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
@@ -294,4 +296,5 @@ def test_variables_of_version_5_hold_numbers(tmp_path, kind, colors):
     dtype = {"cell": object, "struct": [("a", "f8")], "logical": bool, "complex": complex}[kind]
     values = np.zeros((2, 2, 3, 4, colors), dtype)
     scipy.io.savemat(tmp_path / "x.mat", {"LF": values})
-    assert "LF holds " in refused(tmp_path / "x.mat")
+    assert "LF holds " in (line := refused(tmp_path / "x.mat"))
+    assert line.endswith("save('lf.mat', 'LF', '-v7.3')") == (kind == "struct")

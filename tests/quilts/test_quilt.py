@@ -56,6 +56,7 @@ def test_rows_of_all_views_are_those_of_each():
         ("x_qs2x2a1_qs11x6a0.5625.exr", (11, 6, 0.5625)),
         ("_qs32x1a2.png", (32, 1, 2.0)),
         ("x_qs8x6a0.75 (1).png", (8, 6, 0.75)),  # downloaded twice
+        ("x_qs8x6a0,75.png", (8, 6, 0.75)),
         ("x_QS8x6a.75_final.jpg", (8, 6, 0.75)),
         ("testCircleqs5x9a0.5625.png", (5, 9, 0.5625)),
         ("hologram_qs5x9a1.7777777777777777.png", (5, 9, 16 / 9)),  # the maker's WebXR library

@@ -147,7 +147,8 @@ def _check_variable(shape: tuple[int, ...], names: list[str], path: Path) -> Non
 
 
 def _not_numeric(name: str, kind: str, path: Path) -> PictureError:
-    return PictureError(f"{name} holds {kind}", where=str(path), rule="a light field holds numbers")
+    fix = f"in MATLAB: {name} = {name}.{name}; save('lf.mat', '{name}', '-v7.3')" if "struct" in kind else ""
+    return PictureError(f"{name} holds {kind}", where=str(path), rule="a light field holds numbers", fix=fix)
 
 
 def _read_hdf5(path: Path) -> tuple[NDArray[Any], str]:
@@ -156,6 +157,9 @@ def _read_hdf5(path: Path) -> tuple[NDArray[Any], str]:
         with h5py.File(path, "r") as file:
             names = [name for name in map(str, file) if not name.startswith("#")]
             light_field = _dataset(h5py, file, _VARIABLE, path)
+            # The 4D Light Field Benchmark's LF.mat is a structure, whose field LF holds the views.
+            if light_field is None and file.get(_VARIABLE, getclass=True) is h5py.Group:
+                light_field = _dataset(h5py, file, f"{_VARIABLE}/{_VARIABLE}", path)
             shape = () if light_field is None else light_field.shape or ()  # a null dataset has no shape
             _check_variable(shape[::-1], names, path)
             note = _dataset(h5py, file, TEXT_KEY, path)
@@ -206,10 +210,10 @@ def _read_version_5(path: Path) -> tuple[NDArray[Any], str]:
         check_input(path.stat().st_size, "the file", where=str(path))
         variables = {variable.name: variable for variable in read_variables(path.read_bytes())}
         array = variables.get(_VARIABLE)
+        if array is not None and not array.is_numeric:  # cells, structures, objects or functions
+            raise _not_numeric(_VARIABLE, f"the class {array.kind}", path)
         _check_variable(() if array is None else array.shape, sorted(variables), path)
         assert array is not None
-        if not array.is_numeric:  # cells, structures, objects or functions
-            raise _not_numeric(_VARIABLE, f"the class {array.kind}", path)
         values: NDArray[Any] = array.values(str(path))
     except (Matlab5Error, OSError) as error:
         raise _damaged(path, error) from error

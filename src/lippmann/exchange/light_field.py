@@ -160,8 +160,8 @@ class LightField:
         if self.cameras is not None and down == across:
             return self.cameras.display(across, width, height, where=where)
         what = "has no display in it" if self.cameras is None else f"has {across} x {down} views, of unlike number"
-        fix = f"say display=..., with {across} x {down} pixels per lens and {width} x {height} lenses"
-        raise PictureError(what, where=where, fix=fix)
+        rule = f"its display has {across} x {down} pixels under each lens, for its views, and {width} x {height} lenses"
+        raise PictureError(what, where=where, rule=rule, fix="describe it in a TOML file, and say display=FILE")
 
     def _origin(self, scene: str, layout: str) -> tuple[NDArray[np.float64], Provenance]:
         if self.metadata is not None:

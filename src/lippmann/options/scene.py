@@ -95,7 +95,7 @@ class SceneOptions(Options):
         is_file=True,
     )
     background: tuple[float, float, float] | None = _light(
-        None, "Colour seen where nothing is hit: R,G,B, linear, 0 to 1.", first=True, read=texts.triple
+        None, "Colour seen where nothing is hit: R,G,B, linear, 0 to 1.", first=True, read=texts.color
     )
     single_scattering: bool = _scene(
         False, "Shade rough metal and glass exactly by glTF's formulas, which lose light between microfacets."

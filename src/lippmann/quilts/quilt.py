@@ -35,7 +35,7 @@ _NOTEBOOK_WIDTH = 768
 #: As players find it: anywhere in the name, the last of several, so that ``_qs8x6a0.75 (1)`` is known. Without an
 #: aspect the name ends there.
 QUILT_NAME = re.compile(
-    r"\A.*qs(\d{1,4})x(\d{1,4})(?:a(\d{0,4}(?:\.\d{1,17})?)(?<=\d)(?![\d.]*\d)|$)", re.IGNORECASE | re.DOTALL
+    r"\A.*qs(\d{1,4})x(\d{1,4})(?:a(\d{0,4}(?:[.,]\d{1,17})?)(?<=\d)(?![\d.,]*\d)|$)", re.IGNORECASE | re.DOTALL
 )
 _PAIR = re.compile(r"_(?:half_)?2x1$")
 _CONVENTION = "a quilt's name ends in columns x rows and aspect ratio, such as _qs8x6a0.75.png"
@@ -335,7 +335,7 @@ def layout_of_name(path: Path) -> QuiltLayout:
     match = QUILT_NAME.search(path.stem)
     if match is None:
         raise PictureError("the name does not say how many views there are", where=str(path), rule=_CONVENTION)
-    aspect = None if match[3] is None else float(match[3])
+    aspect = None if match[3] is None else float(match[3].replace(",", "."))  # some languages' mark of decimals
     return checked_layout(int(match[1]), int(match[2]), aspect, where=str(path))
 
 

@@ -117,6 +117,7 @@ def test_content_counts_where_the_name_says_nothing(save):
         ("a.obj", b"glTF....", r"a\.obj: is no \.obj file; it begins like a \.glb file"),
         ("a.ply", XML.encode(), r"a\.ply: is no \.ply file; it begins like a \.xml file"),
         ("a.ply", b"\n<!DOCTYPE html><title>404", r"a\.ply: is a web page, no scene; download the file itself"),
+        ("transforms_train.json", b'{"frames": []}', r"transforms_train\.json: lists photographs and their cameras"),
         ("a.vtp", b"<html>", r"a\.vtp: is a web page"),
         ("a.stl", b"PK\3\4....", r"a\.stl: is a ZIP archive; unpack it, and name the scene file inside"),
         ("a.usdz", b"PK\3\4....", r"a\.usdz: is no USDZ package"),

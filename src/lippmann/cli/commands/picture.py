@@ -59,7 +59,7 @@ def info(
 
 def views(
     picture: options.Picture,
-    output: options.Folder,
+    output: options.OptionalFolder = None,
     format: Format = None,
     bits: options.Bits = None,
     display: options.PictureDisplay = None,
@@ -70,7 +70,7 @@ def views(
     from lippmann.image import open_picture, write_views
     from lippmann.image.views import view_grid
 
-    console = Console(quiet, as_json)
+    console, output = Console(quiet, as_json), output_of(output, picture, "-views")
     image = open_picture(picture, display=parse.display(display))
     with console.progress() as progress:
         count = write_views(image, output, format=format, bits=bits, progress=progress)
@@ -84,7 +84,7 @@ def views(
 
 def micro_images(
     picture: options.Picture,
-    output: options.Folder,
+    output: options.OptionalFolder = None,
     format: Format = None,
     bits: options.Bits = None,
     display: options.PictureDisplay = None,
@@ -94,7 +94,7 @@ def micro_images(
     """Split a picture into micro-images: one picture per lens."""
     from lippmann.image import open_picture, write_micro_images
 
-    console = Console(quiet, as_json)
+    console, output = Console(quiet, as_json), output_of(output, picture, "-micro-images")
     image = open_picture(picture, display=parse.display(display))
     with console.progress() as progress:
         count = write_micro_images(image, output, format=format, bits=bits, progress=progress)
@@ -306,7 +306,7 @@ def _replay_depth(
 
 def refocus(
     picture: options.Picture,
-    output: options.Output,
+    output: options.OptionalOutput = None,
     plane: Annotated[
         float | None,
         typer.Option("--plane", help="Height of the focus plane in mm, positive toward the viewer."),
@@ -336,8 +336,9 @@ def refocus(
 
     console = Console(quiet, as_json)
     if (plane is None) == (planes is None):
-        raise UsageError("say --plane or --planes", rule="one plane, or FIRST:LAST:COUNT")
+        raise UsageError("say --plane or --planes", rule="mm before the lens plane, which is 0, or FIRST:LAST:COUNT")
     heights = [] if planes is None else parse.steps(planes, "--planes")
+    output = output_of(output, picture, "-planes" if plane is None else "-refocused.png")
     if plane is None:
         check_stack_path(output, bits)
     else:

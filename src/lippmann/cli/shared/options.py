@@ -45,6 +45,15 @@ Open = Annotated[
     typer.Option("--open", help="View the result in a browser once it is written.", rich_help_panel="Output"),
 ]
 Folder = Annotated[Path, typer.Option("--output", "-o", help="The folder to write; it appears whole or not at all.")]
+OptionalFolder = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        help="The folder to write; it appears whole or not at all. By default named after the picture, in this folder.",
+        show_default=False,
+    ),
+]
 Picture = Annotated[Path, typer.Argument(help="A picture that Lippmann wrote (PNG, EXR, TIFF or Zarr).")]
 DisplayName = Annotated[
     str,

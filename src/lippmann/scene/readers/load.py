@@ -358,6 +358,9 @@ def _reader_of(path: Path, suffix: str) -> Plugin[Reader]:
 def _refuse_others(path: Path, suffix: str) -> None:
     """Raise :class:`SceneError` for an archive or a web page that is called as a scene file."""
     head = read_bytes(path, 32).lstrip().lower()
+    if suffix == ".json" and path.stem.startswith("transforms"):
+        what, fix = "lists photographs and their cameras, no scene", "train splats of them, and name the .ply file"
+        raise SceneError(what, where=path.name, fix=fix)
     for start, (what, fix) in _NO_SCENES.items():
         if head.startswith(start) and not (start.startswith(b"pk") and suffix in _ZIPPED):
             raise SceneError(what, where=path.name, fix=fix)
