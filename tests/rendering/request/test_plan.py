@@ -86,7 +86,7 @@ def test_a_photograph_has_one_ray_a_pixel_and_keeps_its_colours():
     found = resolve(RenderRequest(tone_map="auto"), unlit(fills_panel=True), load_display("seed-lenticular"))
     assert (found.method, found.denoise, found.spp, found.pixel_filter) == ("full", "none", 1, "point")
     assert (found.tone_map, found.exposure) == ("none", 0.0)
-    assert found.reason == "full: a photograph has no noise"
+    assert found.reason == "full: a photograph is shown as it is"
     assert found.spp_reserve is None
 
 

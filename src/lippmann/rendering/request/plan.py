@@ -227,7 +227,7 @@ def _method(facts: _Facts) -> Choice[Method]:
         (request.method != "auto", request.method, ASKED),
         (scene.is_off_surfaces_alone, "full", f"{kinds} have no noise"),
         (scene.lies_off_surfaces, "full", f"{kind}, whose light lies on no surface"),
-        (facts.is_photograph, "full", "a photograph has no noise"),
+        (facts.is_photograph, "full", "a photograph is shown as it is"),
         (facts.is_denoised_draft, "full", "a draft, denoised"),  # sharing takes a while for 0.4 dB
         (facts.shows_own_colors, "full", "unlit surfaces have no noise inside their edges"),
         (request.denoise != "auto", "full", f"{denoising}, as asked for"),
