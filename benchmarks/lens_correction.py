@@ -3,10 +3,10 @@
 python benchmarks/lens_correction.py [SCENE ...]
 
 Each bundled scene, or each scene or file named, is rendered for a 60-lpi print whose crest is at best focus, and 20 %
-above the paraxial focus. Rays go through the middles of lenses, as those of a picture that is not corrected, or all
-across them. Pictures of rays through the middles: along the directions of a pinhole at thickness over index (`t/n`),
-of one at the gap (`gap`), and along true directions (`true`). Pictures of rays across: `t/n across`, `true across`,
-and `corrected`.
+above the paraxial focus. Rays go through the middles of lenses, as for pinholes, or all across them, as `render` sends
+them where a lens is given. Pictures of rays through the middles: along the directions of a pinhole at thickness over
+index (`t/n`), of one at the gap (`gap`), and along true directions (`true`). Pictures of rays across: `t/n across`,
+`true across`, and `corrected`.
 
 The light that each picture sends through the lens is compared with rays in directions that were not solved for: the
 middles of thirds of pixels, where the correction knows halves. Under `psnr` these rays go across the lenses: a lens has
@@ -21,12 +21,12 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from harness import RESULTS, machine, save
-from lippmann.corrected import WholeLensDisplay
 from lippmann.display import load_display
 from lippmann.optics.correction import TOLERANCE, LensCorrection, parts_beside
 from lippmann.optics.pixel_shares import pixel_shares
@@ -92,7 +92,7 @@ def measure(scene, crest):
     exposure = choose_exposure(scene, own, RenderRequest(integrator="direct", threads=1))
     pinhole = replace(own, distortion=None)
     simple = replace(pinhole, gap=own.lens.thickness / own.lens.index)
-    whole = WholeLensDisplay.of
+    middles = partial(replace, lens=None)
 
     def halves(display):
         # Each has random numbers of its own: else the noise of both would be the same.
@@ -101,18 +101,18 @@ def measure(scene, crest):
             for number, each in enumerate(parts_beside())
         ]
 
-    middle, across = halves(own), halves(whole(own))
+    middle, across = halves(middles(own)), halves(own)
     pictures = {
-        "t/n": render(scene, simple, exposure, SAMPLES),
-        "gap": render(scene, pinhole, exposure, SAMPLES),
+        "t/n": render(scene, middles(simple), exposure, SAMPLES),
+        "gap": render(scene, middles(pinhole), exposure, SAMPLES),
         "true": np.mean(middle, axis=0),
-        "t/n across": render(scene, whole(simple), exposure, SAMPLES),
+        "t/n across": render(scene, simple, exposure, SAMPLES),
         "true across": np.mean(across, axis=0),
         "corrected": LensCorrection(own).rows(across),
     }
     columns = {name: columns_of(pixels) for name, pixels in pictures.items()}
     table, row = light_table_of(own, own), {}
-    for key, display in (("psnr", whole(own)), ("psnr of middles", own)):
+    for key, display in (("psnr", own), ("psnr of middles", middles(own))):
         thirds = (render(scene, display, exposure, TRUTH_SAMPLES, beside=each, width=1 / 3, seed=1) for each in JUDGED)
         truth = np.concatenate([columns_of(pixels) for pixels in thirds])
         free, bounded = best(table, truth)

@@ -1,17 +1,14 @@
 """Scenes rendered for the lens that is there: pixels whose light through it comes nearest to what rays meet.
 
 The light that is meant has more directions than the display has pixels: it is the picture of a display with pixels half
-as wide. It is that of whole lenses: a lens has one colour to an eye, and nearest to the scene is the mean of all that
-stands behind the lens, not the colour behind its middle.
+as wide.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 
 from lippmann.display import Display
-from lippmann.display.array_ops import NUMPY, Array, ArrayOps
-from lippmann.display.display import Vector
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
 from lippmann.image.stored_values import FloatArray
@@ -75,28 +72,7 @@ def render_corrected(
     return IntegralImage(pixels, display, finer.world_from_display, provenance)
 
 
-@dataclass(frozen=True)
-class WholeLensDisplay(Display):
-    """A display whose pixels record the light of all of their lens, not of its middle alone.
-
-    Samples of a pixel run across the lens as they run down the pixel.
-    """
-
-    @staticmethod
-    def of(display: Display) -> WholeLensDisplay:
-        """Such a display with all else as it is."""
-        return WholeLensDisplay(**{each.name: getattr(display, each.name) for each in fields(Display)})
-
-    def light_ray(self, x: Array, y: Array, ops: ArrayOps = NUMPY) -> tuple[Vector, Vector]:
-        """:meth:`Display.light_ray` moved in parallel across the lens, by the place of ``y`` in its row of pixels."""
-        (origin_x, origin_y, origin_z), direction = super().light_ray(x, y, ops)
-        _, v = self.pixel_coordinates(x, y)
-        aside = (v - ops.floor(v) - 0.5) * self.lens_array.pitch
-        aside_x, aside_y = self.lattice.from_axes(aside, 0.0)
-        return (origin_x + aside_x, origin_y + aside_y, origin_z), direction
-
-
-def finer_display(display: Display) -> WholeLensDisplay:
+def finer_display(display: Display) -> Display:
     """The same lenses before pixels half as wide and high; the middles of its sub-pixels lie where they lay."""
     panel = display.panel
     red, green, blue = ((PARTS * right, PARTS * down) for right, down in panel.subpixel_offsets)
@@ -107,7 +83,7 @@ def finer_display(display: Display) -> WholeLensDisplay:
         pixel_pitch=panel.pixel_pitch / PARTS,
         subpixel_offsets=(red, green, blue),
     )
-    return WholeLensDisplay.of(replace(display, panel=finer, sheet=None, pixel=None))
+    return replace(display, panel=finer, sheet=None, pixel=None)
 
 
 def parts_of(pixels: FloatArray) -> list[FloatArray]:

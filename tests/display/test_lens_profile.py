@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from lippmann.display import Display, load_display
@@ -67,3 +68,19 @@ def test_a_display_checks_its_lens_and_keeps_it():
     # A pinhole is written as it always was.
     assert "lens" not in display.to_dict()
     assert "lens" not in display.in_words()
+
+
+@pytest.mark.parametrize("name", ["panel-4k", "mla-square", "mla-hexagonal"])
+def test_points_of_a_lens_fill_it_across_the_way_of_the_pixel(name):
+    display = load_display(name)
+    s, t = (each.ravel() for each in np.meshgrid(*(2 * [(np.arange(9) + 0.5) / 9]), indexing="ij"))
+    assert display.aperture_point(s, t) == (0.0, 0.0)
+    pitch, lenses = display.lens_array.pitch, display.lens_array
+    full = replace(display, lens=LensProfile(3.0 * pitch, 4.0 * pitch))
+    narrow = replace(display, lens=LensProfile(3.0 * pitch, 4.0 * pitch, diameter=0.5 * pitch))
+    right, up = full.aperture_point(s, t)
+    np.testing.assert_allclose(np.array(narrow.aperture_point(s, t)), 0.5 * np.array([right, up]))
+    across, along = full.lattice.across(right, up), full.lattice.along(right, up)
+    np.testing.assert_allclose(across, (t - 0.5) * pitch, atol=1e-12)
+    high = 0.0 if lenses.layout == "lenticular" else lenses.row_spacing
+    np.testing.assert_allclose(along, (s - 0.5) * high, atol=1e-12)

@@ -11,6 +11,7 @@ import trimesh
 
 import lippmann
 from lippmann.display import Display, LensArray, Panel
+from lippmann.display.lens_profile import LensProfile
 from lippmann.display.view_cone import panel_window, view_window
 from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.session import even_background
@@ -169,3 +170,18 @@ def test_only_an_even_background_is_known_without_rays(ball):
     assert even_background(built, RenderRequest(integrator="normal")) is None
     lit = lippmann.load_scene(trimesh.creation.box(), environment=None, background=(0.1, 0.2, 0.3))
     assert even_background(build(lit), RenderRequest(integrator="direct")) == (0.1, 0.2, 0.3)
+
+
+def test_rays_from_all_across_lenses_meet_a_box_inside_its_window_alone():
+    lenses, lens = LensArray("lenticular", 6.0), LensProfile(4.0, 8.0)
+    display = Display("real", Panel(300, 240, 0.2), lenses, 5.0, lens=lens, aperture_distance=15.0)
+    x, y, z = (each.ravel() for each in np.meshgrid([-6.5, 6.5], [-4.0, 4.0], [-0.2, 0.0]))
+    window = panel_window(np.stack([x, y, z], axis=1), display)
+    u, v = np.meshgrid(np.arange(300) + 0.5, np.arange(240) + 0.5)
+    (ox, oy, oz), (dx, dy, dz) = display.light_ray(*display.panel_point(u, v))
+    for edge in (0.0, 1.0):
+        aside, _ = display.aperture_point(0.5, edge)
+        meets = (np.abs(ox + aside - oz / dz * dx) <= 6.5) & (np.abs(oy - oz / dz * dy) <= 4.0)
+        rows, columns = np.nonzero(meets)
+        assert window.left <= columns.min() < columns.max() < window.left + window.width
+        assert window.top <= rows.min() < rows.max() < window.top + window.height

@@ -324,6 +324,22 @@ class Display:
         aperture = length * 0.0 + self.aperture_distance
         return (*origin, aperture), (slope_x / length, slope_y / length, -1.0 / length)
 
+    def aperture_point(self, s: Array, t: Array) -> tuple[Array, Array]:
+        """Point of a lens for ``s`` and ``t`` in [0, 1), in mm from its middle: all of its light has one direction.
+
+        Micro-lenses are taken for rectangles. Pinholes have no other point than their middle.
+
+        ``s`` goes along the lens, not across it: where it is the place across a pixel, which decides the direction,
+        places in the lens and directions are independent of each other, axis by axis.
+        """
+        if self.lens is None:
+            return 0.0, 0.0
+        fill = 1.0 if self.lens.diameter is None else self.lens.diameter / self.lens_array.pitch
+        across = (t - 0.5) * fill * self.lens_array.pitch
+        if self.lens_array.layout == "lenticular":
+            return self.lattice.from_axes(across, 0.0)
+        return across, (s - 0.5) * fill * self.lens_array.row_spacing
+
     def pinhole_place(self, place: Array, ops: ArrayOps = NUMPY) -> Array:
         """Place across a lens, in mm from its axis, at which a pinhole at the gap has the direction of ``place``."""
         return place if self.distortion is None else self.distortion.pinhole_place(place, 0.0 * place, ops)[0]

@@ -113,8 +113,9 @@ def panel_window(corners: NDArray[np.float64], display: Display) -> PixelWindow 
     x, y = ((corners[:, axis] + share * either * z) / nearness for axis, share in enumerate(shares))
     columns = x / panel.pixel_pitch + panel.width / 2
     rows = panel.height / 2 - y / panel.pixel_pitch
-    # Sub-pixels lie up to a pixel beside their own.
-    margin = math.ceil(reach / panel.pixel_pitch) + 1 + _MARGIN
+    # Rays of real lenses start as far beside their middles. Sub-pixels lie up to a pixel beside their own.
+    aside = 0.0 if display.lens is None else reach
+    margin = math.ceil((reach + aside) / panel.pixel_pitch) + 1 + _MARGIN
     return _window(columns, rows, (panel.width, panel.height), margin)
 
 

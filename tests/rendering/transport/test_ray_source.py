@@ -46,6 +46,8 @@ def test_device_rays_equal_numpy_rays(display, subpixels):
     else:
         x, y = display.panel_point(u, v)
     origin, direction = (np.array(part) for part in display.light_ray(x, y))
+    for axis, aside in enumerate(display.aperture_point(*jitter.astype(float))):
+        origin[axis] += aside
     expected_o = TURN[:3, :3] @ origin + TURN[:3, 3:]
     expected_d = TURN[:3, :3] @ direction / 2
     scale = np.abs(expected_o).max()

@@ -88,7 +88,7 @@ class DisplayRays(OnePicture):
     """Rays along the light lines of a display's pixels or sub-pixels.
 
     The samples of a pixel fill its square. Those of a sub-pixel fill a third of its width about the sub-pixel's own
-    place.
+    place. Before lenses with a profile they also fill the aperture of the lens, in parallel.
 
     Parameters
     ----------
@@ -119,7 +119,9 @@ class DisplayRays(OnePicture):
             x, y = self.display.subpixel_point(u, v, mi.Float64(channel), DEVICE)
         else:
             x, y = self.display.panel_point(u, v)
-        return self.display.light_ray(x, y, DEVICE)
+        (ox, oy, oz), direction = self.display.light_ray(x, y, DEVICE)
+        aside_x, aside_y = self.display.aperture_point(mi.Float64(jitter.x), mi.Float64(jitter.y))
+        return (ox + aside_x, oy + aside_y, oz), direction
 
 
 class WindowRays(OnePicture):
