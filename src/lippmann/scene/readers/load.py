@@ -84,7 +84,6 @@ _ELSEWHERE = {
     **dict.fromkeys((".mgz", ".mgh"), "convert it by FreeSurfer: mri_convert in.mgz out.nii.gz"),
     ".mtl": "it holds the materials of an .obj file: name that",
     ".hdr": "save it as .nii or .nii.gz, which hold header and voxels in one file",
-    ".3mf": "save it as .stl in the slicer, or with trimesh and lxml: trimesh.load_mesh('a.3mf').export('a.stl')",
     ".amf": "save it as .stl in the slicer",
     **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar"), "unpack it, and name the scene file inside"),
     ".zae": "unzip it, open the .dae in Blender, then File > Export > glTF 2.0 (.glb)",
@@ -103,7 +102,7 @@ _NO_SCENES = {
     **dict.fromkeys((b"<!doctype html", b"<html"), ("is a web page, no scene", "download the file itself")),
 }
 #: Kinds that are ZIP archives themselves.
-_ZIPPED = (".npz", ".sog", ".usdz", ".usd")
+_ZIPPED = (".3mf", ".npz", ".sog", ".usdz", ".usd")
 
 _DIRECTIONS: dict[Up, Direction] = {"y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0), "-y": (0.0, -1.0, 0.0)}
 

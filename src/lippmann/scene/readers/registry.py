@@ -169,6 +169,7 @@ _OWN = {
     "sog": Reader((".sog",), f"{_HERE}.splats.sog:read_sog", options=("files",), up="-y"),
     "spz": Reader((".spz",), f"{_HERE}.splats.spz:read_spz", up="y"),
     "stl": Reader((".stl",), f"{_HERE}.stl:read_stl", up="z"),
+    "3mf": Reader((".3mf",), f"{_HERE}.three_mf.reader:read_three_mf", up="z"),
     "usd": Reader(
         (".usd", ".usda", ".usdc", ".usdz"),
         f"{_HERE}.usd:read_usd",

@@ -1,0 +1,229 @@
+"""Parts of a 3MF package: its models as they stand in XML.
+
+By the 3MF Core Specification 1.3 and its extensions Materials and Properties 1.2 and Production 1.1.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.errors import SceneError
+from lippmann.runtime.machine import check_input
+from lippmann.scene.parsing.files import read_bytes
+
+#: Millimetres of the units that a model may be in.
+UNITS = {"micron": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
+
+#: Bytes that an element takes while a model is read, at most, over its bytes as text.
+_BYTES_PER_BYTE = 8
+_MODEL = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
+#: Elements that are not read, and what they would show.
+_UNREAD = {
+    "compositematerials": "mixtures of materials",
+    "multiproperties": "several properties in one",
+    "beamlattice": "lattices of beams",
+}
+_COLOR = re.compile("#([0-9a-fA-F]{6})([0-9a-fA-F]{2})?")
+
+
+class Placed(NamedTuple):
+    """An object of a part, and where: ``world_from_object`` ``(4, 4)`` in units of the model."""
+
+    part: str
+    number: str
+    matrix: NDArray[np.float64]
+
+
+@dataclass
+class Group:
+    """Properties that corners refer to by their places: sRGB codes ``(r, g, b, a)``, or ``(u, v)`` on a picture."""
+
+    values: list[tuple[float, ...]] = field(default_factory=list)
+    picture: str = ""
+
+
+#: Vertices, the group of the properties of its corners, and their places there.
+Triangle = tuple[int, int, int, str | None, int, int, int]
+
+
+@dataclass
+class Shape:
+    """An object: vertices ``x, y, z``, triangles, or objects that it is made of."""
+
+    group: str | None
+    index: int
+    vertices: list[tuple[float, float, float]] = field(default_factory=list)
+    triangles: list[Triangle] = field(default_factory=list)
+    components: list[Placed] = field(default_factory=list)
+
+
+@dataclass
+class Part:
+    """A model: its objects and properties by their numbers, what is to be built of them, the files of its pictures."""
+
+    scale: float = 1.0
+    shapes: dict[str, Shape] = field(default_factory=dict)
+    groups: dict[str, Group] = field(default_factory=dict)
+    pictures: dict[str, tuple[str, str]] = field(default_factory=dict)
+    build: list[Placed] = field(default_factory=list)
+    unread: dict[str, None] = field(default_factory=dict)
+
+
+class Package:
+    """A 3MF package, whose parts are read when they are asked for."""
+
+    def __init__(self, path: Path) -> None:
+        """Open a package; a :class:`SceneError` where it is none."""
+        self.where = path.name
+        read_bytes(path, 4)
+        try:
+            self._archive = zipfile.ZipFile(path)
+        except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
+            raise SceneError(f"is no 3MF package ({error})", where=self.where, rule="it is a ZIP archive") from None
+        self._parts: dict[str, Part] = {}
+
+    def close(self) -> None:
+        """Close the archive."""
+        self._archive.close()
+
+    def bytes_of(self, name: str) -> bytes:
+        """What a file of the package holds."""
+        try:
+            entry = self._archive.getinfo(name.lstrip("/"))
+            check_input(_BYTES_PER_BYTE * entry.file_size, f"'{name}'", where=self.where)
+            return self._archive.read(entry)
+        except (KeyError, zipfile.BadZipFile, OSError, ValueError, RuntimeError, NotImplementedError, EOFError):
+            raise SceneError(f"has no whole file '{name}'", where=self.where, fix="is the package cut short?") from None
+
+    def start(self) -> str:
+        """The name of the model that is shown: that of the package's relations."""
+        target = ""
+
+        def begin(_: str, attributes: dict[str, str]) -> None:
+            nonlocal target
+            if attributes.get("Type") == _MODEL:
+                target = target or attributes.get("Target", "")
+
+        self._parse("_rels/.rels", begin)
+        return posixpath.join("/", target or "3D/3dmodel.model")
+
+    def part(self, name: str) -> Part:
+        """A model of the package."""
+        if name not in self._parts:
+            reader = _PartReader(name)
+            self._parts[name] = reader.part
+            self._parse(name, reader.begin)
+        return self._parts[name]
+
+    def _parse(self, name: str, begin: Callable[[str, dict[str, str]], None]) -> None:
+        parser = expat.ParserCreate()
+        parser.StartElementHandler = begin
+
+        def refuse(*_: object) -> None:
+            raise SceneError(f"'{name}' declares a document type", where=self.where, rule="models have none")
+
+        parser.StartDoctypeDeclHandler = refuse
+        try:
+            parser.Parse(self.bytes_of(name), True)
+        except expat.ExpatError as error:
+            raise SceneError(f"'{name}' is no well-formed XML ({error})", where=self.where) from None
+        except (KeyError, ValueError, LookupError) as error:
+            fault = f"'{name}', line {parser.CurrentLineNumber}: {error} is missing or no value of its kind"
+            raise SceneError(fault, where=self.where, fix="is the file whole?") from None
+
+
+class _PartReader:
+    """Takes the elements of a model in the order in which they begin."""
+
+    def __init__(self, name: str) -> None:
+        self.part = Part()
+        self._name = name
+        self._group, self._shape = Group(), Shape(None, 0)
+        self._take = {
+            "model": self._model,
+            "object": self._object,
+            "component": self._component,
+            "item": self._item,
+            **dict.fromkeys(("basematerials", "colorgroup"), self._colors),
+            "base": self._base,
+            "color": self._color,
+            "texture2d": self._texture2d,
+            "texture2dgroup": self._texture2dgroup,
+            "tex2coord": self._tex2coord,
+        }
+
+    def begin(self, tag: str, given: dict[str, str]) -> None:
+        """Take an element."""
+        if tag == "vertex":
+            self._shape.vertices.append((float(given["x"]), float(given["y"]), float(given["z"])))
+            return
+        if tag == "triangle":
+            group = given.get("pid", self._shape.group)
+            first = int(given.get("p1", self._shape.index))
+            self._shape.triangles.append(
+                (
+                    *(int(given["v1"]), int(given["v2"]), int(given["v3"])),
+                    *(group, first, int(given.get("p2", first)), int(given.get("p3", first))),
+                )
+            )
+            return
+        plain = {key.rpartition(":")[2]: value for key, value in given.items()}
+        name = tag.rpartition(":")[2]
+        if name in self._take:
+            self._take[name](plain)
+        elif name in _UNREAD:
+            self.part.unread[_UNREAD[name]] = None
+
+    def _model(self, given: dict[str, str]) -> None:
+        self.part.scale = UNITS[given.get("unit", "millimeter")]
+
+    def _object(self, given: dict[str, str]) -> None:
+        self._shape = self.part.shapes[given["id"]] = Shape(given.get("pid"), int(given.get("pindex", 0)))
+
+    def _component(self, given: dict[str, str]) -> None:
+        self._shape.components.append(self._placed(given))
+
+    def _item(self, given: dict[str, str]) -> None:
+        if given.get("printable") != "0":
+            self.part.build.append(self._placed(given))
+
+    def _placed(self, given: dict[str, str]) -> Placed:
+        matrix = np.eye(4)
+        if "transform" in given:  # rows of the matrix that acts on row vectors, without the last column
+            matrix[:3] = np.array([float(value) for value in given["transform"].split()]).reshape(4, 3).T
+        return Placed(posixpath.join("/", given.get("path", self._name)), given["objectid"], matrix)
+
+    def _colors(self, given: dict[str, str]) -> None:
+        self._group = self.part.groups[given["id"]] = Group()
+
+    def _base(self, given: dict[str, str]) -> None:
+        self._group.values.append(_color(given.get("displaycolor", "#FFFFFF")))
+
+    def _color(self, given: dict[str, str]) -> None:
+        self._group.values.append(_color(given["color"]))
+
+    def _texture2d(self, given: dict[str, str]) -> None:
+        self.part.pictures[given["id"]] = given["path"], given.get("tilestyleu", "wrap")
+
+    def _texture2dgroup(self, given: dict[str, str]) -> None:
+        self._group = self.part.groups[given["id"]] = Group(picture=given["texid"])
+
+    def _tex2coord(self, given: dict[str, str]) -> None:
+        self._group.values.append((float(given["u"]), float(given["v"])))
+
+
+def _color(text: str) -> tuple[float, ...]:
+    match = _COLOR.fullmatch(text.strip())
+    if match is None:
+        raise ValueError(f"the colour '{text}'")
+    return (*(value / 255.0 for value in bytes.fromhex(match[1] + (match[2] or "ff"))),)

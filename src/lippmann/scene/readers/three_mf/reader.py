@@ -1,0 +1,129 @@
+"""Reader of 3MF packages (``.3mf``), as slicers and programs for 3D printing write them: upright on the build plate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.errors import SceneError
+from lippmann.scene.parsing.files import decode_image
+from lippmann.scene.parsing.vertex_colors import COLORED, GREY, linear_colors, material_of
+from lippmann.scene.readers.three_mf.parts import Package, Part, Placed, Shape, Triangle
+from lippmann.scene.values.description import Image, Instance, Material, Mesh, SceneDescription, Texture, Wrap
+
+#: Objects within others, and copies of objects, at most.
+_DEEPEST, _MOST = 16, 1 << 20
+
+
+def read_three_mf(path: Path) -> SceneDescription:
+    """Read what a package says is to be built, in millimetres, with its colours and pictures.
+
+    Raises
+    ------
+    SceneError
+        The file is missing or no 3MF package, a part of it is missing or damaged, or nothing is to be built.
+    """
+    package = Package(path)
+    try:
+        return _Reader(package, path.stem).read()
+    finally:
+        package.close()
+
+
+class _Reader:
+    def __init__(self, package: Package, name: str) -> None:
+        self._package, self._name = package, name
+        self._notes: dict[str, None] = {}
+        self._meshes: list[Mesh] = []
+        self._materials: list[Material] = []
+        self._images: dict[str, Image] = {}
+        self._shown: dict[tuple[str, str], list[int]] = {}
+        self._places: dict[int, list[NDArray[np.float64]]] = {}
+        self._copies = 0
+
+    def read(self) -> SceneDescription:
+        """The scene."""
+        start = self._package.part(self._package.start())
+        for item in start.build:
+            self._place(item, np.diag([start.scale, start.scale, start.scale, 1.0]), 0)
+        if not self._places:
+            raise self._error("has nothing to build that is made of triangles")
+        return SceneDescription(
+            self._name,
+            self._meshes,
+            self._materials,
+            [Instance(mesh, np.stack(worlds)) for mesh, worlds in self._places.items()],
+            notes=[*self._notes],
+            up=(0.0, 0.0, 1.0),
+        )
+
+    def _place(self, placed: Placed, world: NDArray[np.float64], depth: int) -> None:
+        part = self._package.part(placed.part)
+        self._notes |= {f"{what} are not shown": None for what in part.unread}
+        shape = part.shapes.get(placed.number)
+        self._copies += 1
+        if shape is None or depth > _DEEPEST or self._copies > _MOST:
+            what = f"has no object {placed.number}" if shape is None else "places objects within objects without end"
+            raise self._error(f"'{placed.part}' {what}")
+        world = world @ placed.matrix
+        for component in shape.components:
+            self._place(component, world, depth + 1)
+        key = placed.part, placed.number
+        if key not in self._shown:
+            self._shown[key] = self._meshes_of(part, shape) if shape.triangles else []
+        for mesh in self._shown[key]:
+            self._places.setdefault(mesh, []).append(world)
+
+    def _meshes_of(self, part: Part, shape: Shape) -> list[int]:
+        """Numbers of the meshes of an object: one for each picture, one for all colours, one for what has neither."""
+        vertices = np.array(shape.vertices, np.float64).reshape(-1, 3)
+        faces = np.array([triangle[:3] for triangle in shape.triangles])
+        if not (0 <= faces.min() <= faces.max() < len(vertices) and np.isfinite(vertices).all()):
+            raise self._error("has a triangle whose vertices are not there")
+        kinds: dict[str | None, list[int]] = {}
+        for number, triangle in enumerate(shape.triangles):
+            group = part.groups.get(triangle[3] or "")
+            kinds.setdefault(None if group is None else group.picture, []).append(number)
+        first = len(self._meshes)
+        for picture, chosen in kinds.items():
+            corners = vertices[faces[chosen]].reshape(-1, 3).astype(np.float32)
+            order = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
+            mesh = Mesh(self._name, corners, order, len(self._materials))
+            if picture is None:
+                self._add(mesh, GREY)
+                continue
+            values = self._values(part, [shape.triangles[number] for number in chosen])
+            if picture:
+                uvs = (values * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32)
+                self._add(replace(mesh, uvs=(uvs,)), replace(COLORED, base_color_texture=self._texture(part, picture)))
+            else:
+                codes = np.rint(255.0 * values)
+                self._add(replace(mesh, colors=linear_colors(codes)), material_of(codes))
+        return [*range(first, len(self._meshes))]
+
+    def _add(self, mesh: Mesh, material: Material) -> None:
+        self._meshes.append(mesh)
+        self._materials.append(material)
+
+    def _values(self, part: Part, triangles: list[Triangle]) -> NDArray[np.float64]:
+        """The properties of all corners of triangles, one after the other."""
+        try:
+            values = [part.groups[group or ""].values for *_, group, _, _, _ in triangles]
+            return np.array([own[at] for own, triangle in zip(values, triangles, strict=True) for at in triangle[4:]])
+        except (IndexError, ValueError):
+            raise self._error("has a triangle whose colours or coordinates are not there") from None
+
+    def _texture(self, part: Part, picture: str) -> Texture:
+        if picture not in part.pictures:
+            raise self._error(f"has no picture {picture}")
+        name, wrap = part.pictures[picture]
+        if name not in self._images:
+            self._images[name] = decode_image(self._package.bytes_of(name), name, where=self._package.where)
+        wraps: Wrap = "repeat" if wrap == "wrap" else "mirror" if wrap == "mirror" else "clamp"
+        return Texture(self._images[name], srgb=True, wrap_u=wraps, wrap_v=wraps)
+
+    def _error(self, what: str) -> SceneError:
+        return SceneError(what, where=self._package.where)

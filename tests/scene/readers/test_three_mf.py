@@ -1,0 +1,127 @@
+"""3MF packages: units, transforms of what is built, components, colours, pictures, damage."""
+
+import io
+import zipfile
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from lippmann.errors import SceneError
+from lippmann.scene.readers.load import load_scene
+
+RELATIONS = """<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
+<Relationship Id="r" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel" Target="/3D/model.model"/>
+</Relationships>"""
+VERTICES = '<vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/><vertex x="0" y="0" z="1"/></vertices>'
+
+
+def solid(number, triangle='v1="0" v2="1" v3="2"', more=""):
+    return f'<object id="{number}" {more}><mesh>{VERTICES}<triangles><triangle {triangle}/></triangles></mesh></object>'
+
+
+def model(resources, build='<item objectid="1"/>', unit="millimeter"):
+    space = 'xmlns:m="http://schemas.microsoft.com/3dmanufacturing/material/2015/02"'
+    space += ' xmlns:p="http://schemas.microsoft.com/3dmanufacturing/production/2015/06"'
+    return f'<model unit="{unit}" {space}><resources>{resources}</resources><build>{build}</build></model>'
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(main, **files):
+        path = tmp_path / "a.3mf"
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("_rels/.rels", RELATIONS)
+            archive.writestr("3D/model.model", main)
+            for name, data in files.items():
+                archive.writestr(f"3D/{name.replace('_', '.')}", data)
+        return load_scene(path).description
+
+    return read
+
+
+def places(scene):
+    """Corners ``(n, 3, 3)`` where they are placed, y up."""
+    found = []
+    for instance in scene.instances:
+        mesh = scene.meshes[instance.mesh]
+        for world in np.reshape(instance.world_from_mesh, (-1, 4, 4)):
+            found.append(mesh.positions[mesh.faces] @ world[:3, :3].T + world[:3, 3])
+    return np.concatenate(found)
+
+
+def test_units_are_millimetres_and_z_is_up(read):
+    (triangle,) = places(read(model(solid(1), unit="inch")))
+    np.testing.assert_allclose(triangle, [[0, 0, 0], [25.4, 0, 0], [0, 25.4, 0]], atol=1e-5)
+
+
+def test_what_is_built_is_moved_and_made_of_components(read):
+    # Rows of the matrix act on row vectors: x to y, y to -x, then 10 along x.
+    turn = "0 1 0 -1 0 0 0 0 1 10 0 0"
+    both = '<object id="2"><components><component objectid="1"/>'
+    both += '<component objectid="1" transform="1 0 0 0 1 0 0 0 1 0 0 5"/></components></object>'
+    build = f'<item objectid="2" transform="{turn}"/><item objectid="1" printable="0"/>'
+    first, second = places(read(model(solid(1) + both, build)))
+    # z is up: (x, y, z) of the package is (x, z, -y) here.
+    np.testing.assert_allclose(first, [[10, 0, 0], [10, 0, -1], [10, 1, 0]], atol=1e-6)
+    np.testing.assert_allclose(second, first + np.array([0, 5, 0]), atol=1e-6)
+
+
+def test_an_object_of_another_part(read):
+    scene = read(model("", '<item objectid="7" p:path="/3D/other.model"/>'), other_model=model(solid(7), ""))
+    assert len(places(scene)) == 1
+
+
+def test_colours_of_corners_are_decoded(read):
+    group = '<m:colorgroup id="5"><m:color color="#FF0000"/><m:color color="#00FF0080"/></m:colorgroup>'
+    scene = read(model(group + solid(1, 'v1="0" v2="1" v3="2" pid="5" p1="0" p2="1" p3="0"')))
+    (mesh,) = scene.meshes
+    np.testing.assert_allclose(mesh.colors, [[1, 0, 0, 1], [0, 1, 0, 128 / 255], [1, 0, 0, 1]], atol=1e-6)
+    assert scene.materials[mesh.material].alpha_mode == "blend"
+
+
+def test_an_object_s_own_material(read):
+    group = '<basematerials id="5"><base name="a" displaycolor="#000000"/>'
+    group += '<base name="b" displaycolor="#0000FF"/></basematerials>'
+    (mesh,) = read(model(group + solid(1, more='pid="5" pindex="1"'))).meshes
+    assert (mesh.colors == [0, 0, 1, 1]).all()
+
+
+def test_pictures(read):
+    png = io.BytesIO()
+    Image.new("RGB", (2, 2), (10, 20, 30)).save(png, "PNG")
+    group = '<m:texture2d id="3" path="/3D/t.png" contenttype="image/png" tilestyleu="clamp"/>'
+    group += (
+        '<m:texture2dgroup id="4" texid="3"><m:tex2coord u="0" v="0"/><m:tex2coord u="1" v="0.25"/></m:texture2dgroup>'
+    )
+    scene = read(model(group + solid(1, 'v1="0" v2="1" v3="2" pid="4" p1="0" p2="1" p3="1"')), t_png=png.getvalue())
+    (mesh,) = scene.meshes
+    texture = scene.materials[mesh.material].base_color_texture
+    assert (texture.image.pixels == (10, 20, 30)).all()
+    assert texture.wrap_u == "clamp"
+    assert mesh.uvs[0].tolist() == [[0, 1], [1, 0.75], [1, 0.75]]
+
+
+@pytest.mark.parametrize(
+    ("main", "line"),
+    [
+        (model(""), "has no object 1"),
+        (model(solid(1, 'v1="0" v2="1" v3="9"')), "whose vertices are not there"),
+        (model(solid(1, 'v1="0" v2="1"')), "'v3' is missing"),
+        (model(solid(1), unit="parsec"), "'parsec' is missing or no value of its kind"),
+        (model(solid(1))[:-9], "is no well-formed XML"),
+        ("<!DOCTYPE model>" + model(solid(1)), "declares a document type"),
+        (model('<object id="1"><components><component objectid="1"/></components></object>'), "without end"),
+        (model(solid(1), ""), "has nothing to build"),
+    ],
+)
+def test_what_cannot_be_read_is_named(read, main, line):
+    with pytest.raises(SceneError, match=r"^a\.3mf: ") as caught:
+        read(main)
+    assert line in str(caught.value)
+
+
+def test_what_is_no_package(tmp_path):
+    (tmp_path / "a.3mf").write_bytes(b"solid nothing")
+    with pytest.raises(SceneError, match=r"a\.3mf: is no 3MF package"):
+        load_scene(tmp_path / "a.3mf")
