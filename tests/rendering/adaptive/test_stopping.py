@@ -100,7 +100,7 @@ def test_a_picture_that_converges_slowly_gets_larger_rounds():
 
 
 def test_a_default_picture_ends_with_its_first_round_where_it_is_likely_clean():
-    goal = Goal(TUNING.clean, TUNING.clean_worst, spp=128, is_promise=False)
+    goal = Goal(TUNING.clean, spp=128, is_promise=False)
     clean, noisy = Noise(error=1e-3), Noise(error=2e-2)
     assert (run(goal, clean, first=8).end, clean.samples) == ("quality", 8)
     assert run(goal, noisy, first=8).end == "quality"
@@ -193,11 +193,12 @@ def test_a_default_picture_is_to_be_clean_by_the_likely_value():
     assert goal_of(request) == Goal(spp=8)
     with_reserve = resolve(RenderRequest(), load_scene("teapot"), SHOWN)
     goal = goal_of(with_reserve)
-    assert goal == Goal(TUNING.clean, TUNING.clean_worst, spp=with_reserve.spp_reserve, is_promise=False)
-    wide = Estimate(TUNING.clean, 20.0, 50.0, TUNING.clean_worst, 5.0, 40.0, (0, 0))
+    assert goal == Goal(TUNING.clean, spp=with_reserve.spp_reserve, is_promise=False)
+    worst = TUNING.clean - TUNING.most_below
+    wide = Estimate(TUNING.clean, 20.0, 50.0, worst, 5.0, 40.0, (0, 0))
     assert goal.missing(wide) == 0
     # However good the picture is as a whole.
-    assert goal.missing(replace(wide, psnr=50.0, worst=TUNING.clean_worst - 2)) == pytest.approx(2)
+    assert goal.missing(replace(wide, psnr=50.0, worst=worst - 2)) == pytest.approx(2)
 
 
 def test_without_a_quality_nothing_is_missing():

@@ -63,7 +63,7 @@ def batches(integrator, *, seed=1, memory=2**30, subpixels=False, **options):
     return FullInBatches(integrator, rays(subpixels), seed=seed, memory=memory, **options)
 
 
-#: Enough for all batches and the smallest wavefronts.
+#: Enough for all batches and small wavefronts.
 TIGHT = SIZE * SIZE * (8 * 12 + 36) + (1 << 14) * 96
 
 
@@ -176,13 +176,13 @@ def test_few_samples_say_something(integrator):
 
 
 def test_fewer_batches_are_kept_where_memory_is_short_and_none_where_it_is_too_short(integrator):
-    small = batches(integrator, memory=SIZE * SIZE * (2 * 12 + 36) + (1 << 14) * 96)
+    small = batches(integrator, memory=SIZE * SIZE * (2 * 12 + 36) + SIZE * 96)
     small.add(16)
     plenty = batches(integrator)
     plenty.add(16)
     assert small.squared_error().values.mean() == pytest.approx(plenty.squared_error().values.mean(), rel=0.5)
     with pytest.raises(MemoryLimitError, match="its own error"):
-        batches(integrator, memory=100_000)
+        batches(integrator, memory=SIZE * SIZE * (2 * 12 + 36))
 
 
 def test_samples_of_one_pass_are_taken_together():

@@ -82,10 +82,10 @@ def test_noise_is_taken_out_of_the_eyes_view(display):
 
 def test_a_denoiser_that_is_asked_for_is_there_or_missed_at_once(teapot, monkeypatch):
     with pytest.raises(UsageError, match="denoise: normal has no noise"):
-        render_eye_preview(teapot, BLOCKS, EYES[0], RenderRequest(integrator="normal", denoise="oidn"))
+        render_eye_preview(teapot, BLOCKS, EYES[0], RenderRequest(integrator="normal", denoise="oidn"), (60, 60))
     monkeypatch.setitem(sys.modules, "pyoidn", None)
     with pytest.raises(UsageError, match="denoise: Open Image Denoise is not installed"):
-        render_eye_preview(teapot, BLOCKS, EYES[0], RenderRequest(denoise="oidn"))
+        render_eye_preview(teapot, BLOCKS, EYES[0], RenderRequest(denoise="oidn"), (60, 60))
 
 
 def test_every_pixel_is_traced_once_and_what_lies_past_the_panel_not_at_all():

@@ -81,15 +81,15 @@ def preview(
         started = time.perf_counter()
         loaded = source.load()
         load_seconds = time.perf_counter() - started
+        size = parse.size(pixels or "512x512", "--pixels")
         if plain:
-            image = _plain(loaded, placement.camera, pixels, eye, request, progress)
+            image = _plain(loaded, placement.camera, size, eye, request, progress)
         else:
             from lippmann.rendering.live.eye_preview import render_eye_preview
             from lippmann.viewing.replay import default_eye
 
             at = default_eye(target) if eye is None else triple(eye, "--eye")
-            most = None if pixels is None else parse.size(pixels, "--pixels")
-            image = render_eye_preview(loaded, target, at, request, most, progress)
+            image = render_eye_preview(loaded, target, at, request, size, progress)
         writing = time.perf_counter()
         provenance = add_seconds(image.provenance, load=load_seconds)
         write_plain_picture(image.pixels, output, bits=bits, transfer=provenance.transfer)
@@ -108,7 +108,7 @@ def preview(
 def _plain(
     scene: Scene,
     camera: str | None,
-    size: str | None,
+    size: tuple[int, int],
     eye: str | None,
     request: RenderRequest,
     progress: ProgressCallback,
@@ -117,4 +117,4 @@ def _plain(
 
     if eye is not None:
         raise UsageError("sees a display", where="--eye", rule="--plain has none", fix="leave one of them out")
-    return render_preview(scene, camera, parse.size(size or "512x512", "--pixels"), request, progress)
+    return render_preview(scene, camera, size, request, progress)

@@ -130,7 +130,7 @@ def goal_of(request: RenderRequest) -> Goal:
         return Goal(request.quality, request.quality_worst, request.max_time, request.spp)
     if request.spp_reserve is None:
         return Goal(spp=request.samples)
-    return Goal(TUNING.clean, TUNING.clean_worst, spp=request.spp_reserve, is_promise=False)
+    return Goal(TUNING.clean, spp=request.spp_reserve, is_promise=False)
 
 
 @dataclass(frozen=True)

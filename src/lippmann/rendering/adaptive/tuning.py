@@ -21,12 +21,11 @@ class AdaptiveTuning:
         dB by which a quality that was asked for may be missed, but with a probability of 2.5 %
         (``estimate_coverage.py``).
     most_below:
-        dB that a micro-image may have less than the whole picture for which a quality was asked.
+        dB that a micro-image may have less than the quality that the whole picture is to have.
     time_share:
         Share of the time left that a round is planned to take: rates vary from round to round.
-    clean, clean_worst:
-        Estimated PSNR in dB of the picture and of its worst micro-image that a default picture is to have
-        (``docs/research/equal-time.md``).
+    clean:
+        Estimated PSNR in dB that a default picture is to have (``docs/research/equal-time.md``).
     """
 
     least_growth: float = 1.2
@@ -36,7 +35,6 @@ class AdaptiveTuning:
     most_below: float = 12.0
     time_share: float = 0.9
     clean: float = 37.0
-    clean_worst: float = 28.0
 
 
 TUNING = AdaptiveTuning()

@@ -29,9 +29,6 @@ from lippmann.rendering.transport.visible_caustics import VisibleBlur
 
 Floats = NDArray[np.float32]
 
-#: The bias is measured for a share of the pixels: samples per pixel over 256, but for as many as a probe has, at least.
-SAMPLES_OF_PIXEL = 256
-
 
 class SquaredBlur:
     """Expected squared bias by blur of the linear pixels of a window.
@@ -53,21 +50,19 @@ class SquaredBlur:
         self._source = source
         self._window = window
         self._seed = seed
-        self._share, self._pass = 0.0, 0
-        self._of_pass = np.zeros((0, 3), np.float32)
+        self._pass, self._of_pass = 0, np.zeros((0, 3), np.float32)
 
     def after(self, samples: int) -> Floats:
         """``(H, W, 3)`` squared bias of a picture of ``samples`` samples per pixel.
 
-        Values of single pixels are noisy, and may be negative; their sums are not biased.
+        It is measured once, at as many pixels as a probe has. Values of single pixels are noisy, and may be negative;
+        their sums are not biased.
         """
         passes = self._passes
-        pixels = self._source.width * self._source.height
-        share = min(1.0, max(samples / SAMPLES_OF_PIXEL, TUNING.probe_side**2 / pixels))
-        # Measured anew at each doubling of the share.
-        if share >= 2 * self._share or share == 1.0 > self._share:
+        if not len(self._of_pass):
             # The photons of the last sample are cached.
-            self._share, self._pass = share, (samples - 1) // passes.pass_samples
+            self._pass = (samples - 1) // passes.pass_samples
+            share = min(1.0, TUNING.probe_side**2 / (self._source.width * self._source.height))
             self._of_pass = self._measure(passes.of_pass(self._pass), share)
         scaled = _mean_area(passes, samples) / radius_of_pass(self._pass) ** 2
         return (self._of_pass * np.float32(scaled**2)).reshape(*self._window.shape, 3)

@@ -14,8 +14,6 @@ BYTES_PER_LANE = 96
 #: Beyond this many lanes a wavefront leaves the caches of a processor and nothing is gained; a GPU is to be busy for
 #: longer than the next wavefront takes to prepare.
 PREFERRED_LANES, PREFERRED_LANES_OF_GPU = 1 << 20, 1 << 22
-#: Fewer lanes than this leave the threads idle while kernels start.
-SMALLEST_LANES = 1 << 14
 
 #: Batches of samples where the memory allows: with more of them, fireflies stand out better against steady noise.
 MOST_BATCHES = 8
@@ -30,17 +28,17 @@ ERROR_MAPS = COLORS
 FOR_DENOISER = PICTURE + COLORS + PICTURE
 #: One emission of photons, which lands about once, with what sorting takes, in bytes.
 PHOTON = 128
-#: One ray from an emitter to a light vertex, with what it takes to trace it, in bytes.
-LIGHT_VERTEX = 256
 #: What reuse of points takes: points without colours, plain rows, maps and lists of pixels. The paper's order takes
 #: the most: 6 for points, 4 for lenses, 8 for places beside centres, 12 for the sorted list.
 POINT_IMAGE = 32
 #: Depth, normal, albedo, shape and position, and the copies that a file writer makes of them; or albedo, normal, height
 #: and coverage for the denoiser, and what a tile adds to them.
 LAYERS = 88
-#: Open Image Denoise with its feature buffers; and the bytes that the network may take beside these. It works in parts
-#: then, which does not change a bit: 0.6 GB take a tenth longer than 1.5 GB, 0.2 GB twice as long.
-DENOISER, NETWORK_MOST = 600, 600 << 20
+#: Open Image Denoise with its feature buffers.
+DENOISER = 600
+#: The bytes that the network may take beside these: those of a million pixels. Larger pictures it works through in
+#: parts, which does not change a bit: 0.6 GB take a tenth longer than 1.5 GB, 0.2 GB twice as long.
+NETWORK_MOST = DENOISER << 20
 
 
 def batches(number: int) -> int:

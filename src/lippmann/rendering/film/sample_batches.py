@@ -97,11 +97,10 @@ class FullInBatches(BatchedPicture):
         self.seconds_compile = 0.0
         self.seconds_trace = 0.0
         self._window = window or PixelWindow(0, 0, source.width, source.height)
-        pixels = self._window.pixels
         keeps_coverage = for_denoiser and isinstance(integrator, PathIntegrator)
         keeps_specular = isinstance(integrator, PathIntegrator) and for_denoiser and integrator.light.chains is not None
         further = memory_model.FOR_DENOISER * keeps_coverage
-        batches, self._lanes = _sizes(pixels, source.channels, memory, further)
+        batches, self._lanes = _sizes(self._window, source.channels, memory, further)
         super().__init__(
             batches,
             self._window.shape,
@@ -270,16 +269,15 @@ def _alternate(number: int) -> tuple[int, ...]:
     return tuple(stream * per_stream + place for place in range(per_stream) for stream in range(STREAMS))
 
 
-def _sizes(pixels: int, channels: int, memory: int, further: int) -> tuple[int, int]:
-    """Number of batches that fit beside ``further`` bytes per pixel, and the lanes of a wavefront."""
+def _sizes(window: PixelWindow, channels: int, memory: int, further: int) -> tuple[int, int]:
+    """Number of batches that fit beside ``further`` bytes per pixel and a row's lanes; and the lanes of a wavefront."""
+    pixels, row = window.pixels, window.width * channels
     for batches in (memory_model.MOST_BATCHES, memory_model.MOST_BATCHES // 2, STREAMS):
         kept = pixels * (memory_model.batches(batches) + further)
-        needed = min(memory_model.SMALLEST_LANES, pixels * channels * batches)
-        fits = memory >= kept + needed * memory_model.BYTES_PER_LANE
-        if fits or batches == STREAMS:
+        if memory >= kept + row * memory_model.BYTES_PER_LANE or batches == STREAMS:
             break
     what = f"a picture of {pixels} pixels that is to know its own error"
-    return batches, memory_model.lanes_within(memory, kept, needed, what)
+    return batches, memory_model.lanes_within(memory, kept, row, what)
 
 
 def _table(numbers: Sequence[int]) -> UInt32:

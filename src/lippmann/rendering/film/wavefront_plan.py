@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from lippmann.rendering.film.memory_model import PICTURE, SMALLEST_LANES, lanes_within
+from lippmann.rendering.film.memory_model import PICTURE, lanes_within
 
 
 @dataclass(frozen=True)
@@ -102,9 +102,8 @@ def cut_wavefronts(
         If not even one row of one sample fits beside the picture.
     """
     row_lanes = width * channels
-    needed = max(row_lanes, min(SMALLEST_LANES, row_lanes * height * samples))
-    most = lanes_within(memory, kept + width * height * PICTURE, needed, f"{width}x{height} pixels", preferred_lanes)
-    most = max(most, row_lanes)
+    kept += width * height * PICTURE
+    most = max(row_lanes, lanes_within(memory, kept, row_lanes, f"{width}x{height} pixels", preferred_lanes))
     run = equal_length(samples, most // row_lanes)
     rows = equal_length(height, most // (row_lanes * run))
     return Plan(width, height, channels, samples, rows, run)

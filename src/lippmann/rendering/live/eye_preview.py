@@ -23,9 +23,6 @@ from lippmann.runtime import machine
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.scene import Scene
 
-#: Pixels along the longer side of the picture, where nothing is said.
-LONGER_SIDE = 512
-
 
 @exclusive()
 def render_eye_preview(
@@ -33,7 +30,7 @@ def render_eye_preview(
     display: Display,
     eye: Vector,
     request: RenderRequest,
-    size: tuple[int, int] | None = None,
+    size: tuple[int, int],
     progress: ProgressCallback = silent,
 ) -> Preview:
     """Render what an eye in front of ``display`` will see of ``scene``.
@@ -46,7 +43,7 @@ def render_eye_preview(
         Of a whole picture. Only ``full`` light is traced, whatever the method. Its noise is taken out where ``denoise``
         asks for that; left "auto", where light is sampled.
     size:
-        Width and height that the picture, which has the panel's shape, keeps to. None: 512 pixels on its longer side.
+        Width and height that the picture, which has the panel's shape, keeps to.
 
     Raises
     ------
@@ -54,7 +51,7 @@ def render_eye_preview(
         As the stages find them.
     """
     resolved = resolve(replace(request, method="full"), scene, display)
-    width, height = display.panel.size_inside(*(size or (LONGER_SIDE, LONGER_SIDE)))
+    width, height = display.panel.size_inside(*size)
     visible = EyeMap(display, (width, height), subpixels=bool(resolved.subpixels)).pixels_for_eye(eye)
     samples = _choose_samples(request, resolved, len(visible.column) // visible.channels)
     denoises = _denoises(request, resolved, scene)

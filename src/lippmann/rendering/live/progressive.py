@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.sobol import named_seed
+from lippmann.options.quality import MOST_SAMPLES
 from lippmann.rendering.denoise.noisy_blend import weigh_samples
 from lippmann.rendering.denoise.oidn import denoise
 from lippmann.rendering.denoise.tuning import TUNING as DENOISE
@@ -29,8 +30,6 @@ Floats = NDArray[np.float32]
 
 #: Target duration of a sampling step in seconds: the delay that it may cause to a frame.
 _STEP_SECONDS = 0.06
-#: Most samples per pixel: the noise is then below one code.
-_MOST_SAMPLES = 1 << 14
 
 
 class Progressive:
@@ -65,7 +64,7 @@ class Progressive:
         self._view.light_up(self._exposure)
         if self._task is not None:
             return self._denoise(seconds)
-        if self.samples >= _MOST_SAMPLES:
+        if self.samples >= MOST_SAMPLES:
             return None
         self._sample(seconds)
         if self._begun:

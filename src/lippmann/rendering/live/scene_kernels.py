@@ -12,7 +12,7 @@ import numpy as np
 from lippmann.device.pbr.emitter_updates import EmitterUpdates
 from lippmann.display import Display
 from lippmann.options.light import LightOptions
-from lippmann.rendering.film.memory_model import BYTES_PER_LANE, PREFERRED_LANES, SMALLEST_LANES
+from lippmann.rendering.film.memory_model import BYTES_PER_LANE, PREFERRED_LANES
 from lippmann.rendering.live.live_tracer import FeatureTracer, LiveIntegrator, LiveTracer
 from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
 from lippmann.rendering.preparation.pilot import make_light_sampler, trace_pilot
@@ -67,7 +67,7 @@ class SceneKernels:
     @property
     def most_lanes(self) -> int:
         """Lanes of the largest wavefront that fits the memory."""
-        return max(SMALLEST_LANES, min(PREFERRED_LANES, self.session.memory // BYTES_PER_LANE))
+        return min(PREFERRED_LANES, self.session.memory // BYTES_PER_LANE)
 
     def place(self, display: Display, request: RenderRequest) -> Placement:
         """The display's placement for a resolved request."""

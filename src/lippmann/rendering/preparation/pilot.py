@@ -41,24 +41,16 @@ class Pilot:
     moments:
         ``(emitters,)`` in the order of ``mi.Scene.emitters()``: second moment of the contribution of each emitter to a
         path, clipped at 1; all 0 in scenes with too many emitters to weight them.
-    indirect:
-        ``(paths,)``: indirect radiance of each path, mean of its components, from emitters at a finite distance: light
-        at rough surfaces that a path reaches by diffuse scattering.
-    placed:
-        Number of emitters at a finite distance: areas, points, spots.
+    brightest_indirect:
+        Largest indirect radiance of a path, mean of its components, from emitters at a finite distance (areas, points,
+        spots): light at rough surfaces that a path reaches by diffuse scattering. 0 with too many emitters.
     region:
         Corners ``(2, 3)`` of a box around the visible points; None where the picture shows no surface.
     """
 
     moments: NDArray[np.float64]
-    indirect: NDArray[np.float64]
-    placed: int
+    brightest_indirect: float
     region: NDArray[np.float64] | None
-
-    def bright_indirect(self, gain: float) -> float:
-        """Second moment of :attr:`indirect`, exposed by ``gain`` and clipped, over the paths where it exceeds white."""
-        exposed = np.minimum(self.indirect * gain, TUNING.most_indirect)
-        return float(np.square(exposed[exposed > 1]).sum() / len(exposed))
 
 
 def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
@@ -70,7 +62,7 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
     lights = integrator.scene.emitters()
     count = len(lights)
     if all(each.is_environment() for each in lights):
-        return Pilot(np.zeros(count), np.zeros(1), 0, None)
+        return Pilot(np.zeros(count), 0.0, None)
     emitters = count if 0 < count <= TUNING.most_weighed_emitters else 1
     paths = TRANSPORT.rays_of_each(emitters)
     lane = dr.arange(mi.UInt32, paths * emitters)
@@ -84,13 +76,13 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
     # Invalid values, as from a normal of length 0, count as no contribution.
     moments = np.nan_to_num(squares).mean(axis=1) if emitters == count else np.zeros(count)
     placed = _has_place(lights) if emitters == count else np.zeros(emitters, bool)
-    indirect = np.nan_to_num(indirect[placed]).sum(axis=0)
-    return Pilot(moments, indirect, int(placed.sum()), _region_about(point.T[hit != 0].astype(np.float64)))
+    brightest = float(np.nan_to_num(indirect[placed]).sum(axis=0).max())
+    return Pilot(moments, brightest, _region_about(point.T[hit != 0].astype(np.float64)))
 
 
 def brightest_specular_light(integrator: PathIntegrator, source: RaySource) -> float:
     """Largest exposed radiance, mean of its components, of the pilot's specular chains."""
-    stream, column, row, _ = _place_of(dr.arange(mi.UInt32, TUNING.pilot_chains), source)
+    stream, column, row, _ = _place_of(dr.arange(mi.UInt32, TRANSPORT.probe_side**2), source)
     pixel, number = PixelRays(source, column, row, mi.UInt32(0)), dr.opaque(mi.UInt32, 1)
     light = integrator.exposed(specular_light(integrator, pixel, stream, number, mi.Bool(True))[0])
     return float(dr.max(dr.mean(light))[0])

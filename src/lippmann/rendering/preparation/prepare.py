@@ -10,7 +10,6 @@ import mitsuba as mi
 
 from lippmann.options.choices import REUSING
 from lippmann.rendering.film import memory_model
-from lippmann.rendering.film.memory_model import LIGHT_VERTEX
 from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
 from lippmann.rendering.preparation.pilot import Pilot, brightest_specular_light, make_light_sampler, trace_pilot
 from lippmann.rendering.preparation.tuning import TUNING
@@ -47,7 +46,7 @@ def prepare_light(
     source:
         Rays of the whole picture, also where a part of it is rendered.
     memory:
-        Bytes for photons and for light vertices.
+        Bytes for photons.
     background:
         Colour of rays without a hit; see :func:`~lippmann.rendering.preparation.exposure.measure_exposure`.
     own_exposure:
@@ -83,7 +82,7 @@ def prepare_light(
         light = replace(light, gain=mi.Float(gain))
         choices["exposure"] = exposure
 
-    passes = trace_light_vertices(paths.lit_by(light), request, pilot, memory, gain)
+    passes = trace_light_vertices(paths.lit_by(light), request, pilot, gain)
     if passes is not None:
         light = replace(light, light_vertices=passes.of_pass(0), vertex_passes=passes)
         choices["light_vertices"] = TRANSPORT.light_vertices
@@ -97,7 +96,7 @@ def prepare_light(
 
 
 def trace_light_vertices(
-    integrator: PathIntegrator, request: RenderRequest, pilot: Pilot, memory: int, gain: float
+    integrator: PathIntegrator, request: RenderRequest, pilot: Pilot, gain: float
 ) -> LightVertexPasses | None:
     """Light vertices for a picture whose indirect light is noisy without them; None for others.
 
@@ -105,14 +104,12 @@ def trace_light_vertices(
     ----------
     pilot:
         The picture's pilot.
-    memory:
-        Bytes for the light vertices of two passes, for both half-buffers. If they are too few, there are none.
     gain:
         Factor on radiance of the picture's exposure.
     """
-    if request.integrator != "path" or request.surfaces < 2 or memory < 4 * TRANSPORT.light_vertices * LIGHT_VERTEX:
+    if request.integrator != "path" or request.surfaces < 2:
         return None
-    if pilot.bright_indirect(gain) < TUNING.bright_indirect or pilot.placed > TRANSPORT.most_vertex_emitters:
+    if gain * pilot.brightest_indirect <= 1:
         return None
     sampler, scene = integrator.light_sampler, integrator.scene
     passes = LightVertexPasses(scene, sampler, TUNING.pass_samples, request.seed, pilot.region)

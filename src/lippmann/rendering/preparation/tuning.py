@@ -14,9 +14,6 @@ class PreparationTuning:
     chains:
         Specular chains with each path of a denoised picture. With 3, pictures of 16 samples lose up to 0.2 dB, and
         1.0 dB of primitives; with 2 up to 0.5 dB, and primitives 1 dB (docs/research/seen-light.md).
-    pilot_chains:
-        Specular chains of the pilot (0.1 s): one of them hits a spot of a 20 000th of the picture with a probability of
-        95 %.
     most_weighed_emitters:
         Scenes with more emitters sample them uniformly.
     mid_grey:
@@ -24,11 +21,6 @@ class PreparationTuning:
     exposure_block:
         Pixels along each side of a block. The exposure follows from the median of block means over lit pixels, as
         single pixels are too noisy.
-    bright_indirect, most_indirect:
-        Paths are joined to light vertices where the second moment of the pilot's exposed indirect radiance exceeds
-        ``bright_indirect``. It is taken over paths brighter than white, each clipped at ``most_indirect``. Scenes where
-        joins gain have 0.0035 to 0.15, others at most 0.0004: half and double choose the same
-        (docs/background/light-vertices.md).
     pass_samples:
         Samples per pixel that one pass of photons, or one set of light vertices, serves.
     kept_share:
@@ -36,12 +28,9 @@ class PreparationTuning:
     """
 
     chains: int = 4
-    pilot_chains: int = 1 << 16
     most_weighed_emitters: int = 1 << 10
     mid_grey: float = 0.18
     exposure_block: int = 16
-    bright_indirect: float = 1e-3
-    most_indirect: float = 4.0
     pass_samples: int = 16
     kept_share: float = 0.25
 

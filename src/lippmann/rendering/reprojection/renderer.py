@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.film.memory_model import PICTURE, POINT_IMAGE, SMALLEST_LANES, lanes_within
+from lippmann.rendering.film.memory_model import PICTURE, POINT_IMAGE, lanes_within
 from lippmann.rendering.film.wavefront import Frame
 from lippmann.rendering.reprojection.default_order import DefaultOrder
 from lippmann.rendering.reprojection.paper_order import PaperOrder
@@ -130,6 +130,5 @@ def wavefront_lanes(memory: int, width: int, height: int, samples: int) -> int:
     MemoryLimitError
         If ``memory`` bytes do not hold even a small one.
     """
-    needed = max(samples, min(SMALLEST_LANES, width * height * samples))
     kept = width * height * (PICTURE + POINT_IMAGE)
-    return max(needed, lanes_within(memory, kept, needed, f"{width}x{height} pixels and their points"))
+    return max(samples, lanes_within(memory, kept, samples, f"{width}x{height} pixels and their points"))

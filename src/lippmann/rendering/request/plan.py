@@ -268,7 +268,7 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
     request = facts.request
     classic = facts.scene.classic if facts.integrator == "classic" else None
     of_file = 1 + (classic.camera.antialiasing if classic is not None and facts.form == "preview" else 0)
-    is_large = (values or 0) > TUNING.many
+    is_large = (values or 0) > TUNING.values * TUNING.usual
     fewest = TUNING.fewest - subpixels * (1 + is_large)
     of_budget = 1 << max(round(math.log2(TUNING.values / (values or TUNING.values))), 0)
     pooled = f"about a million for the picture, but {fewest} to {TUNING.usual} of each pixel"

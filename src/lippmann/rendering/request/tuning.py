@@ -18,9 +18,8 @@ class RequestTuning:
         may miss rare light such as mirrored emitters.
     fewest:
         Least samples per pixel of a pooled picture: with fewer the worst micro-images are noisy, and outliers cannot be
-        told apart. One less per sub-pixel with rays of its own, two less of more than ``many`` sub-pixels.
-    many:
-        See ``fewest``, and ``docs/research/adaptive-sampling.md``.
+        told apart. One less per sub-pixel with rays of its own, two less where there are more of these than ``values``
+        times ``usual`` (``docs/research/adaptive-sampling.md``).
     values:
         Samples of a pooled picture, of all its pixels together: half a second of two cores (``defaults.py``).
     reserve, most_in_reserve:
@@ -37,7 +36,6 @@ class RequestTuning:
 
     usual: int = 16
     fewest: int = 4
-    many: int = 1 << 24
     values: int = 1 << 20
     reserve: int = 8
     most_in_reserve: int = 200_000_000

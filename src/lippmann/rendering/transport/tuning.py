@@ -43,8 +43,6 @@ class TransportTuning:
         pilot.
     uniform_share:
         Share of emitter samples, emissions and rays from emitters that goes to all alike, for what a pilot missed.
-    most_vertex_emitters:
-        Scenes of more emitters are left to paths: each has a start of its own in the kernel of rays.
     """
 
     probe_side: int = 128
@@ -60,7 +58,6 @@ class TransportTuning:
     photons_of_cell: int = 8
     light_vertices: int = 1 << 16
     uniform_share: float = 0.1
-    most_vertex_emitters: int = 1 << 6
 
     def rays_of_each(self, kinds: int) -> int:
         """Rays of a pilot for each of so many emitters, or pairs of an emitter and a caster."""
