@@ -320,8 +320,8 @@ class _Cut:
 
 
 def _traced(stage: Stage, source: Any, samples: int) -> Picture:
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.rendering.session import open_session
 

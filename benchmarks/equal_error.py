@@ -280,8 +280,8 @@ def trace_lit(stage: Stage, samples: int, seed: int) -> Picture:
 
 
 def trace_paths(stage: Stage, samples: int, seed: int) -> Picture:
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
     plan = cut_wavefronts(stage.source.width, stage.source.height, samples, memory=4 << 30)
     return trace_frame(stage.integrator, stage.source, plan, seed=seed).pixels

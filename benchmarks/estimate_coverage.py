@@ -111,8 +111,8 @@ class Case:
         self.reference, self.reference_samples = found["parts"], int(found["samples"])
 
     def _long(self, seconds: float) -> tuple[NDArray[np.float64], int]:
+        from lippmann.rendering.film.memory_model import cut_wavefronts
         from lippmann.rendering.film.wavefront import trace_frame
-        from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
         plan = cut_wavefronts(self.source.width, self.source.height, 128, memory=MEMORY)
         parts = np.zeros((REFERENCE_PARTS, self.source.height, self.source.width, 3))

@@ -24,8 +24,8 @@ def main() -> None:
     from lippmann.api import load_scene
     from lippmann.device.pbr import build
     from lippmann.display import load_display
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import DisplayRays
     from lippmann.rendering.transport.scene_features import make_scene_features

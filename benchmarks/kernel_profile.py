@@ -89,8 +89,8 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     import mitsuba as mi
 
     from lippmann.rendering.film import wavefront
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import samples_of_tile
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport import path, path_techniques
 
     source, paths = stage.source, stage.integrator

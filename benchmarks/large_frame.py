@@ -29,8 +29,8 @@ TILES_BETWEEN = 8
 
 def main() -> None:
     import lippmann
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.rendering.session import open_session
     from lippmann.rendering.transport.ray_source import DisplayRays

@@ -86,8 +86,8 @@ def tachyon_seconds(path: Path, size: int, depth: int) -> tuple[float, float]:
 def tracer(path: Path, size: int, depth: int) -> Callable[[], Any]:
     """Our picture of the scene, everything but the tracing done."""
     from lippmann.device.whitted.scene import build_classic
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.whitted import WhittedIntegrator
     from lippmann.rendering.transport.whitted_camera import WhittedCameraRays
 

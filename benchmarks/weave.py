@@ -85,8 +85,8 @@ def _measure(name: str, reference: int) -> tuple[dict[str, Any], list[Picture]]:
     cameras = QuiltRays(display, at.world_from_display, COLUMNS, ROWS, VIEW)
 
     def traced(source: Any, samples: int, seed: int) -> tuple[Picture, float]:
+        from lippmann.rendering.film.memory_model import cut_wavefronts
         from lippmann.rendering.film.wavefront import trace_frame
-        from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
         plan = cut_wavefronts(source.width, source.height, samples, channels=source.channels, memory=4 << 30)
         started = time.perf_counter()

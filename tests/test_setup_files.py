@@ -11,7 +11,7 @@ import yaml
 
 from lippmann._version import VERSION
 from lippmann.runtime import llvm, llvm_install
-from lippmann.runtime.library_file import Host
+from lippmann.runtime.llvm import Host
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -12,8 +12,8 @@ import pytest
 import typer
 
 from lippmann.cli.app import COMMANDS, GROUPS, app_of, make_app
+from lippmann.cli.shared.command_options import OPTION_GROUPS
 from lippmann.cli.shared.examples import EXAMPLES
-from lippmann.cli.shared.grouped_help import OPTION_GROUPS
 from lippmann.cli.shared.outputs import output_of
 
 

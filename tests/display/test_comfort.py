@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from lippmann.display import load_display
-from lippmann.display.comfort import FUSED, comfort_in_words, fusion_warning
 from lippmann.display.stereo import depth_of_disparity
+from lippmann.scene.placement import FUSED, comfort_in_words, fusion_warning
 
 MONITOR, PANEL = load_display("odyssey-3d"), load_display("portrait")
 

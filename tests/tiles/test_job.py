@@ -105,8 +105,7 @@ def test_tiles_hold_what_the_file_will(engine):
 @pytest.mark.parametrize("layout", ["lenticular", "square", "hexagonal"])
 def test_the_sums_of_tiles_give_the_estimate_of_the_whole(engine, layout):
     from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
-    from lippmann.rendering.estimate.pixel_errors import ErrorSums, PixelErrors
-    from lippmann.rendering.estimate.psnr import estimate_plain
+    from lippmann.rendering.estimate.psnr import ErrorSums, PixelErrors, estimate_plain
     from lippmann.tiles.tile_render import LENSES, SUMS, lens_sums
 
     display = Display("test", Panel(90, 70, 0.25), LensArray(layout, 1.9), gap=6.8, aperture_distance=5.0)

@@ -193,7 +193,7 @@ def test_an_interrupted_run_gives_the_same_file(settings, ending, tmp_path, monk
 @pytest.mark.usefixtures("engine")
 def test_the_sums_of_tiles_give_the_estimate_of_the_whole():
     from lippmann.rendering.estimate.denoised_psnr import PictureEstimator, estimate_denoised
-    from lippmann.rendering.estimate.pixel_errors import ErrorSums, PixelErrors
+    from lippmann.rendering.estimate.psnr import ErrorSums, PixelErrors
     from lippmann.tiles.tile_render import LENSES, OF_SAMPLES, SUMS, lens_sums
 
     random = np.random.default_rng(0)

@@ -1,4 +1,4 @@
-"""The command line: parse, call the library, leave with an exit code (:mod:`~lippmann.cli.outcome`).
+"""The command line: parse, call the library, leave with an exit code (:mod:`~lippmann.cli.app`).
 
 Nothing is imported here that takes time: Ctrl-C is one line from the first moment. SIGTERM, and SIGHUP of a terminal
 that is closed, end a command as Ctrl-C does.
@@ -42,7 +42,7 @@ def main(arguments: list[str] | None = None) -> None:
         atexit.register(lambda: _end_at_once(code))
     # NumPy's threads would wait for work with the processor at full load, and what they are given is small.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from lippmann.cli import app, outcome
+    from lippmann.cli import app
     from lippmann.cli.shared import standard_streams
     from lippmann.cli.shared.exit_codes import INTERRUPTED
 
@@ -54,9 +54,9 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         sys.unraisablehook = _hear_again
         _hear(ends, _interrupt)
-        code = outcome.run(words, debug=debug)
+        code = app.run(words, debug=debug)
     except KeyboardInterrupt:
-        code = outcome.stopped()
+        code = app.stopped()
     except SystemExit as error:
         code = error.code if isinstance(error.code, int) else int(error.code is not None)
         raise
@@ -83,9 +83,9 @@ def _interrupt(*_: object) -> None:
 
 def run(words: list[str], *, debug: bool = False) -> int:
     """Run one command; errors become one line on standard error unless ``debug`` asks for the traceback."""
-    from lippmann.cli import outcome
+    from lippmann.cli import app
 
-    return outcome.run(words, debug=debug)
+    return app.run(words, debug=debug)
 
 
 def _leave_early(*_: object) -> NoReturn:

@@ -9,8 +9,7 @@ if TYPE_CHECKING:
     from lippmann.image.integral_image import IntegralImage
     from lippmann.image.metadata import Metadata
     from lippmann.image.part_folders import compose, write_micro_images, write_views
-    from lippmann.image.picture import Picture
-    from lippmann.image.provenance import Provenance
+    from lippmann.image.picture import Picture, Provenance
     from lippmann.image.read import PictureFile, open_file, read_metadata, read_picture
     from lippmann.image.streamed import LargePicture, open_picture
     from lippmann.image.write import write_picture
@@ -23,7 +22,7 @@ _HOME = {
     "write_micro_images": "lippmann.image.part_folders",
     "write_views": "lippmann.image.part_folders",
     "Picture": "lippmann.image.picture",
-    "Provenance": "lippmann.image.provenance",
+    "Provenance": "lippmann.image.picture",
     "PictureFile": "lippmann.image.read",
     "open_file": "lippmann.image.read",
     "read_metadata": "lippmann.image.read",

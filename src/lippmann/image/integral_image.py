@@ -18,8 +18,7 @@ from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import PictureError
 from lippmann.image.encoding import display_codes
 from lippmann.image.micro_images import Permutation, micro_images_as_views
-from lippmann.image.picture import Picture, checked_placement
-from lippmann.image.provenance import Provenance
+from lippmann.image.picture import Picture, Provenance, checked_placement
 from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored
 from lippmann.image.views import Resampling, exact_view_shape, resampled_views
 

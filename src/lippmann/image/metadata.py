@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 from lippmann.display import Display
 from lippmann.errors import LippmannError, PictureError
-from lippmann.image.picture import Picture, checked_placement
-from lippmann.image.provenance import Provenance
+from lippmann.image.picture import Picture, Provenance, checked_placement
 from lippmann.image.stored_values import Matrix
 
 #: Version of this text; rises when a known name changes its meaning.

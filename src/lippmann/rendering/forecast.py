@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.display.comfort import comfort_in_words
 from lippmann.display.view_cone import cone_in_words, depth_gain_of_fused_cone, view_cone
 from lippmann.optics.proof import Proof, prove
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film import memory_model
-from lippmann.rendering.film.wavefront_plan import cut_wavefronts
+from lippmann.rendering.film.memory_model import cut_wavefronts
 from lippmann.rendering.picture import lens_notes, traced_window
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.preconditions import why_no_estimate
@@ -27,7 +26,7 @@ from lippmann.rendering.request.render_request import RenderRequest, format_valu
 from lippmann.rendering.session import Session, open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.runtime.machine import amount_in_words
-from lippmann.scene.placement import Placement
+from lippmann.scene.placement import Placement, comfort_in_words
 from lippmann.scene.scene import Scene
 from lippmann.wording import depths_in_words, duration_in_words, html_table, samples_in_words
 

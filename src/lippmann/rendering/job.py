@@ -10,16 +10,15 @@ from numpy.typing import NDArray
 
 from lippmann.progress import ProgressCallback
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
+from lippmann.rendering.film.memory_model import cut_wavefronts
 from lippmann.rendering.film.wavefront import Frame, trace_frame
-from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Session
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.ray_source import DisplayRays, OnePicture, QuiltRays, SubpixelRays, WindowRays
 
 if TYPE_CHECKING:
-    from lippmann.rendering.estimate.pixel_errors import PixelErrors
-    from lippmann.rendering.estimate.psnr import Estimate
+    from lippmann.rendering.estimate.psnr import Estimate, PixelErrors
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,8 +18,7 @@ from lippmann.rendering.denoise.dual_buffer import Denoised, clean_light, remove
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 from lippmann.rendering.denoise.outlines import exchange_coverage
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
-from lippmann.rendering.estimate.pixel_errors import PixelErrors
-from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts
+from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts, PixelErrors
 from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
 from lippmann.rendering.film.wavefront import Frame
 from lippmann.rendering.job import Job, Traced, guided_denoiser, one_stream

@@ -17,7 +17,7 @@ from lippmann._version import VERSION
 from lippmann.display import Display
 from lippmann.display.sheet_layout import trimmed
 from lippmann.errors import EngineError, UsageError
-from lippmann.image.provenance import Provenance
+from lippmann.image.picture import Provenance
 from lippmann.options.choices import LIGHT, POOLED_LIGHT, REUSING
 from lippmann.options.integrators import INTEGRATORS
 from lippmann.options.option import Options
@@ -25,7 +25,7 @@ from lippmann.options.quality import QualityOptions
 from lippmann.options.texts import settings_of
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
-from lippmann.rendering.film.wavefront_plan import cut_wavefronts
+from lippmann.rendering.film.memory_model import cut_wavefronts
 from lippmann.rendering.light_statements import light_notes, stated_error, visible_share, warn_of_emptiness
 from lippmann.rendering.request.plan import follow
 from lippmann.rendering.request.render_request import Choice, RenderRequest

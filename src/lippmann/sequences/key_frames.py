@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from lippmann.display import Display
-from lippmann.image.provenance import Provenance
+from lippmann.image.picture import Provenance
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.sequences.cuts import Moment, is_cut
 

@@ -15,11 +15,10 @@ from lippmann.image.encoding import stored_values
 from lippmann.journal.tile_file import TileResult
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.guided_denoiser import effort_of
-from lippmann.rendering.estimate.pixel_errors import ErrorSums, PixelErrors
-from lippmann.rendering.estimate.psnr import ERROR_LAYER
+from lippmann.rendering.estimate.psnr import ERROR_LAYER, ErrorSums, PixelErrors
+from lippmann.rendering.film.memory_model import cut_wavefronts
 from lippmann.rendering.film.sample_batches import FullInBatches
 from lippmann.rendering.film.wavefront import RayTotals, trace_frame
-from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.job import Job
 from lippmann.rendering.methods import SAMPLES_LAYER, trace
 from lippmann.rendering.request.preconditions import why_no_estimate

@@ -28,7 +28,7 @@ from lippmann.image.encoding import (
     profile_in_file,
 )
 from lippmann.image.metadata import Metadata, to_text
-from lippmann.image.provenance import Provenance
+from lippmann.image.picture import Provenance
 from lippmann.image.stored_values import FloatArray, Layer, Values
 from lippmann.image.write import can_be_banded, check_output, format_for, replacing_output, write_rows
 from lippmann.journal.tile_file import DamagedTile, TileResult
@@ -36,8 +36,7 @@ from lippmann.journal.tile_journal import TileStore, read_job, sweep_beside
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise import oidn
 from lippmann.rendering.estimate.denoised_psnr import estimate_sums
-from lippmann.rendering.estimate.pixel_errors import ErrorSums
-from lippmann.rendering.estimate.psnr import Estimate
+from lippmann.rendering.estimate.psnr import ErrorSums, Estimate
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.light_statements import is_among_mirrors
 from lippmann.rendering.request.render_request import RenderRequest
@@ -374,7 +373,7 @@ def _whole(job: TileJob, store: TileStore) -> dict[str, Pixels]:
 
 def fits_whole(display: Display, request: RenderRequest) -> bool:
     """Whether a picture can be rendered in one piece within the memory that it may use; see
-    :func:`lippmann.rendering.film.wavefront_plan.make_plan`.
+    :func:`lippmann.rendering.film.memory_model.make_plan`.
 
     Beside its own pixels that takes their errors and the codes of its file; more where it is pooled or denoised, and
     thrice as much where so are sub-pixels that keep all colours.

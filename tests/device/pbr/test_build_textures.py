@@ -156,8 +156,7 @@ def test_mesh_without_coordinates_takes_the_first_texel_and_says_so(build, look,
 
 
 def test_picture_is_uploaded_once(engine, texels):
-    from lippmann.device.pbr.material_groups import Variant
-    from lippmann.device.pbr.materials import make_finishes
+    from lippmann.device.pbr.materials import Variant, make_finishes
     from lippmann.device.pbr.textures import TextureStore
 
     image = Image("t", texels)

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lippmann.device.pbr.instancing import FEW_INSTANCES, LARGE_MESH, MOST_INSTANCES, CopiedMesh, choose_instances
+from lippmann.device.pbr.shapes import FEW_INSTANCES, LARGE_MESH, MOST_INSTANCES, CopiedMesh, choose_instances
 from lippmann.errors import SceneError
 
 PLENTY = 1 << 40

@@ -16,8 +16,7 @@ from lippmann.progress import Progress
 from lippmann.rendering.adaptive.stopping import Goal, goal_of, reach
 from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
-from lippmann.rendering.estimate.pixel_errors import PixelErrors
-from lippmann.rendering.estimate.psnr import Estimate
+from lippmann.rendering.estimate.psnr import Estimate, PixelErrors
 from lippmann.rendering.film.memory_model import MOST_BATCHES
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest

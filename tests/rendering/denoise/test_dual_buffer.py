@@ -8,7 +8,7 @@ import pytest
 from lippmann.color.transfer import encode, encode_srgb
 from lippmann.rendering.denoise.dual_buffer import Denoised
 from lippmann.rendering.denoise.tuning import TUNING
-from lippmann.rendering.estimate.pixel_errors import PixelErrors
+from lippmann.rendering.estimate.psnr import PixelErrors
 
 SHAPE = (256, 256, 3)
 

@@ -14,7 +14,7 @@ from lippmann.display.panel import Panel
 from lippmann.image.micro_images import lens_indices
 from lippmann.metrics.mse_psnr import micro_image_means, psnr
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
-from lippmann.rendering.estimate.pixel_errors import PixelErrors
+from lippmann.rendering.estimate.psnr import PixelErrors
 
 SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
 

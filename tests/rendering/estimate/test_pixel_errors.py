@@ -7,7 +7,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from lippmann.rendering.estimate.pixel_errors import (
+from lippmann.rendering.estimate.psnr import (
     MOST_LESS,
     ErrorSums,
     PixelErrors,

@@ -13,8 +13,7 @@ from lippmann.display.panel import Panel
 from lippmann.image.micro_images import lens_indices
 from lippmann.metrics.mse_psnr import micro_image_means, psnr
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
-from lippmann.rendering.estimate.pixel_errors import PixelErrors
-from lippmann.rendering.estimate.psnr import FLOOR, Estimate
+from lippmann.rendering.estimate.psnr import FLOOR, Estimate, PixelErrors
 from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.request.render_request import RenderRequest
 

@@ -128,7 +128,7 @@ def test_ball_and_wall_are_where_they_stand():
 def test_layers_do_not_depend_on_tiles():
     built = of_mitsuba(ball_and_wall())
     from lippmann.rendering.film.aov import plan_layers
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.transport.ray_source import DisplayRays
 
     source = DisplayRays(DISPLAY, WORLD_FROM_DISPLAY)
@@ -306,7 +306,7 @@ def test_guides_average_over_the_pixel():
 @pytest.mark.long
 def test_guides_do_not_depend_on_tiles_and_passes():
     from lippmann.rendering.film.feature_buffers import trace_guides
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.transport.ray_source import DisplayRays
 
     built = of_mitsuba(ball_and_wall())

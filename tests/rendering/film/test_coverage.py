@@ -97,8 +97,8 @@ def test_sub_pixels_have_their_own(session, truth):
 
 
 def test_parts_and_one_stream_have_that_of_the_whole(session, truth):
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
     window = PixelWindow(20, 10, 40, 30)
     whole = batches(session, rays(), 5).coverage_halves()

@@ -129,8 +129,8 @@ def test_every_sample_of_both_streams_is_taken_once(engine, rounds, shares, memo
 def test_the_mean_is_that_of_full_and_the_error_what_it_says(integrator, subpixels):
     from lippmann.color.transfer import encode_srgb
     from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
     plan = cut_wavefronts(SIZE, SIZE, 768, channels=3 if subpixels else 1, memory=2**30)
     reference = encode_srgb(trace_frame(integrator, rays(subpixels), plan, seed=77).pixels)

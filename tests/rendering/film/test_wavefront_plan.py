@@ -7,8 +7,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lippmann.errors import MemoryLimitError
-from lippmann.rendering.film.memory_model import BYTES_PER_LANE, PICTURE, preferred_lanes
-from lippmann.rendering.film.wavefront_plan import cut_batches, cut_wavefronts, equal_length
+from lippmann.rendering.film.memory_model import (
+    BYTES_PER_LANE,
+    PICTURE,
+    cut_batches,
+    cut_wavefronts,
+    equal_length,
+    preferred_lanes,
+)
 
 
 @settings(deadline=None, max_examples=60)

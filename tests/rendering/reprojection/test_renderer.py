@@ -28,9 +28,9 @@ class Case:
         self.source = DisplayRays(self.display, world)
 
     def full(self, samples=1):
+        from lippmann.rendering.film.memory_model import cut_wavefronts
         from lippmann.rendering.film.sample_batches import trace_in_batches
         from lippmann.rendering.film.wavefront import trace_frame
-        from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
         if samples > 1:
             return trace_in_batches(self.integrator, self.source, samples, memory=1 << 30)[0]

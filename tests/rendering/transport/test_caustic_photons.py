@@ -155,8 +155,8 @@ def test_photons_pass_holes_on_their_way():
 def traced(scene_dict, view, *, photons, size=24, spp=64, seed=0, depth=6, samples=1 << 26):
     import mitsuba as mi
 
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.casters import find_casters
     from lippmann.rendering.transport.caustic_photons import CausticPhotons
     from lippmann.rendering.transport.path import PathIntegrator

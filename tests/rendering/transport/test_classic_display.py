@@ -72,8 +72,8 @@ def test_the_picture_does_not_depend_on_how_it_was_cut(corners):
     from dataclasses import replace
 
     from lippmann.device.whitted.scene import build_classic
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.whitted import WhittedIntegrator
     from lippmann.rendering.transport.whitted_camera import WhittedCameraRays
 

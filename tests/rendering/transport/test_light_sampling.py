@@ -54,8 +54,8 @@ def stage(scene, depth=3):
 
 
 def picture(integrator, source, samples, seed):
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
     return trace_frame(integrator, source, cut_wavefronts(SIZE, SIZE, samples, memory=2**31), seed=seed).pixels
 
@@ -319,8 +319,8 @@ def test_two_renders_of_one_scene_leave_each_other_alone(engine):
         return session, session.integrator(source, np.eye(4)), source
 
     def traced(session, integrator, source):
+        from lippmann.rendering.film.memory_model import cut_wavefronts
         from lippmann.rendering.film.wavefront import trace_frame
-        from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
         plan = cut_wavefronts(SIZE, SIZE, 2, memory=session.memory)
         return trace_frame(integrator, source, plan, seed=request.seed).pixels.tobytes()

@@ -118,8 +118,8 @@ def passes(integrator, seed):
 
 
 def pictures(integrator, source, joined, *, seeds, spp=8):
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
     plan = cut_wavefronts(SIDE, SIDE, spp, memory=2**30)
     found = []

@@ -182,8 +182,7 @@ def test_the_rest_of_the_sides_is_black_and_the_views_tell_their_error():
 def test_estimates_are_those_of_the_views():
     """One view is far noisier than the others, and is named."""
     from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
-    from lippmann.rendering.estimate.pixel_errors import PixelErrors
-    from lippmann.rendering.estimate.psnr import Parts
+    from lippmann.rendering.estimate.psnr import Parts, PixelErrors
 
     parts = Parts.views(3, 4, (20, 10))
     assert parts.owner[-1, 0] == 0

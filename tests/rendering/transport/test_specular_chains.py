@@ -93,8 +93,8 @@ def chained(integrator, chains):
 
 
 def pictures(integrator, source, chains, *, seeds, spp=8):
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
     integrator = chained(integrator, chains)
     plan = cut_wavefronts(SIDE, SIDE, spp, memory=2**30)
@@ -270,9 +270,9 @@ def test_chains_count_the_emitter_samples_of_their_path():
 def test_seen_light_is_told_apart_and_is_all_that_is_seen(all_events):
     """The emitter's mirror images and the sky's; not what lies on matt surfaces."""
 
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.sample_batches import FullInBatches
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 
     integrator, source = all_events
     integrator = chained(integrator, 4)
@@ -336,9 +336,9 @@ def test_of_many_chains_each_counts_as_a_whole(all_events):
     """The emitter is 15 times white: one of 8 chains counts up to 5.7 of that, one of 64 as a whole."""
     import mitsuba as mi
 
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.sample_batches import FullInBatches
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.specular_chains import most_of_chain
 
     assert 4 < most_of_chain(8.0) < 5
@@ -370,8 +370,8 @@ def test_sky_at_outlines_stays_with_paths(engine):
     """Samples of both sides belong together: of a ball as bright as its sky nothing would be seen."""
     import mitsuba as mi
 
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
     from lippmann.rendering.transport.scene_features import make_scene_features

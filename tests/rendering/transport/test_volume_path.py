@@ -75,8 +75,8 @@ def fog_room(medium, distance=4.0):
 
 
 def trace(scene, camera, spp, depth=DEPTH, seed=0):
+    from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.film.wavefront_plan import cut_wavefronts
     from lippmann.rendering.transport.ray_source import CameraRays
     from lippmann.rendering.transport.volume_path import VolumePathIntegrator
 

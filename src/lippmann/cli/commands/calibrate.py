@@ -11,8 +11,8 @@ import typer
 
 from lippmann.cli.commands import view as viewing
 from lippmann.cli.shared import options
+from lippmann.cli.shared.command_options import HelpfulCommand
 from lippmann.cli.shared.console import Console
-from lippmann.cli.shared.grouped_help import HelpfulCommand
 from lippmann.errors import OutputError, UsageError
 
 if TYPE_CHECKING:

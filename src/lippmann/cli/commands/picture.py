@@ -22,7 +22,7 @@ from lippmann.wording import samples_in_words
 if TYPE_CHECKING:
     from lippmann.display import Display
     from lippmann.image import PictureFile
-    from lippmann.image.provenance import Provenance
+    from lippmann.image.picture import Provenance
     from lippmann.image.stored_values import FloatArray
     from lippmann.quilts.quilt import Quilt
     from lippmann.viewing.stereo import Stereo
@@ -414,7 +414,7 @@ def _quilt_values(path: Path, quilt: Quilt) -> dict[str, Any]:
 
 
 def _quilt_lines(path: Path, quilt: Quilt) -> list[str]:
-    from lippmann.image.provenance import Provenance
+    from lippmann.image.picture import Provenance
 
     (width, height), (view_width, view_height) = quilt.size, quilt.view_size
     aspect = "" if quilt.layout.aspect is None else f", aspect {quilt.layout.aspect:g}"

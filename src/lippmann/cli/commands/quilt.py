@@ -11,9 +11,8 @@ import typer
 
 from lippmann.cli.commands.interlace import FitOption, fit_note
 from lippmann.cli.shared import options, parse
-from lippmann.cli.shared.command_options import for_form, with_options
+from lippmann.cli.shared.command_options import HelpfulCommand, for_form, with_options
 from lippmann.cli.shared.console import Console, add_seconds, depth_line, estimate_in_words, report
-from lippmann.cli.shared.grouped_help import HelpfulCommand
 from lippmann.cli.shared.scene_source import SceneSource, sheet_of
 from lippmann.errors import UsageError
 from lippmann.options.light import LightOptions

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lippmann.device.pbr.emitters import active_lights, environment_object, light_object
-from lippmann.device.pbr.material_groups import Variant, follows_tangents
-from lippmann.device.pbr.materials import Finish, make_finishes
+from lippmann.device.pbr.materials import Finish, Variant, follows_tangents, make_finishes
 from lippmann.device.pbr.media import MEDIA_NOTE, has_media
 from lippmann.device.pbr.shapes import Dress, has_volume, make_shapes
 from lippmann.device.pbr.textures import TextureStore

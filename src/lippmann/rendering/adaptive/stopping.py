@@ -17,8 +17,7 @@ from lippmann.options.quality import MOST_SAMPLES
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
-from lippmann.rendering.estimate.pixel_errors import PixelErrors
-from lippmann.rendering.estimate.psnr import Estimate
+from lippmann.rendering.estimate.psnr import Estimate, PixelErrors
 from lippmann.rendering.film.memory_model import MOST_BATCHES
 from lippmann.rendering.request.render_request import RenderRequest
 

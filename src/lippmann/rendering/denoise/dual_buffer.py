@@ -37,7 +37,7 @@ from lippmann.color.transfer import Coding, coding_chord, coding_slope, encode
 from lippmann.rendering.denoise.noisy_blend import mean_around, weigh_samples
 from lippmann.rendering.denoise.outlines import exchange_coverage
 from lippmann.rendering.denoise.tuning import TUNING
-from lippmann.rendering.estimate.pixel_errors import PixelErrors
+from lippmann.rendering.estimate.psnr import PixelErrors
 from lippmann.rendering.estimate.tuning import TUNING as ESTIMATE
 from lippmann.rendering.film.wavefront import Coverage
 from lippmann.rendering.request.tuning import TUNING as REQUEST

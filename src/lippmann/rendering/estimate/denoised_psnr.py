@@ -30,15 +30,17 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.image.micro_images import row_blocks
-from lippmann.rendering.estimate.pixel_errors import ErrorSums, PixelErrors, parts_with_pixels
 from lippmann.rendering.estimate.psnr import (
     NORMAL_95,
+    ErrorSums,
     Estimate,
     PartErrors,
     Parts,
+    PixelErrors,
     estimate_plain,
     make_estimate,
     neighbourhood,
+    parts_with_pixels,
 )
 from lippmann.rendering.estimate.tuning import TUNING
 

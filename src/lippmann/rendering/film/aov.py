@@ -17,7 +17,7 @@ from lippmann.device.kernel_ops import divide, to_numpy
 from lippmann.device.types import Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.memory_model import LAYERS as BYTES
-from lippmann.rendering.film.wavefront_plan import Plan, Tile, cut_wavefronts
+from lippmann.rendering.film.memory_model import Plan, Tile, cut_wavefronts
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.scene.matrices import normal_matrix

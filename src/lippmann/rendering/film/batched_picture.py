@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import Coding, coding_slope
 from lippmann.errors import UsageError
 from lippmann.rendering.estimate.jackknife import error_of_batches
-from lippmann.rendering.estimate.pixel_errors import PixelErrors
+from lippmann.rendering.estimate.psnr import PixelErrors
+from lippmann.rendering.film.memory_model import Run
 from lippmann.rendering.film.wavefront import Coverage
-from lippmann.rendering.film.wavefront_plan import Run
 
 Floats = NDArray[np.float32]
 

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from lippmann.device.kernel_ops import to_numpy
 from lippmann.device.types import Color3f, Float, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.film.memory_model import LAYERS
+from lippmann.rendering.film.memory_model import LAYERS, Pass, Plan, Tile, cut_wavefronts
 from lippmann.rendering.film.wavefront import Coverage, samples_of_tile, to_rows
-from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile, cut_wavefronts
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.scene.matrices import inverse, rotation_of

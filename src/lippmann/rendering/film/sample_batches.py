@@ -22,9 +22,10 @@ from lippmann.device.sobol import SampleStream
 from lippmann.device.types import UInt32
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.progress import Progress, ProgressCallback, of_part, silent
-from lippmann.rendering.estimate.pixel_errors import PixelErrors
+from lippmann.rendering.estimate.psnr import PixelErrors
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.batched_picture import STREAMS, BatchedPicture
+from lippmann.rendering.film.memory_model import Run, cut_batches
 from lippmann.rendering.film.wavefront import (
     STRIP_ROWS,
     Frame,
@@ -37,7 +38,6 @@ from lippmann.rendering.film.wavefront import (
     sum_samples,
     to_rows,
 )
-from lippmann.rendering.film.wavefront_plan import Run, cut_batches
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource, SubpixelRays

@@ -22,7 +22,7 @@ from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, Color3f, Float, Spectrum, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
+from lippmann.rendering.film.memory_model import Pass, Plan, Tile
 from lippmann.rendering.transport.integrator import Integrator, PixelSample
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource

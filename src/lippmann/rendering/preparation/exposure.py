@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.primaries import REC709, xyz_from_rgb
+from lippmann.rendering.film.memory_model import cut_wavefronts
 from lippmann.rendering.film.wavefront import trace_frame
-from lippmann.rendering.film.wavefront_plan import cut_wavefronts
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.ray_source import ChosenRays, RaySource
