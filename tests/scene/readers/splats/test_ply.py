@@ -107,3 +107,18 @@ def test_splats_that_lack_a_property_are_refused_by_its_name(tmp_path, left_out,
     with pytest.raises(SceneError, match=said) as refusal:
         load_scene(path)
     assert "\n" not in str(refusal.value)
+
+
+def test_splats_of_a_survey_keep_their_shape(tmp_path):
+    """In single precision, half a metre would be lost at five million metres."""
+    path = write(tmp_path / "a.ply", kinds=dict.fromkeys("xyz", "double"))
+    far = np.array([500000.0, 5400000.0, 300.0])
+    offsets = np.array([[0, 0, 0], [0.25, 0, 0], [0, 0.125, 0]])
+    text = path.read_text().replace("vertex 1", "vertex 3")
+    head, _, line = text.rstrip().rpartition("\n")
+    lines = [" ".join([*map(repr, (far + offset).tolist()), *line.split()[3:]]) for offset in offsets]
+    path.write_text("\n".join([head, *lines, ""]))
+    scene = load_scene(path, up="y")
+    centers = scene.description.splats.centers
+    np.testing.assert_allclose(centers - centers[0], offsets, atol=1e-6)
+    assert any("so far from the origin" in note for note in scene.notes)

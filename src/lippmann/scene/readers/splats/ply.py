@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.far_origin import near_origin
 from lippmann.scene.parsing.ply_header import Element, Header
 from lippmann.scene.parsing.vertex_colors import full_brightness
 from lippmann.scene.readers.splats.activation import (
@@ -152,6 +153,7 @@ def _floats(rows: Rows, names: Sequence[str]) -> FloatArray:
     return values
 
 
+@np.errstate(over="ignore")  # of damaged numbers, which are left out
 def _trained(rows: Rows, element: Element, where: str) -> tuple[Splats, tuple[str, ...]]:
     names = _names(element)
     rest = sum(name.startswith("f_rest_") for name in names)
@@ -171,8 +173,10 @@ def _trained(rows: Rows, element: Element, where: str) -> tuple[Splats, tuple[st
     opacities = sigmoid(_floats(rows, ["opacity"])[:, 0])
     if _FILTER in names:
         log_scales, opacities = _filtered(log_scales, opacities, _floats(rows, [_FILTER]))
+    moved: list[str] = []
+    centers = near_origin(np.stack([rows[axis].astype(np.float64) for axis in "xyz"], axis=1), moved)
     splats, notes = activated(
-        _floats(rows, ["x", "y", "z"]),
+        centers.astype(np.float32),
         log_scales,
         _floats(rows, ["rot_1", "rot_2", "rot_3", "rot_0"]),
         opacities,
@@ -181,7 +185,7 @@ def _trained(rows: Rows, element: Element, where: str) -> tuple[Splats, tuple[st
     )
     unread = sorted(name[:40] for name in names - {*_TRAINED, _THIRD_SCALE, *_DC, *_RGB, _FILTER, *_UNUSED})
     unread = [name for name in unread if not name.startswith("f_rest_")]
-    return splats, (*notes, *([f"of splats not shown: {', '.join(unread[:20])}"] if unread else []))
+    return splats, (*moved, *notes, *([f"of splats not shown: {', '.join(unread[:20])}"] if unread else []))
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of damaged numbers, which are left out
