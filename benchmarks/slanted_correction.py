@@ -3,12 +3,12 @@
 python benchmarks/slanted_correction.py [SCENE ...]
 
 Each bundled scene, or each scene or file named, is rendered for a part of a 15.6-inch 4K panel behind an acrylic sheet.
-The light that windows of rows send through the lenses is compared with rays in directions that were not solved for: the
-middles of thirds of pixels, where the correction knows halves. Windows of 6 rows were solved for, those of 10 and 12
-were not. Light is that over the light of a white panel, which is even in windows of 6 and 12 rows, and has waves of
-17 % in those of 10. `gain` is over the picture along true directions, `gain over t/n` over that of a pinhole at
-thickness over index. `told` is the gain that the program prints. Writes benchmarks/results/slanted_correction.json,
-where other scenes keep their rows.
+Rays go all across the lenses. The light that windows of rows send through the lenses is compared with rays in
+directions that were not solved for: the middles of thirds of pixels, where the correction knows halves. Windows of 6
+rows were solved for, those of 10 and 12 were not. Light is that over the light of a white panel, which is even in
+windows of 6 and 12 rows, and has waves of 17 % in those of 10. `gain` is over the picture along true directions, `gain
+over t/n` over that of a pinhole at thickness over index, whose rays go through the middles. `told` is the gain that the
+program prints. Writes benchmarks/results/slanted_correction.json, where other scenes keep their rows.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from lippmann.scene.readers.load import load_scene
 from part_rays import render
 
 DISPLAY = load_display(Path(__file__).parent / "slanted_panel.toml").resized(240, 120)
-SIMPLE = replace(DISPLAY, distortion=None, gap=DISPLAY.lens.thickness / DISPLAY.lens.index)
+SIMPLE = replace(DISPLAY, lens=None, distortion=None, gap=DISPLAY.lens.thickness / DISPLAY.lens.index)
 SAMPLES, TRUTH_SAMPLES = 64, 128
 JUDGED, WINDOWS = (-1 / 3, 0.0, 1 / 3), (6, 10, 12)
 
