@@ -1,6 +1,7 @@
 """Coordinates far from the origin, as surveys write them."""
 
 import base64
+import itertools
 import json
 import struct
 
@@ -118,3 +119,38 @@ def test_others_stay(places):
     notes = []
     assert near_origin(places, notes) is places
     assert notes == []
+
+
+def test_an_animation_far_away_is_moved_by_the_same_at_all_times(tmp_path):
+    from lippmann.sequences.motion import AnimatedFile
+
+    way = np.array([UTM, UTM + np.array([2.0, 0.0, 0.0])])
+    parts = [CORNERS.astype("<f4"), np.array(FACES, "<u4"), np.array([0, 1], "<f4"), way.astype("<f4")]
+    kinds = [(5126, 4, "VEC3"), (5125, 12, "SCALAR"), (5126, 2, "SCALAR"), (5126, 2, "VEC3")]
+    starts = np.cumsum([0, *(part.nbytes for part in parts)]).tolist()
+    data = base64.b64encode(b"".join(part.tobytes() for part in parts)).decode()
+    accessors = [
+        {"bufferView": number, "componentType": kind, "count": count, "type": shape}
+        for number, (kind, count, shape) in enumerate(kinds)
+    ]
+    accessors[0] |= {"min": [0, 0, 0], "max": [0.1, 0.2, 0.3]}
+    accessors[2] |= {"min": [0], "max": [1]}
+    views = [{"buffer": 0, "byteOffset": a, "byteLength": b - a} for a, b in itertools.pairwise(starts)]
+    channel = {"sampler": 0, "target": {"node": 0, "path": "translation"}}
+    document = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"byteLength": starts[-1], "uri": f"data:;base64,{data}"}],
+        "bufferViews": views,
+        "accessors": accessors,
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "nodes": [{"mesh": 0}],
+        "animations": [{"samplers": [{"input": 2, "output": 3}], "channels": [channel]}],
+        "scenes": [{"nodes": [0]}],
+        "scene": 0,
+    }
+    (tmp_path / "a.gltf").write_text(json.dumps(document))
+    motion = AnimatedFile(tmp_path / "a.gltf", fps=1)
+    first, last = (motion.scene(frame).bounds for frame in (0, 1))
+    assert np.abs(first).max() < 1
+    assert last - first == pytest.approx(np.array([[2.0, 0.0, 0.0]] * 2), abs=1e-5)
+    assert any("its shape would be rounded" in note for note in motion.scene(0).notes)

@@ -42,8 +42,13 @@ def moved_near_origin(description: SceneDescription) -> SceneDescription:
 
     As buildings and terrains have it, whose meshes lie about their own origin.
     """
+    return moved_back(description, placed_offset(description))
+
+
+def placed_offset(description: SceneDescription) -> NDArray[np.float64] | None:
+    """Where a scene of meshes lies that its placements put far from the origin; None of others."""
     if description.splats is not None or description.volume is not None:
-        return description
+        return None
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for number, worlds in description.fitted_placements.items():
         positions = description.meshes[number].positions
@@ -53,7 +58,11 @@ def moved_near_origin(description: SceneDescription) -> SceneDescription:
             halves = np.abs(worlds[:, :3, :3]) @ ((most - least) / 2.0)
             low = np.minimum(low, (middles - halves).min(axis=0))
             high = np.maximum(high, (middles + halves).max(axis=0))
-    offset = _far_offset((low + high) / 2, (high - low).max() / 2)
+    return _far_offset((low + high) / 2, (high - low).max() / 2)
+
+
+def moved_back(description: SceneDescription, offset: NDArray[np.float64] | None) -> SceneDescription:
+    """A scene with its cameras and lights, moved by an offset the other way, with a note; as it is without one."""
     if offset is None:
         return description
     move = np.eye(4)
