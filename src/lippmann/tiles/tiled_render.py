@@ -120,12 +120,11 @@ def render_to_file(
     from lippmann.tiles.tile_render import prepare
 
     started = time.perf_counter()
-    name, stored = format_for(output, bits)
+    name, stored = check_output(output, bits)
     finish.check_stored(stored, output)
     finish.check_colors(request.transfer)
     request = request.for_file(output)
     printed = finish.display(display)
-    check_output(output, bits)
     if name == "zarr":
         zarr_array.load_zarr(output)
     job = make_job(

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from lippmann.calibration.finish import Finish
     from lippmann.display import Display
     from lippmann.image import IntegralImage
+    from lippmann.image.encoding import FormatName
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.tiles.tiled_render import Runner
 
@@ -79,7 +80,7 @@ def render(
     machine: MachineOptions,
 ) -> None:
     """Render a scene into the native pixels of a display."""
-    from lippmann.image.write import check_output, format_for
+    from lippmann.image.write import check_output
     from lippmann.rendering.picture import render_picture
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.runtime.atomic_write import check_folder_writable
@@ -117,9 +118,9 @@ def render(
 
             open_file(moving.video)
         return
-    name, stored = format_for(output, bits)
+    name, stored = check_output(output, bits)
     _check_layers(how.layers, name, output)
-    if on_cluster or is_tiled(output, bits, traced, request, resume=resume):
+    if on_cluster or is_tiled(name, traced, request, resume=resume):
         if correct == "lens":
             fix = "render a quilt with 'lippmann quilt', then 'lippmann weave --correct lens'"
             _refuse_correction("tiles, as a cluster, --resume, Zarr and pictures beyond the memory have them", fix)
@@ -136,7 +137,6 @@ def render(
         if opens:
             _open(output, quiet=quiet, as_json=as_json)
         return
-    check_output(output, bits)
     if finish is not None:
         finish.check_stored(stored, output)
     if maps is not None:
@@ -217,11 +217,8 @@ def _with_seconds(image: IntegralImage, **seconds: float) -> IntegralImage:
     return replace(image, provenance=add_seconds(image.provenance, **seconds))
 
 
-def is_tiled(output: Path, bits: int | None, display: Display, request: RenderRequest, *, resume: bool) -> bool:
+def is_tiled(name: FormatName, display: Display, request: RenderRequest, *, resume: bool) -> bool:
     """Whether a picture has to be rendered in tiles: where that is asked for, or is the only way."""
-    from lippmann.image.write import format_for
-
-    name, _ = format_for(output, bits)
     if resume or name != "tiff":
         return resume or name == "zarr"
     from lippmann.tiles.tiled_render import fits_whole

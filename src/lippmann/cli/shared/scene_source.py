@@ -89,14 +89,14 @@ def planned_display(name: str, printed: PrintOptions) -> tuple[Display, tuple[in
     PictureError
         If the size has not the shape of a pair.
     """
-    from lippmann.display import load_display
-
-    if printed.size is None or name == _PRINT or load_display(name).stereo is None:
+    if printed.size is None or name == _PRINT:
         return display_of(name, printed), None
+    display = display_of(name, replace(printed, size=None))
+    if display.stereo is None:
+        return display_of(name, printed), None  # which refuses the size
     from lippmann.cli.shared import parse
     from lippmann.quilts.quilt import quilt_of_display
 
-    display = display_of(name, replace(printed, size=None))
     pair = quilt_of_display(display, size=parse.size(printed.size, "--size"))
     return display, (pair.width, pair.height)
 

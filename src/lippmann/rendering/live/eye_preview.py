@@ -108,4 +108,4 @@ def _denoises(asked: RenderRequest, resolved: RenderRequest, scene: Scene) -> bo
         load_denoiser()
         return True
     is_noisy = asked.denoise == "auto" and resolved.integrator in POOLED_LIGHT
-    return is_noisy and not (scene.lies_off_surfaces or scene.fills_panel) and machine.has_denoiser()
+    return is_noisy and not (scene.lies_off_surfaces or scene.is_unlit) and machine.has_denoiser()
