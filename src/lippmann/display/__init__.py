@@ -3,8 +3,7 @@
 from lippmann.display.array_ops import NUMPY, ArrayOps
 from lippmann.display.display import Display
 from lippmann.display.formats.load import list_displays, load_display
-from lippmann.display.lattice import LensGrid
-from lippmann.display.lens_array import LensArray
+from lippmann.display.lens_array import LensArray, LensGrid
 from lippmann.display.micro_image_layout import (
     covers_whole_pixels,
     micro_image_extent,

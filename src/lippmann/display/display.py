@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 
 from lippmann.display.array_ops import NUMPY, Array, ArrayOps
 from lippmann.display.distortion import Distortion
-from lippmann.display.lattice import WHOLE_TOLERANCE, Lattice, LensGrid, lattice_in_front_of
-from lippmann.display.lens_array import LensArray
+from lippmann.display.lens_array import WHOLE_TOLERANCE, Lattice, LensArray, LensGrid, lattice_in_front_of
 from lippmann.display.lens_profile import LensProfile
 from lippmann.display.panel import Panel
 from lippmann.display.pixel_aperture import PixelAperture

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from lippmann.display.array_ops import NUMPY
 from lippmann.display.display import Display
-from lippmann.display.lattice import Lattice
-from lippmann.display.lens_array import LensArray
+from lippmann.display.lens_array import Lattice, LensArray
 from lippmann.display.lens_profile import LensProfile
 from lippmann.errors import DisplayError
 

@@ -1,8 +1,8 @@
 """Description of a picture and its display for the viewer, as plain values for JSON.
 
-The viewer draws by the formulas of :mod:`lippmann.viewing.replay` and :mod:`lippmann.display.lattice`. Their parameters
-are given as they take effect (aligned pitches, lenses counted as in :attr:`Display.lens_grid`), in millimetres, pixels
-and degrees.
+The viewer draws by the formulas of :mod:`lippmann.viewing.replay` and :mod:`lippmann.display.lens_array`. Their
+parameters are given as they take effect (aligned pitches, lenses counted as in :attr:`Display.lens_grid`), in
+millimetres, pixels and degrees.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Neighbouring points of a row meet the same lens, some tens of times in a row: a lens holds one run of a row at most,
 because its cell is convex. The end of a run is calculated. Only where it falls on a point, up to rounding, is the lens
-of that point looked up as :class:`~lippmann.display.lattice.Lattice` does.
+of that point looked up as :class:`~lippmann.display.lens_array.Lattice` does.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def _in_row(x: float, y: float, j: float, lattice: Real) -> tuple[float, float]:
 
 @inlined
 def _lens_at(x: float, y: float, is_hexagonal: bool, lattice: Real) -> tuple[float, float]:
-    """:meth:`lippmann.display.lattice.Lattice.lens_at`, in the same operations in the same order."""
+    """:meth:`lippmann.display.lens_array.Lattice.lens_at`, in the same operations in the same order."""
     down = lattice[ORIGIN_Y] - y
     if not is_hexagonal:
         j = _nearest(down, lattice[ROW_PITCH], lattice[TOLERANCE])

@@ -60,8 +60,7 @@ def stage(scene):
 
 
 def given(integrator, source, /, *, gain=1.0, **options):
-    from lippmann.rendering.preparation.pilot import trace_pilot
-    from lippmann.rendering.preparation.prepare import trace_light_vertices
+    from lippmann.rendering.preparation.prepare import trace_light_vertices, trace_pilot
     from lippmann.rendering.request.render_request import RenderRequest
 
     request = RenderRequest(**({"integrator": "path", "spp": 16} | options))
@@ -109,11 +108,11 @@ def test_nothing_is_joined_where_indirect_light_is_dim():
 
 
 def test_scenes_of_very_many_emitters_are_left_to_paths(monkeypatch):
-    from lippmann.rendering.preparation import pilot
+    from lippmann.rendering.preparation import prepare
 
     scene = room(small()) | {"point": {"type": "point", "position": [-0.8, 0.8, -0.7], "intensity": 1e-3}}
     assert given(*stage(scene))
-    monkeypatch.setattr(pilot, "TUNING", replace(pilot.TUNING, most_weighed_emitters=1))
+    monkeypatch.setattr(prepare, "TUNING", replace(prepare.TUNING, most_weighed_emitters=1))
     assert not given(*stage(scene))
 
 

@@ -61,13 +61,13 @@ def picture(integrator, source, samples, seed):
 
 
 def estimated_weights(integrator, source):
-    from lippmann.rendering.preparation.pilot import emitter_weights, trace_pilot
+    from lippmann.rendering.preparation.prepare import emitter_weights, trace_pilot
 
     return emitter_weights(trace_pilot(integrator, source))
 
 
 def pilot_sampler(integrator, source):
-    from lippmann.rendering.preparation.pilot import make_light_sampler, trace_pilot
+    from lippmann.rendering.preparation.prepare import make_light_sampler, trace_pilot
 
     return make_light_sampler(integrator.scene, trace_pilot(integrator, source))
 
@@ -268,11 +268,11 @@ def test_emitters_without_contribution_are_sampled_uniformly():
 
 
 def test_invalid_contributions_do_not_count(monkeypatch):
-    from lippmann.rendering.preparation import pilot
+    from lippmann.rendering.preparation import prepare
 
     integrator, source = stage(room())
     whole = estimated_weights(integrator, source)
-    along = pilot._contributions
+    along = prepare._contributions
 
     def some_lost(*given):
         import drjit as dr
@@ -281,19 +281,19 @@ def test_invalid_contributions_do_not_count(monkeypatch):
         squares, *others = along(*given)
         return dr.select(dr.arange(mi.UInt32, dr.width(squares)) % 64 == 0, dr.nan, squares), *others
 
-    monkeypatch.setattr(pilot, "_contributions", some_lost)
+    monkeypatch.setattr(prepare, "_contributions", some_lost)
     assert estimated_weights(integrator, source) == pytest.approx(whole, rel=0.05)
 
 
 def test_no_emitter_one_or_very_many_keep_the_weights_of_the_scene(monkeypatch):
-    from lippmann.rendering.preparation import pilot
+    from lippmann.rendering.preparation import prepare
     from lippmann.rendering.transport.light_sampling import SceneLightSampler
 
     for order in ((), ("bright",)):
         integrator, source = stage(room(order))
         assert estimated_weights(integrator, source) == pytest.approx([1.0] * len(order))
         assert isinstance(pilot_sampler(integrator, source), SceneLightSampler)
-    monkeypatch.setattr(pilot, "TUNING", replace(pilot.TUNING, most_weighed_emitters=2))
+    monkeypatch.setattr(prepare, "TUNING", replace(prepare.TUNING, most_weighed_emitters=2))
     integrator, source = stage(room())
     assert estimated_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
 

@@ -66,8 +66,7 @@ def described(description):
 
 
 def prepared(scene, *, has_null):
-    from lippmann.rendering.preparation.pilot import trace_pilot
-    from lippmann.rendering.preparation.prepare import shoot_photons
+    from lippmann.rendering.preparation.prepare import shoot_photons, trace_pilot
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays

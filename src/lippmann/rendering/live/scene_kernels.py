@@ -15,12 +15,11 @@ from lippmann.options.light import LightOptions
 from lippmann.rendering.film.memory_model import BYTES_PER_LANE, PREFERRED_LANES
 from lippmann.rendering.live.live_tracer import FeatureTracer, LiveIntegrator, LiveTracer
 from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
-from lippmann.rendering.preparation.pilot import make_light_sampler, trace_pilot
+from lippmann.rendering.preparation.prepare import make_light_sampler, trace_pilot
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Session, even_background, make_integrator
 from lippmann.rendering.transport.first_surface import make_surfaces
-from lippmann.rendering.transport.path import PathIntegrator
-from lippmann.rendering.transport.prepared_light import PreparedLight
+from lippmann.rendering.transport.path import PathIntegrator, PreparedLight
 from lippmann.rendering.transport.ray_source import DisplayRays
 from lippmann.scene.hull_bounds import bounds_by_hull
 from lippmann.scene.placement import Placement
