@@ -22,10 +22,10 @@ main()
 HELP = {"annotated_doc", "lippmann", "shellingham", "typer"}
 RENDER = HELP | {"cffi", "cython_runtime", "drjit", "imagecodecs", "mitsuba", "numpy", "psutil", "pycparser", "pyoidn"}
 BUDGETS = {
-    "--help": (HELP, 23),
-    "preview teapot": (RENDER, 211),
-    "render teapot": (RENDER, 221),
-    "render model.glb": (RENDER, 244),
+    "--help": (HELP, 21),
+    "preview teapot": (RENDER, 199),
+    "render teapot": (RENDER, 204),
+    "render model.glb": (RENDER, 227),
 }
 
 

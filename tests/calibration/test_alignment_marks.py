@@ -14,7 +14,7 @@ from lippmann.calibration.alignment_marks import Marks
 from lippmann.calibration.finish import Finish
 from lippmann.display import load_display
 from lippmann.display.formats.print_sheet import Print
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
 from lippmann.viewing.replay import replay

@@ -10,7 +10,7 @@ from lippmann.calibration.labels import label_window, paint_label
 from lippmann.calibration.pattern_files import draw_labelled, pattern_picture
 from lippmann.display import Panel
 from lippmann.display.formats.monitor import Monitor
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 
 MONITOR = Monitor("small", Panel(1200, 800, 0.3), pitch=14.0, slope=-4.7, center=0.31, viewing_distance=700.0)
 

@@ -14,7 +14,7 @@ from lippmann.calibration import NAMES, Pattern, draw, fields, whole
 from lippmann.calibration.patterns import COLORS, LIT, step_of
 from lippmann.display import Panel
 from lippmann.display.formats.monitor import Monitor
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage, Provenance
 from lippmann.viewing.replay import replay

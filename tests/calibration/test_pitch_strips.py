@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from lippmann.calibration.pitch_strips import PitchTest
 from lippmann.display.formats.print_sheet import Print
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
 from lippmann.viewing.replay import replay

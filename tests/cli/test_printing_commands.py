@@ -64,7 +64,7 @@ def test_a_pitch_test(lippmann, tmp_path):
     test = PitchTest(sheet, 5, 0.2)
     assert outcome.json["strips"] == [strip.lpi for strip in test.all_strips]
     assert outcome.json["expected"] == pytest.approx(sheet.pitch_on_print)
-    from lippmann.display.pixel_window import PixelWindow
+    from lippmann.display.panel import PixelWindow
 
     np.testing.assert_array_equal(tifffile.imread(path), test.draw(PixelWindow(0, 0, 315, 157)))
     assert dpi(path) == ((200, 1), (200, 1))

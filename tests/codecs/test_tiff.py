@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import tifffile
 
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.image import open_file
 from lippmann.image.streamed import pixels_of_file
 

@@ -20,7 +20,7 @@ import pytest
 import zarr
 
 from lippmann.codecs.zarr_reader import open_array, read_array_metadata
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.errors import PictureError
 from lippmann.exchange.zarr_store import read_zarr
 from lippmann.image import open_file, read_picture

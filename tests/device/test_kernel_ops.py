@@ -122,7 +122,7 @@ def test_arrays_and_textures_of_all_parts_are_found_once():
 def test_plugins_show_their_arrays_and_hide_their_models():
     from lippmann.device.pbr.gltf_bsdf import surface_bsdf
     from lippmann.device.pbr.gltf_bsdf_parameters import SurfaceModel
-    from lippmann.device.pbr.texture_lookup import Signal, numbers
+    from lippmann.device.pbr.textures import Signal, numbers
 
     def signal(value):
         return Signal(numbers([value]))

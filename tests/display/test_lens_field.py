@@ -10,7 +10,7 @@ import pytest
 from lippmann.display import Display, LensArray, Panel
 from lippmann.display.lens_field import LensField
 from lippmann.display.micro_image_layout import lens_numbers
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 
 DISPLAYS = {
     "square": Display("q", Panel(96, 96, 1.0), LensArray("square", 8.0), 4.0),

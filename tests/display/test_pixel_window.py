@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lippmann.display.pixel_window import PixelWindow, TileGrid
+from lippmann.display.panel import PixelWindow, TileGrid
 
 WINDOWS = st.builds(PixelWindow, st.integers(0, 15), st.integers(0, 15), st.integers(1, 12), st.integers(1, 12))
 

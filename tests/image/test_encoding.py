@@ -12,7 +12,7 @@ from PIL import Image
 from lippmann.codecs.icc import srgb_profile
 from lippmann.display import load_display
 from lippmann.display.formats.print_sheet import Print
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.image import IntegralImage, read_picture
 from lippmann.image.picture import Provenance
 from lippmann.image.read import open_file

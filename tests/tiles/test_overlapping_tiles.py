@@ -101,7 +101,7 @@ def test_tiles_have_the_samples_of_the_whole_picture(settings):
 @pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_a_window_has_the_pixels_of_the_whole():
-    from lippmann.display.pixel_window import PixelWindow
+    from lippmann.display.panel import PixelWindow
     from lippmann.rendering.film.sample_batches import FullInBatches
     from lippmann.rendering.transport.ray_source import WindowRays
     from lippmann.tiles.tile_render import prepare

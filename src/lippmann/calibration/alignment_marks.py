@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from lippmann.calibration.labels import label_window, paint_label
 from lippmann.display import Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.display.sheet_layout import trim_of, with_margin
 from lippmann.errors import UsageError
 from lippmann.image.stored_values import FloatArray

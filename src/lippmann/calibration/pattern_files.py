@@ -12,7 +12,7 @@ from lippmann.calibration.labels import label_window, paint_label
 from lippmann.calibration.patterns import FloatArray, Pattern, draw, fields, step_of
 from lippmann.display.display import INFINITE
 from lippmann.display.formats.monitor import Monitor
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.image import IntegralImage, Provenance
 from lippmann.progress import Progress, ProgressCallback, silent
 

@@ -46,7 +46,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display.formats.monitor import Monitor
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.errors import LippmannError, UsageError
 
 FloatArray = NDArray[np.float32]

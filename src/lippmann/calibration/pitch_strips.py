@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from lippmann.calibration.labels import label_window, paint_label
 from lippmann.calibration.patterns import check_step, round_step
 from lippmann.display.formats.print_sheet import Print
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.runtime.engine_lock import cached_property
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lippmann.display.array_ops import NUMPY
 from lippmann.display.display import Display
 from lippmann.display.lens_array import BOUNDARY_TOLERANCE, WHOLE_TOLERANCE
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 
 Indices = NDArray[np.int32]
 

@@ -11,7 +11,7 @@ import math
 from dataclasses import replace
 
 from lippmann.display.display import Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.display.sheet import Sheet
 from lippmann.errors import UsageError
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display.display import Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 
 #: Degrees to which programs that render quilts narrow the cone of newer panels, so that neighbouring views fuse: in 50
 #: degrees the same views lie farther apart (``STANDARD_VIEW_CONE`` of quiltwright, 2026).

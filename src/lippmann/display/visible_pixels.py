@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lippmann.display.array_ops import NUMPY
 from lippmann.display.display import Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 
 Vector = tuple[float, float, float]
 Indices = NDArray[np.uint32]

@@ -18,7 +18,7 @@ from lippmann.codecs import png, tiff
 from lippmann.codecs.icc import srgb_profile
 from lippmann.color.transfer import Transfer, dequantize, quantize
 from lippmann.display import Display
-from lippmann.display.pixel_window import TileGrid
+from lippmann.display.panel import TileGrid
 from lippmann.display.sheet import SRGB
 from lippmann.errors import PictureError
 from lippmann.image.micro_images import row_blocks

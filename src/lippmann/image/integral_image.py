@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lippmann.display import Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.errors import PictureError
 from lippmann.image.encoding import display_codes
 from lippmann.image.micro_images import Permutation, micro_images_as_views

@@ -18,7 +18,7 @@ from typing import Literal, cast, get_args
 import numpy as np
 
 from lippmann.display import Display, micro_image_shape, pixel_indices_under_lens, pixel_lenses
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.errors import OutputError, PictureError
 from lippmann.image.encoding import STORED, FormatName, converted_values, encode_values, linear_values
 from lippmann.image.integral_image import IntegralImage

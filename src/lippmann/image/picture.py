@@ -12,7 +12,7 @@ import numpy as np
 
 from lippmann.color.transfer import Transfer
 from lippmann.display import Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.errors import PictureError, UsageError
 from lippmann.image.encoding import linear_values
 from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, Values

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from lippmann.display import Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.errors import PictureError
 from lippmann.image.encoding import is_mirrored, linear_values, mirrored_in_file
 from lippmann.image.integral_image import IntegralImage

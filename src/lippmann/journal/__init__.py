@@ -1,6 +1,6 @@
 """Journals of unfinished pictures and sequences: finished tiles and frames on disk, for resuming after a crash."""
 
-from lippmann.display.pixel_window import TileGrid
+from lippmann.display.panel import TileGrid
 from lippmann.journal.fingerprint import content_hash, differences, in_words
 from lippmann.journal.frame_journal import FrameJournal
 from lippmann.journal.tile_file import DamagedTile, TileResult, decode, encode

@@ -20,7 +20,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, NamedTuple
 
-from lippmann.display.pixel_window import TileGrid
+from lippmann.display.panel import TileGrid
 from lippmann.errors import OutputError, PictureError
 from lippmann.journal.file_lock import locked
 from lippmann.journal.fingerprint import differences

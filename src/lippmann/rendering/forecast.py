@@ -31,7 +31,7 @@ from lippmann.scene.scene import Scene
 from lippmann.wording import depths_in_words, duration_in_words, html_table, samples_in_words
 
 if TYPE_CHECKING:
-    from lippmann.display.pixel_window import PixelWindow
+    from lippmann.display.panel import PixelWindow
     from lippmann.rendering.transport.integrator import Integrator
     from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 

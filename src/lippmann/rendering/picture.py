@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from lippmann.display import Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.display.view_cone import panel_window
 from lippmann.options.choices import REUSING
 from lippmann.progress import ProgressCallback, silent

@@ -11,7 +11,7 @@ from typing import Any
 import anyio.to_thread
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.display.visible_pixels import EyeMap
 from lippmann.errors import LippmannError, UsageError
 from lippmann.studio_app.page_values import (

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 from lippmann.display import Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.display.visible_pixels import EyeMap
 from lippmann.errors import UsageError
 from lippmann.options.choices import Integrator, ToneMap

@@ -17,7 +17,7 @@ import numpy as np
 from lippmann._version import VERSION
 from lippmann.color.transfer import Transfer
 from lippmann.display import Display
-from lippmann.display.pixel_window import PixelWindow, TileGrid
+from lippmann.display.panel import PixelWindow, TileGrid
 from lippmann.errors import UsageError
 from lippmann.journal.fingerprint import content_hash, in_words
 from lippmann.rendering.film import memory_model

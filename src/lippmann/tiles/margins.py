@@ -18,7 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lippmann.display import Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.rendering.denoise.oidn import NETWORK_STEP
 from lippmann.rendering.request.render_request import RenderRequest
 

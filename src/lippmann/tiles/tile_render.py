@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lippmann.codecs.types import Pixels
 from lippmann.display import NUMPY, Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.image.encoding import stored_values
 from lippmann.journal.tile_file import TileResult
 from lippmann.progress import ProgressCallback, silent

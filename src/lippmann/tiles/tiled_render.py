@@ -15,7 +15,7 @@ from lippmann.calibration.finish import NO_FINISH, Finish
 from lippmann.codecs import tiff, zarr_array
 from lippmann.codecs.types import Pixels
 from lippmann.display import Display
-from lippmann.display.pixel_window import TileGrid
+from lippmann.display.panel import TileGrid
 from lippmann.errors import EngineError
 from lippmann.image import IntegralImage
 from lippmann.image.encoding import (

@@ -10,7 +10,7 @@ import threading
 import numpy as np
 
 from lippmann.codecs.png import encode_png
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.image import Picture
 from lippmann.image.encoding import converted_values

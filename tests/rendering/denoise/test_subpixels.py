@@ -10,7 +10,7 @@ import pytest
 import lippmann
 from lippmann.color.transfer import encode_srgb
 from lippmann.display import Display, LensArray, Panel
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.metrics.mse_psnr import psnr
 from lippmann.rendering.request.render_request import RenderRequest
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 
 pytestmark = pytest.mark.usefixtures("engine")
 

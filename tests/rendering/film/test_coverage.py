@@ -9,7 +9,7 @@ import pytest
 
 import lippmann
 from lippmann.display import Display, LensArray, Panel
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.rendering.film.wavefront import Coverage
 from lippmann.rendering.request.render_request import RenderRequest
 

@@ -12,7 +12,7 @@ import pytest
 import lippmann
 from lippmann.color.transfer import quantize
 from lippmann.display import Display, LensArray, Panel, load_display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.light import LightOptions
 from lippmann.options.placement import PlacementOptions

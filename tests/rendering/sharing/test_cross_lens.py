@@ -9,7 +9,7 @@ import pytest
 
 from lippmann.display import Display, LensArray, Panel
 from lippmann.display.micro_image_layout import lens_numbers, lens_numbers_in_full_color
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.rendering.film.feature_buffers import Guides
 from lippmann.rendering.sharing.cross_lens import share_light
 

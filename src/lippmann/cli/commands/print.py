@@ -113,7 +113,7 @@ def pitch_test(
     """Write a pitch test: strips at slightly different print pitches, to find the sheet's."""
     from lippmann.calibration.pitch_strips import PitchTest
     from lippmann.codecs.tiff_strips import write_tiff_bands
-    from lippmann.display.pixel_window import PixelWindow
+    from lippmann.display.panel import PixelWindow
     from lippmann.runtime.atomic_write import check_writable, replacing
 
     console = Console(quiet, as_json)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.pbr.materials import Emission
-from lippmann.device.pbr.texture_lookup import Place, Signal, Table, numbers
+from lippmann.device.pbr.textures import Place, Signal, Table, numbers
 from lippmann.device.types import (
     Bool,
     BoundingBox3f,

@@ -21,7 +21,7 @@ from dataclasses import replace
 from lippmann.device.kernel_ops import arrays_of
 from lippmann.device.pbr import microfacet
 from lippmann.device.pbr.gltf_bsdf_parameters import Lobe, Point, Sheen, SurfaceModel
-from lippmann.device.pbr.texture_lookup import Place
+from lippmann.device.pbr.textures import Place
 from lippmann.device.types import (
     BSDF,
     Bool,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from lippmann.device.pbr.texture_lookup import Lookup, Place, Signal
+from lippmann.device.pbr.textures import Lookup, Place, Signal
 from lippmann.device.types import Color3f, Float, Frame3f, MitsubaTexture, Point2f, Vector3f
 
 

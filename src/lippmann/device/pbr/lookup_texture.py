@@ -7,7 +7,7 @@ from typing import Literal
 
 from lippmann.device.pbr import microfacet
 from lippmann.device.pbr.gltf_bsdf_parameters import SurfaceModel
-from lippmann.device.pbr.texture_lookup import Place
+from lippmann.device.pbr.textures import Place
 from lippmann.device.types import Bool, Color3f, Float, MitsubaTexture, Properties, SurfaceInteraction3f
 
 #: ``base``: base colour; ``coverage``: opacity; ``metal``: reflectance of a smooth metal of that colour.

@@ -19,8 +19,7 @@ from lippmann.device.pbr import microfacet
 from lippmann.device.pbr.gltf_bsdf import surface_bsdf
 from lippmann.device.pbr.gltf_bsdf_parameters import Anisotropy, NormalMap, SurfaceModel, ThinFilm
 from lippmann.device.pbr.lookup_texture import signal_texture
-from lippmann.device.pbr.texture_lookup import Signal, numbers, uv_attribute
-from lippmann.device.pbr.textures import TextureStore, sampler_key, texture_key
+from lippmann.device.pbr.textures import Signal, TextureStore, numbers, sampler_key, texture_key, uv_attribute
 from lippmann.device.types import BSDF
 from lippmann.scene.values.description import Color, Material, Texture
 

@@ -21,7 +21,7 @@ from lippmann.device.pbr.emitters import glow
 from lippmann.device.pbr.materials import Finish, Variant
 from lippmann.device.pbr.round_shapes import BYTES, can_wear, curves, ellipsoids, keeps_round
 from lippmann.device.pbr.tangents import tangents_in_uv, with_own_corners
-from lippmann.device.pbr.texture_lookup import (
+from lippmann.device.pbr.textures import (
     ALPHA_ATTRIBUTE,
     COLOR_ATTRIBUTE,
     MEMBER_ATTRIBUTE,

@@ -18,7 +18,7 @@ from lippmann.device.pbr.gltf_bsdf_parameters import (
     Sheen,
     SurfaceModel,
 )
-from lippmann.device.pbr.texture_lookup import Place, Signal
+from lippmann.device.pbr.textures import Place, Signal
 from lippmann.device.pbr.thin_film import thin_film_reflectance
 from lippmann.device.types import Bool, Color3f, Float, Vector3f
 

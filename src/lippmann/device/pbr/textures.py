@@ -1,16 +1,271 @@
-"""Pictures on the device: each is uploaded once per use of its channels, and looked up by every material."""
+"""Pictures on the device: each is uploaded once per use of its channels, and looked up by every material.
+
+A :class:`Signal` is a factor times a lookup, either of which may be absent; texels are as glTF's samplers say.
+Materials that are alike but for their numbers and pictures form a family with one plugin. Which member a triangle has,
+it says by a mesh attribute.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
-from lippmann.device.pbr.texture_lookup import Bitmap, Lookup, PooledBitmap, Sampler, Signal, Table, TexelPool, numbers
-from lippmann.device.types import MitsubaTexture
-from lippmann.scene.values.description import Image, Texture
+from lippmann.device.types import (
+    Array,
+    Bool,
+    Color3f,
+    Float,
+    FloatOrColor,
+    MitsubaTexture,
+    Point2f,
+    SurfaceInteraction3f,
+    UInt32,
+    Vector3f,
+)
+from lippmann.scene.values.description import Filter, Image, Texture, Wrap
+
+#: Mesh attributes that carry a triangle's member number, and vertex colours with their alpha.
+MEMBER_ATTRIBUTE, COLOR_ATTRIBUTE, ALPHA_ATTRIBUTE = "face_member", "vertex_color", "vertex_alpha"
+#: Mesh attribute that carries tangents: see :mod:`lippmann.device.pbr.tangents`.
+TANGENT_ATTRIBUTE = "vertex_tangent"
+
+
+def uv_attribute(uv_set: int) -> str:
+    """Mesh attribute that carries a uv set beyond the mesh's own: u and v in the first two of three channels."""
+    return f"vertex_uv{uv_set}"
+
+
+class Place:
+    """A surface point (``mi.SurfaceInteraction3f``), with what its mesh says there looked up once."""
+
+    def __init__(self, si: SurfaceInteraction3f, active: Bool) -> None:
+        self.si = si
+        self.active = active
+        self._cache: dict[str, Array] = {}
+
+    @property
+    def member(self) -> UInt32:
+        """Number in the family (UInt32)."""
+        import mitsuba as mi
+
+        if MEMBER_ATTRIBUTE not in self._cache:
+            number = self.si.shape.eval_attribute_1(MEMBER_ATTRIBUTE, self.si, self.active)
+            self._cache[MEMBER_ATTRIBUTE] = mi.UInt32(number + 0.5)
+        return self._cache[MEMBER_ATTRIBUTE]
+
+    @property
+    def color(self) -> Color3f:
+        """Vertex colour."""
+        return self.si.shape.eval_attribute_3(COLOR_ATTRIBUTE, self.si, self.active)
+
+    @property
+    def alpha(self) -> Float:
+        """Vertex alpha."""
+        return self.si.shape.eval_attribute_1(ALPHA_ATTRIBUTE, self.si, self.active)
+
+    @property
+    def tangent(self) -> Vector3f:
+        """The mesh's own tangent, as its attribute has it."""
+        return self.si.shape.eval_attribute_3(TANGENT_ATTRIBUTE, self.si, self.active)
+
+    def uv(self, attribute: str | None) -> Point2f:
+        """Texture coordinates: the mesh's own, or those in an attribute."""
+        import mitsuba as mi
+
+        if attribute is None:
+            return self.si.uv
+        if attribute not in self._cache:
+            carried = self.si.shape.eval_attribute_3(attribute, self.si, self.active)
+            self._cache[attribute] = mi.Point2f(carried.x, carried.y)
+        return self._cache[attribute]
+
+
+# The classes below are dataclasses so that Dr.Jit finds the arrays in them when it records or freezes a function.
+
+
+@dataclass(eq=False)
+class Table:
+    """One value per member: ``channels`` numbers each, in a row."""
+
+    values: FloatOrColor
+    channels: int = 1
+
+    def at(self, place: Place) -> FloatOrColor:
+        import drjit as dr
+        import mitsuba as mi
+
+        kind = mi.Color3f if self.channels == 3 else type(self.values)
+        return dr.gather(kind, self.values, place.member, place.active)
+
+
+def numbers(values: Sequence[float] | NDArray[np.float64]) -> Table | FloatOrColor:
+    """A factor of one member, or a table of several: ``(n,)`` scalars or ``(n, 3)`` colours.
+
+    Kernels read them as data, so that materials of the same make share one kernel.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    array = np.asarray(values, dtype=np.float32)
+    if len(array) > 1:
+        return Table(mi.Float(array.ravel()), 3 if array.ndim == 2 else 1)
+    if array.ndim == 2:
+        return mi.Color3f(*(dr.opaque(mi.Float, float(value)) for value in array[0]))
+    return dr.opaque(mi.Float, float(array[0]))
+
+
+def _at(value: Table | FloatOrColor, place: Place) -> FloatOrColor:
+    return value.at(place) if isinstance(value, Table) else value
+
+
+@dataclass(eq=False)
+class Sampler:
+    """How a texture is looked at: ``transform`` holds the upper rows of the matrix on (u, v, 1), None for identity."""
+
+    wraps: tuple[Wrap, Wrap]
+    filter: Filter
+    attribute: str | None
+    transform: tuple[Table | Float, ...] | None
+
+    def uv(self, place: Place) -> Point2f:
+        """Coordinates after the transform, not yet wrapped."""
+        import drjit as dr
+        import mitsuba as mi
+
+        uv = place.uv(self.attribute)
+        if self.transform is None:
+            return uv
+        a, b, c, d, e, f = (_at(value, place) for value in self.transform)
+        return mi.Point2f(dr.fma(a, uv.x, dr.fma(b, uv.y, c)), dr.fma(d, uv.x, dr.fma(e, uv.y, f)))
+
+
+def _fold(x: Float, wrap: Wrap, texels: Float) -> Float:
+    """Bring a coordinate into [0, 1] so that a lookup that repeats beyond it sees what ``wrap`` asks for.
+
+    Half a texel from a border, interpolation sees the border texel alone: what clamping and mirroring mean there.
+    """
+    import drjit as dr
+
+    if wrap == "repeat":
+        return x - dr.floor(x)
+    if wrap == "mirror":
+        x = 1 - dr.abs(x - 2 * dr.floor(x * 0.5) - 1)
+    margin = 0.5 / texels
+    return dr.clip(x, margin, 1 - margin)
+
+
+@dataclass(eq=False)
+class Bitmap:
+    """One picture for all: Mitsuba's own texture, which repeats where the wrap modes of the axes differ."""
+
+    texture: MitsubaTexture
+    channels: int
+    sampler: Sampler
+    size: tuple[int, int]
+
+    def eval(self, place: Place) -> FloatOrColor:
+        """``Color3f`` or ``Float``, by the number of channels."""
+        import mitsuba as mi
+
+        si, sampler = place.si, self.sampler
+        mixed = sampler.wraps[0] != sampler.wraps[1]
+        if mixed or sampler.attribute is not None or sampler.transform is not None:
+            uv = sampler.uv(place)
+            if mixed:
+                uv = mi.Point2f(*(_fold(uv[axis], sampler.wraps[axis], self.size[axis]) for axis in range(2)))
+            si = mi.SurfaceInteraction3f(si)
+            si.uv = uv
+        return self.texture.eval_3(si, place.active) if self.channels == 3 else self.texture.eval_1(si, place.active)
+
+
+@dataclass(eq=False)
+class TexelPool:
+    """The texels of many pictures in one row, four 8-bit channels to a number; ``linear`` decodes sRGB codes."""
+
+    texels: UInt32
+    linear: Float
+
+
+@dataclass(eq=False)
+class PooledBitmap:
+    """A picture for each member of a family, all of one sampler: ``first`` texel in the pool and size of each."""
+
+    pool: TexelPool
+    first: Table
+    width: Table
+    height: Table
+    channels: tuple[int, ...]
+    coded: bool
+    sampler: Sampler
+
+    def eval(self, place: Place) -> FloatOrColor:
+        """``Color3f`` or ``Float``, by the number of channels shown."""
+        import drjit as dr
+        import mitsuba as mi
+
+        sizes = self.width.at(place), self.height.at(place)
+        uv = self.sampler.uv(place)
+        x, y = (_fold(uv[axis], self.sampler.wraps[axis], sizes[axis]) * sizes[axis] for axis in range(2))
+        if self.sampler.filter == "nearest":
+            return self._texel(dr.minimum(dr.floor(x), sizes[0] - 1), dr.minimum(dr.floor(y), sizes[1] - 1), place)
+        x, y = x - 0.5, y - 0.5
+        left, top = dr.floor(x), dr.floor(y)
+        share = mi.Point2f(x - left, y - top)
+        left, right = dr.select(left < 0, left + sizes[0], left), dr.select(left + 1 >= sizes[0], 0, left + 1)
+        top, bottom = dr.select(top < 0, top + sizes[1], top), dr.select(top + 1 >= sizes[1], 0, top + 1)
+        upper = dr.lerp(self._texel(left, top, place), self._texel(right, top, place), share.x)
+        lower = dr.lerp(self._texel(left, bottom, place), self._texel(right, bottom, place), share.x)
+        return dr.lerp(upper, lower, share.y)
+
+    def _texel(self, column: Float, row: Float, place: Place) -> FloatOrColor:
+        import drjit as dr
+        import mitsuba as mi
+
+        index = self.first.at(place) + mi.UInt32(row) * mi.UInt32(self.width.at(place)) + mi.UInt32(column)
+        packed = dr.gather(mi.UInt32, self.pool.texels, index, place.active)
+        codes = [(packed >> (8 * channel)) & 255 for channel in self.channels]
+        if self.coded:
+            values = [dr.gather(mi.Float, self.pool.linear, code, place.active) for code in codes]
+        else:
+            values = [mi.Float(code) * (1 / 255) for code in codes]
+        return mi.Color3f(*values) if len(values) == 3 else values[0]
+
+
+Lookup = Bitmap | PooledBitmap
+
+
+@dataclass(eq=False)
+class Signal:
+    """``factor`` times ``lookup`` at a surface point; None stands for 1. Both are never None."""
+
+    factor: Table | FloatOrColor | None
+    lookup: Lookup | None = None
+
+    def eval(self, place: Place) -> FloatOrColor:
+        factor = _at(self.factor, place)
+        if self.lookup is None:
+            return factor
+        value = self.lookup.eval(place)
+        return value if factor is None else value * factor
+
+    def may_be_below(self, least: float) -> bool:
+        """Whether a number may be less than ``least`` somewhere."""
+        if self.lookup is not None:
+            return True
+        values = self.factor.values if isinstance(self.factor, Table) else self.factor
+        return bool((np.array(values) < least).any())
+
+    @property
+    def follows_uv_only(self) -> bool:
+        """Whether texture coordinates are all that the value depends on, the mesh's attributes nothing."""
+        if isinstance(self.factor, Table) or isinstance(self.lookup, PooledBitmap):
+            return False
+        return self.lookup is None or self.lookup.sampler.attribute is None
+
 
 #: Which mesh attribute carries a uv set; sets that are not in it are the mesh's own.
 UvAttributes = Mapping[int, str]

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.image.micro_images import lens_indices
 from lippmann.rendering.estimate.tuning import TUNING
 from lippmann.rendering.request.tuning import TUNING as REQUEST

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream, named_seed
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.rendering.film.memory_model import PREFERRED_LANES
 from lippmann.rendering.film.wavefront import select_colors
 from lippmann.rendering.transport.caustic_photons import CausticPhotons, radius_of_pass

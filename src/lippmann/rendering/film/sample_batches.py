@@ -20,7 +20,7 @@ from lippmann.color.transfer import Coding
 from lippmann.device.kernel_ops import divide, upload
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import UInt32
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.progress import Progress, ProgressCallback, of_part, silent
 from lippmann.rendering.estimate.psnr import PixelErrors
 from lippmann.rendering.film import memory_model

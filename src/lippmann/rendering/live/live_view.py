@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.display.visible_pixels import EyeMap, PixelSet
 from lippmann.errors import UsageError
 from lippmann.options.light import LightOptions

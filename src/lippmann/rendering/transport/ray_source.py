@@ -14,7 +14,7 @@ from lippmann.device.kernel_ops import DEVICE
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
 from lippmann.device.types import Float64, Point2f, Ray3f, UInt32
 from lippmann.display import Display
-from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.panel import PixelWindow
 from lippmann.display.view_cone import cone_tangent
 from lippmann.scene.values.description import Camera
 
