@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from lippmann.display import load_display
 from lippmann.image import IntegralImage, read_picture
@@ -211,3 +212,12 @@ def test_what_is_split_or_refocused_is_named_after_the_picture(lippmann, picture
     ):
         assert lippmann(words[0], picture, *words[1:]).code == 0
         assert (tmp_path / f"{picture.stem}-{name}").exists()
+
+
+def test_what_is_woven_is_named_after_its_views(lippmann, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cup").mkdir()
+    for number in range(3):
+        Image.fromarray(np.full((256, 256, 3), 40 * number, np.uint8)).save(tmp_path / "cup" / f"view_{number}.png")
+    assert lippmann("weave", "cup", "--display", "seed-lenticular").code == 0
+    assert (tmp_path / "cup-native.png").exists()

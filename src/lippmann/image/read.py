@@ -272,7 +272,12 @@ def _opened(path: Path, file: BufferedReader, start: bytes) -> PictureFile:
         )
     if not start:
         raise PictureError("is empty", where=str(path), fix="make or fetch it anew")
-    raise PictureError("is no picture that is known here", where=str(path), rule="PNG, OpenEXR, TIFF and Zarr are read")
+    raise PictureError(
+        "is no picture that is known here",
+        where=str(path),
+        rule="PNG, OpenEXR, TIFF and Zarr are read",
+        fix="scenes are described by 'lippmann plan', light fields read by 'lippmann import'",
+    )
 
 
 def _plausible(file: PictureFile, size: int | None) -> PictureFile:

@@ -13,6 +13,7 @@ from lippmann.cli.commands.interlace import FitOption, fit_note
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import HelpfulCommand, for_form, with_options
 from lippmann.cli.shared.console import Console, add_seconds, depth_line, estimate_in_words, report
+from lippmann.cli.shared.outputs import output_of
 from lippmann.cli.shared.scene_source import SceneSource, sheet_of
 from lippmann.errors import UsageError
 from lippmann.options.light import LightOptions
@@ -238,8 +239,8 @@ def sizes(as_json: options.Json = False) -> None:
 @with_options
 def weave(
     source: Annotated[Path, typer.Argument(help="A quilt, or a folder with one picture per view.")],
-    output: options.Output,
     display: options.DisplayName,
+    output: options.OptionalOutput = None,
     choice: Annotated[
         str, typer.Option("--views", help="nearest: one view per sub-pixel; linear: a mixture of two.")
     ] = "linear",
@@ -263,7 +264,7 @@ def weave(
     from lippmann.quilts.weave import weave as weave_views
     from lippmann.quilts.weave import weave_to_file
 
-    console = Console(quiet, as_json)
+    console, output = Console(quiet, as_json), output_of(output, source, "-native.png")
     name, stored = check_output(output, bits)
     target, asked_finish = sheet_of(load_display(display), finishing)
     finish = asked_finish or NO_FINISH
