@@ -1,20 +1,10 @@
-"""Formulas of a single lenticule that need no tracing: focus, field of the extreme ray, published design rules."""
+"""Formulas of a single lenticule that need no tracing: field of the extreme ray, and the rule of depth."""
 
 from __future__ import annotations
 
 import math
 
 from lippmann.display.lens_profile import LensProfile
-
-
-def paraxial_focus(profile: LensProfile) -> float:
-    """Depth in mm below the top of the crest at which paraxial light from afar meets: ``n R / (n - 1)``."""
-    return profile.index * profile.radius / (profile.index - 1.0)
-
-
-def nodal_gap(profile: LensProfile) -> float:
-    """Distance in mm from the panel to the crest's centre of curvature, through which a thin bundle goes straight."""
-    return profile.thickness - profile.radius
 
 
 def extreme_ray_field(profile: LensProfile, pitch: float) -> float:
@@ -31,11 +21,6 @@ def extreme_ray_field(profile: LensProfile, pitch: float) -> float:
     inside = edge - math.atan(pitch / (profile.thickness - sag))
     sine = profile.index * math.sin(inside)
     return math.degrees(2.0 * (edge - math.asin(sine))) if abs(sine) <= 1.0 else math.nan
-
-
-def ghost_free_thickness(profile: LensProfile, strips: int) -> float:
-    """Thickness in mm that suits a number of strips by US patent 6 726 858: ``(n s - 1) R / (s (n - 1))``."""
-    return (profile.index * strips - 1.0) * profile.radius / (strips * (profile.index - 1.0))
 
 
 def rule_of_depth(profile: LensProfile, strips: float) -> float:
