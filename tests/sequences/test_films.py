@@ -20,6 +20,8 @@ from lippmann.sequences.forms import QuiltForm
         ("portrait", "a_qs8x6a0.75.mp4", None, "h264", None),
         ("portrait", "a_qs8x6a0.75.mp4", (9600, 9600), None, "8192x8190 pixels, smaller than 9600x9600: hevc takes"),
         ("portrait", "a_qs8x6a0.75.apng", (9600, 9600), None, None),
+        ("go", "a_qs11x6a0.5625.mp4", (803, 606), None, "792x606 pixels, smaller than 803x606: h264 takes even sides"),
+        ("go", "a_qs11x6a0.5625.mp4", (803, 606), "h264-rgb", None),
     ],
 )
 def test_a_film_that_is_made_smaller_says_so(display, film, size, codec, note):

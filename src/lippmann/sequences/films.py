@@ -29,7 +29,7 @@ from lippmann.sequences.kept_scene import KeptScene
 from lippmann.sequences.motion import Motion
 from lippmann.viewing.color_and_depth import rgbd_codes
 from lippmann.viewing.hololuminescent import HEIGHT, WIDTH, for_hololuminescent
-from lippmann.viewing.mp4_film import Codec, codec_for, most_pixels
+from lippmann.viewing.mp4_film import Codec, codec_for, coded_size, most_pixels
 from lippmann.viewing.replay import Eye, default_eye, default_size
 from lippmann.viewing.video_file import codec_of_film
 from lippmann.viewing.video_frames import (
@@ -185,10 +185,12 @@ def film_of_quilts(
             widest = max(size)
         view = size[0] // layout.columns, size[1] // layout.rows
         smaller = view_size_of_video(view, layout, widest)
+        width, height = smaller[0] * layout.columns, smaller[1] * layout.rows
+        if chosen is not None:
+            width, height = coded_size((width, height), chosen, layout)
         note = None
-        if smaller != view:
-            width, height = smaller[0] * layout.columns, smaller[1] * layout.rows
-            rule = f"{chosen} takes sides of at most {widest}"
+        if (width, height) != size:
+            rule = f"{chosen} takes sides of at most {widest}" if smaller != view else f"{chosen} takes even sides"
             note = f"the film's pictures are {width}x{height} pixels, smaller than {size[0]}x{size[1]}: {rule}"
         return Filming(lambda frame: quilt_of_video(form.read(frame.path), widest), chosen, layout, note)
     if shows not in ("eye", "hololuminescent"):

@@ -88,6 +88,11 @@ def most_pixels(codec: Codec) -> int:
     return _ENCODERS[codec].widest
 
 
+def coded_size(size: tuple[int, int], codec: Codec, quilt: QuiltLayout) -> tuple[int, int]:
+    """Width and height of coded quilts: where a side is odd and may not be, each view loses a pixel."""
+    return size if _ENCODERS[codec].is_exact else _even_size(size, quilt)
+
+
 def check_film(place: Path, size: tuple[int, int], codec: Codec, *, exact: bool = False) -> None:
     """Check before the first frame that a film of this size can be coded.
 
@@ -202,4 +207,10 @@ def _even(codes: Pixels, quilt: QuiltLayout | None) -> Pixels:
         return np.pad(codes, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
     views = codes.reshape(quilt.rows, height // quilt.rows, quilt.columns, width // quilt.columns, 3)
     whole = views[:, : views.shape[1] - height % 2, :, : views.shape[3] - width % 2]
-    return np.ascontiguousarray(whole).reshape(height - height % 2 * quilt.rows, width - width % 2 * quilt.columns, 3)
+    width, height = _even_size((width, height), quilt)
+    return np.ascontiguousarray(whole).reshape(height, width, 3)
+
+
+def _even_size(size: tuple[int, int], quilt: QuiltLayout) -> tuple[int, int]:
+    width, height = size
+    return width - width % 2 * quilt.columns, height - height % 2 * quilt.rows
