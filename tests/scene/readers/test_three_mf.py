@@ -87,6 +87,17 @@ def test_an_object_s_own_material(read):
     assert (mesh.colors == [0, 0, 1, 1]).all()
 
 
+def test_the_uppermost_of_several_properties(read):
+    groups = '<basematerials id="5"><base name="a" displaycolor="#00FF00"/></basematerials>'
+    groups += '<m:colorgroup id="6"><m:color color="#000000"/><m:color color="#FF0000"/></m:colorgroup>'
+    groups += (
+        '<m:multiproperties id="7" pids="5 6"><m:multi pindices="0 1"/><m:multi pindices="0"/></m:multiproperties>'
+    )
+    scene = read(model(groups + solid(1, 'v1="0" v2="1" v3="2" pid="7" p1="0" p2="1" p3="0"')))
+    assert scene.meshes[0].colors.tolist() == [[1, 0, 0, 1], [0, 0, 0, 1], [1, 0, 0, 1]]
+    assert "layers of colour below others are not shown" in scene.notes
+
+
 def test_pictures(read):
     png = io.BytesIO()
     Image.new("RGB", (2, 2), (10, 20, 30)).save(png, "PNG")
@@ -100,6 +111,18 @@ def test_pictures(read):
     assert (texture.image.pixels == (10, 20, 30)).all()
     assert texture.wrap_u == "clamp"
     assert mesh.uvs[0].tolist() == [[0, 1], [1, 0.75], [1, 0.75]]
+
+
+def test_a_picture_that_lets_the_colour_below_through(read):
+    png = io.BytesIO()
+    Image.new("RGBA", (2, 2), (255, 255, 255, 51)).save(png, "PNG")
+    groups = '<basematerials id="5"><base name="a" displaycolor="#00FF00"/></basematerials>'
+    groups += '<m:texture2d id="3" path="/3D/t.png" contenttype="image/png"/>'
+    groups += '<m:texture2dgroup id="4" texid="3"><m:tex2coord u="0" v="0"/></m:texture2dgroup>'
+    groups += '<m:multiproperties id="7" pids="5 4"><m:multi pindices="0 0"/></m:multiproperties>'
+    scene = read(model(groups + solid(1, 'v1="0" v2="1" v3="2" pid="7" p1="0"')), t_png=png.getvalue())
+    texture = scene.materials[scene.meshes[0].material].base_color_texture
+    np.testing.assert_allclose(texture.image.pixels[0, 0], [0.2, 1.0, 0.2], atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,6 @@ _MODEL = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 #: Elements that are not read, and what they would show.
 _UNREAD = {
     "compositematerials": "mixtures of materials",
-    "multiproperties": "several properties in one",
     "beamlattice": "lattices of beams",
 }
 _COLOR = re.compile("#([0-9a-fA-F]{6})([0-9a-fA-F]{2})?")
@@ -46,10 +45,14 @@ class Placed(NamedTuple):
 
 @dataclass
 class Group:
-    """Properties that corners refer to by their places: sRGB codes ``(r, g, b, a)``, or ``(u, v)`` on a picture."""
+    """Properties that corners refer to by their places: sRGB codes ``(r, g, b, a)``, or ``(u, v)`` on a picture.
+
+    ``below`` is the colour that shows through the picture.
+    """
 
     values: list[tuple[float, ...]] = field(default_factory=list)
     picture: str = ""
+    below: tuple[float, ...] = (1.0, 1.0, 1.0)
 
 
 #: Vertices, the group of the properties of its corners, and their places there.
@@ -149,6 +152,7 @@ class _PartReader:
         self.part = Part()
         self._name = name
         self._group, self._shape = Group(), Shape(None, 0)
+        self._first, self._last, self._layer = Group(), Group(), 0  # what properties in layers are taken from
         self._take = {
             "model": self._model,
             "object": self._object,
@@ -160,6 +164,8 @@ class _PartReader:
             "texture2d": self._texture2d,
             "texture2dgroup": self._texture2dgroup,
             "tex2coord": self._tex2coord,
+            "multiproperties": self._multiproperties,
+            "multi": self._multi,
         }
 
     def begin(self, tag: str, given: dict[str, str]) -> None:
@@ -196,6 +202,23 @@ class _PartReader:
     def _item(self, given: dict[str, str]) -> None:
         if given.get("printable") != "0":
             self.part.build.append(self._placed(given))
+
+    def _multiproperties(self, given: dict[str, str]) -> None:
+        """Layers of properties: the last lies on top, and is taken alone, a picture over the first's colour."""
+        self._first, *_, self._last = [self.part.groups[each] for each in (given["pids"].split() * 2)]
+        self._layer = len(given["pids"].split()) - 1
+        if not self._last.picture:
+            self.part.unread["layers of colour below others"] = None
+        self._group = self.part.groups[given["id"]] = Group(picture=self._last.picture)
+
+    def _multi(self, given: dict[str, str]) -> None:
+        indices = [int(index) for index in given["pindices"].split()]
+        index = indices[self._layer] if self._layer < len(indices) else 0
+        if not 0 <= index < len(self._last.values):
+            raise ValueError(f"the place {index} of a property")
+        if self._group.picture and not self._group.values and not self._first.picture and indices:
+            self._group.below = self._first.values[indices[0]][:3]
+        self._group.values.append(self._last.values[index])
 
     def _placed(self, given: dict[str, str]) -> Placed:
         matrix = np.eye(4)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import decode_image
+from lippmann.scene.parsing.texture_maps import unit
 from lippmann.scene.parsing.vertex_colors import COLORED, GREY, linear_colors, material_of
 from lippmann.scene.readers.three_mf.parts import Package, Part, Placed, Shape, Triangle
 from lippmann.scene.values.description import Image, Instance, Material, Mesh, SceneDescription, Texture, Wrap
@@ -83,22 +84,25 @@ class _Reader:
         faces = np.array([triangle[:3] for triangle in shape.triangles])
         if not (0 <= faces.min() <= faces.max() < len(vertices) and np.isfinite(vertices).all()):
             raise self._error("has a triangle whose vertices are not there")
-        kinds: dict[str | None, list[int]] = {}
+        kinds: dict[tuple[str, tuple[float, ...]] | None, list[int]] = {}
         for number, triangle in enumerate(shape.triangles):
             group = part.groups.get(triangle[3] or "")
-            kinds.setdefault(None if group is None else group.picture, []).append(number)
+            kinds.setdefault(None if group is None else (group.picture, group.below), []).append(number)
         first = len(self._meshes)
-        for picture, chosen in kinds.items():
+        for kind, chosen in kinds.items():
             corners = vertices[faces[chosen]].reshape(-1, 3).astype(np.float32)
             order = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
             mesh = Mesh(self._name, corners, order, len(self._materials))
-            if picture is None:
+            if kind is None:
                 self._add(mesh, GREY)
                 continue
             values = self._values(part, [shape.triangles[number] for number in chosen])
+            picture, below = kind
             if picture:
                 uvs = (values * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32)
-                self._add(replace(mesh, uvs=(uvs,)), replace(COLORED, base_color_texture=self._texture(part, picture)))
+                self._add(
+                    replace(mesh, uvs=(uvs,)), replace(COLORED, base_color_texture=self._texture(part, picture, below))
+                )
             else:
                 codes = np.rint(255.0 * values)
                 self._add(replace(mesh, colors=linear_colors(codes)), material_of(codes))
@@ -116,14 +120,23 @@ class _Reader:
         except (IndexError, ValueError):
             raise self._error("has a triangle whose colours or coordinates are not there") from None
 
-    def _texture(self, part: Part, picture: str) -> Texture:
+    def _texture(self, part: Part, picture: str, below: tuple[float, ...]) -> Texture:
         if picture not in part.pictures:
             raise self._error(f"has no picture {picture}")
         name, wrap = part.pictures[picture]
         if name not in self._images:
             self._images[name] = decode_image(self._package.bytes_of(name), name, where=self._package.where)
         wraps: Wrap = "repeat" if wrap == "wrap" else "mirror" if wrap == "mirror" else "clamp"
-        return Texture(self._images[name], srgb=True, wrap_u=wraps, wrap_v=wraps)
+        return Texture(_over(self._images[name], below), srgb=True, wrap_u=wraps, wrap_v=wraps)
 
     def _error(self, what: str) -> SceneError:
         return SceneError(what, where=self._package.where)
+
+
+def _over(image: Image, below: tuple[float, ...]) -> Image:
+    """A picture over a colour, both of sRGB codes, which the format mixes as they stand."""
+    if image.pixels.shape[2] < 4:
+        return image
+    pixels = unit(image)
+    alpha = pixels[..., 3:]
+    return Image(image.name, (alpha * pixels[..., :3] + (1.0 - alpha) * np.array(below)).astype(np.float32))
