@@ -2,13 +2,15 @@
 
 Time on two cores: about six minutes for the encoders, and ten for twelve rendered frames.
 
-python benchmarks/film_encoding.py [--codecs NAME...] [--rendered FRAMES]
+python benchmarks/film_encoding.py [--codecs NAME...] [--rendered FRAMES] [--peak FRAMES]
 
 Each codec writes a film of ``COUNTS[-1]`` pictures of a Portrait's quilt, made without rendering, in a process of its
 own. Its resident memory is sampled, without what it was before the first picture: the largest of the first so many
 pictures, and what is left while the encoder waits, as it does while a frame is rendered.
 ``--rendered``: whole commands for a Portrait: a still of the teapot as it is by default and as a draft, and so many
 frames of its turntable as drafts, files alone and with their film in H.264.
+``--peak``: the largest memory of the whole command for so many frames of one sample a pixel, denoised and written as a
+film in H.264, over that of a still of the same options.
 Writes ``benchmarks/results/film_encoding.json``, where rows of other codecs stay.
 """
 
@@ -104,6 +106,16 @@ def _wait_until_idle() -> None:
         time.sleep(0.5)
 
 
+def peak(count: int) -> dict[str, Any]:
+    """Peaks of whole commands in bytes: a still, and a film of so many frames with the same options."""
+    checkout, words = Checkout(HERE), ["quilt", "render", "teapot", "-d", "portrait", "-q", "--spp", "1"]
+    turn = ["--turntable", "48", "--frames", f"0:{count}"]
+    with tempfile.TemporaryDirectory() as folder:
+        still = checkout.run(_PROGRAM, [*words, "-o", f"{folder}/still.png"])["peak"]
+        film = checkout.run(_PROGRAM, [*words, *turn, "-o", f"{folder}/film.mp4"])["peak"]
+    return {"frames": count, "still": still, "film": film}
+
+
 def rendered(count: int) -> dict[str, Any]:
     """Processor seconds and peak of frames in files, of the same with their film, and of a still."""
     checkout, figures = Checkout(HERE), {}
@@ -143,6 +155,13 @@ machine. A draft takes {draft["peak"] / 1e6:.0f} MB, the film of drafts {film["p
 default takes {still["peak"] / 1e6:.0f} MB; with what encoders hold while they wait that is, by addition,
 {shares}.
 """
+    if (measured := result.get("peak")) and result.get("rendered"):
+        more, still = measured["film"] - measured["still"], result["rendered"]["still"]["peak"]
+        text += f"""
+Measured, for {measured["frames"]} frames of one sample a pixel, denoised, with their film in H.264: the command takes
+{measured["film"] / 1e6:.0f} MB at most, a still with the same options {measured["still"] / 1e6:.0f} MB. The film's
+{more / 1e6:.0f} MB over its still make {1 + more / still:.2f} of a still as it is by default.
+"""
     return text
 
 
@@ -150,6 +169,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--codecs", nargs="*", default=CODECS)
     parser.add_argument("--rendered", type=int)
+    parser.add_argument("--peak", type=int)
     parser.add_argument("--one", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
@@ -162,9 +182,11 @@ def main() -> None:
         done = subprocess.run(command, check=True, capture_output=True, text=True)
         codecs[codec] = json.loads(done.stdout.splitlines()[-1])
         print(codec, codecs[codec], flush=True)
-    found = {"codecs": codecs, "rendered": result.get("rendered")}
+    found = {"codecs": codecs, "rendered": result.get("rendered"), "peak": result.get("peak")}
     if options.rendered:
         found["rendered"] = rendered(options.rendered)
+    if options.peak:
+        found["peak"] = peak(options.peak)
     save("film_encoding", found)
 
 
