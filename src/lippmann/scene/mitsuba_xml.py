@@ -120,8 +120,6 @@ def read_mitsuba_xml(path: Path, files: NamedFiles | None = None) -> MitsubaXml:
     """
     reader = _Reader(NamedFiles.of(path, files))
     root = reader.file(path, {}, [], "", level=0)
-    if root.tag != "scene":
-        raise SceneError(f"is XML of a '{root.tag[:40]}'", where=path.name, rule="a Mitsuba file holds a 'scene'")
     return MitsubaXml(root, reader.files)
 
 
@@ -153,6 +151,8 @@ class _Reader:
             rule = f"at most {MOST_INCLUDE_LEVELS} files inside each other and {MOST_INCLUDES} in all are included"
             raise SceneError("includes too many files", where=where, rule=rule, fix="does a file include itself?")
         raw = parse_xml(read_bytes(path), where)
+        if level == 0 and raw.tag != "scene":
+            raise SceneError(f"is XML of a '{raw.tag[:40]}'", where=where, rule="a Mitsuba file holds a 'scene'")
         self._check_version(raw, where)
         paths: list[Path] = []
         known = dict(parameters)

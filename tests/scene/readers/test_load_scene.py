@@ -75,6 +75,7 @@ def test_up_of_what_says_it_itself_is_refused():
         ("water.sdf", "obabel in.sdf"),
         ("room.splat", "SuperSplat"),
         ("tower.laz", "CloudCompare"),
+        ("points3D.txt", "colmap model_converter"),
         ("scan.xyzrgb", "CloudCompare"),
         ("brain.mgz", "mri_convert"),
         ("car.mtl", "name that"),
@@ -122,6 +123,7 @@ def test_content_counts_where_the_name_says_nothing(save):
         ("a.usdz", b"PK\3\4....", r"a\.usdz: is no USDZ package"),
         ("a.ply", OBJ.encode(), r"a\.ply: is no PLY file"),
         ("a.stl", OBJ.encode(), r"a\.stl: is no STL file"),
+        ("a.xml", b"<mujoco><default class='a'/></mujoco>", r"a\.xml: is XML of a 'mujoco'; a Mitsuba file holds a"),
         ("a.xml", b"<list></list>", r"a\.xml: is XML of a 'list'"),
         ("a.xml", XML.encode()[:-3], r"a\.xml:1: is no well-formed XML"),
         (
