@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float32]
 Numbers = NDArray[np.float64]
 
-#: Where the light that shades a volume's surfaces comes from: right, up and toward the viewer.
+#: Direction toward the light that shades a volume's surfaces: left, up and toward the viewer.
 LIGHT = (-0.45, 0.6, 1.0)
 
 
