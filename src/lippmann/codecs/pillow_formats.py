@@ -8,7 +8,7 @@ from __future__ import annotations
 import threading
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -80,20 +80,29 @@ def open_picture(source: Path | BinaryIO, formats: tuple[str, ...] = (*FORMATS,)
 
     if isinstance(source, Path):
         check_kind(source, PictureError)
-    Image.init()  # loads all decoders, without which those of the list may be unknown
-    known = tuple(name for name in formats if name in Image.OPEN)
     with _limit_lock:
         limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # of damaged EXIF
-                opened = Image.open(source, formats=known)  # its head alone
+                opened = _open_head(source, formats)
         finally:
             Image.MAX_IMAGE_PIXELS = limit
     with opened as picture:
         name = str(source) if isinstance(source, Path) else ""
         check_input(BYTES_PER_PIXEL * picture.width * picture.height, f"a picture of {_size(picture)}", where=name)
         yield picture
+
+
+def _open_head(source: Path | BinaryIO, formats: tuple[str, ...]) -> Image.Image:
+    """The picture, of which the head alone is read. The common decoders come first: to load all takes long."""
+    from PIL import Image, UnidentifiedImageError
+
+    for load_decoders in (Image.preinit, Image.init):
+        load_decoders()
+        with suppress(UnidentifiedImageError):
+            return Image.open(source, formats=[name for name in formats if name in Image.OPEN])
+    raise UnidentifiedImageError(f"cannot identify image file {source!r}")
 
 
 def _size(picture: Image.Image) -> str:
@@ -110,7 +119,8 @@ def codes_of(picture: Image.Image) -> Pixels:
     if picture.mode in ("1", "L"):
         return np.array(picture.convert("L"))[..., None]
     has_alpha = "A" in picture.getbands() or "transparency" in picture.info
-    return np.array(picture.convert("RGBA" if has_alpha else "RGB"))
+    mode = "RGBA" if has_alpha else "RGB"
+    return np.array(picture if picture.mode == mode else picture.convert(mode))
 
 
 def _is_white_zero(picture: Image.Image) -> bool:
