@@ -262,6 +262,28 @@ def binned(vectors, values):
     return np.histogram2d(vectors[:, 2], np.arctan2(vectors[:, 1], vectors[:, 0]), edges, weights=values)[0]
 
 
+@pytest.mark.parametrize("name", ["veil", "oiled glass"])
+def test_one_call_gives_what_evaluation_and_sampling_give(build, parts, name):
+    import drjit as dr
+    import mitsuba as mi
+
+    bsdf, context = bsdf_of(build, parts, CASES[name]), mi.BSDFContext()
+    ways = directions(64, 1)
+    si = dr.zeros(mi.SurfaceInteraction3f, len(ways))
+    si.wi = vectors(directions(64, 2))
+    u = mi.Float(np.linspace(0.01, 0.99, len(ways), dtype=np.float32))
+    points = mi.Point2f(u, dr.sqrt(u))
+    value, pdf, bs, factor = bsdf.eval_pdf_sample(context, si, vectors(ways), u, points)
+    alone, factor_alone = bsdf.sample(context, si, u, points)
+    pairs = zip(
+        (value, pdf, bs.wo, bs.pdf, bs.sampled_type, factor),
+        (*bsdf.eval_pdf(context, si, vectors(ways)), alone.wo, alone.pdf, alone.sampled_type, factor_alone),
+        strict=True,
+    )
+    for together, apart in pairs:
+        np.testing.assert_allclose(np.array(together), np.array(apart), rtol=1e-6)
+
+
 @pytest.mark.long_cases("oiled glass-0.3")
 @pytest.mark.slow
 @pytest.mark.parametrize(

@@ -115,9 +115,14 @@ def _bsdf_class(variant: str) -> type[BSDF]:
             self, ctx: BSDFContext, si: SurfaceInteraction3f, sample1: Float, sample2: Point2f, active: Bool = True
         ) -> tuple[BSDFSample3f, Color3f]:
             place = Place(si, active)
+            return self._sample_at(ctx, place, surface_point(self.model, place), sample1, sample2)
+
+        def _sample_at(
+            self, ctx: BSDFContext, place: Place, point: Point, sample1: Float, sample2: Point2f
+        ) -> tuple[BSDFSample3f, Color3f]:
+            si, drawn = place.si, point
             opacity = None if self.model.opacity is None else self.model.coverage(place)
             u = sample1 if opacity is None else dr.minimum(sample1 / opacity, 1)
-            point = drawn = surface_point(self.model, place)
             if self._may_be_sharp and ctx.type_mask & SHARP_FIRST:
                 drawn = self._sharp_first(point)
             wo, kind, possible = self._sample_lobes(drawn, u, sample2)
@@ -138,18 +143,34 @@ def _bsdf_class(variant: str) -> type[BSDF]:
             if self._may_be_sharp:
                 sharp = (kind != passing) & microfacet.is_sharp(si.wi, wo, self._sharp_normal(point))
                 bs.sampled_type |= dr.select(sharp, mi.UInt32(SHARP_EVENT), 0)
-            return bs, weight & active
+            return bs, weight & place.active
 
         def eval_pdf(
             self, ctx: BSDFContext, si: SurfaceInteraction3f, wo: Vector3f, active: Bool = True
         ) -> tuple[Color3f, Float]:
             del ctx
             place = Place(si, active)
-            value, pdf = self._scatter(surface_point(self.model, place), wo)
+            return self._eval_at(place, surface_point(self.model, place), wo)
+
+        def _eval_at(self, place: Place, point: Point, wo: Vector3f) -> tuple[Color3f, Float]:
+            value, pdf = self._scatter(point, wo)
             if self.model.opacity is not None:
                 opacity = self.model.coverage(place)
                 value, pdf = value * opacity, pdf * opacity
-            return value & active, pdf & active
+            return value & place.active, pdf & place.active
+
+        def eval_pdf_sample(
+            self,
+            ctx: BSDFContext,
+            si: SurfaceInteraction3f,
+            wo: Vector3f,
+            sample1: Float,
+            sample2: Point2f,
+            active: Bool = True,
+        ) -> tuple[Color3f, Float, BSDFSample3f, Color3f]:
+            place = Place(si, active)
+            point = surface_point(self.model, place)
+            return *self._eval_at(place, point, wo), *self._sample_at(ctx, place, point, sample1, sample2)
 
         def eval(self, ctx: BSDFContext, si: SurfaceInteraction3f, wo: Vector3f, active: Bool = True) -> Color3f:
             return self.eval_pdf(ctx, si, wo, active)[0]

@@ -175,7 +175,9 @@ def _contributions(
         uniform.x = (mi.Float(emitter) + uniform.x) / emitters
         sampling = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         # By MIS as if the emitter were the only one.
-        light, _, _ = integrator.direct_light(si, bsdf, uniform, sampling, emitters)
+        ds, emitted = integrator.light_sampler.sample_direction(si, uniform, sampling)
+        value, pdf = bsdf.eval_pdf(context, si, si.to_local(ds.d), sampling)
+        light, _ = integrator.reflected(si, ds, emitted, value, pdf, sampling, emitters)
         contribution = dr.mean(throughput * light / emitters)
         squares += dr.square(dr.minimum(contribution, 1))
         is_rough = dr.squared_norm(sharp_lobe(si, bsdf, sampling)) == 0

@@ -23,11 +23,9 @@ from lippmann.device.sobol import SampleStream
 from lippmann.device.syntax import syntax
 from lippmann.device.types import (
     Bool,
-    BSDFPtr,
     DirectionSample3f,
     Float,
     MitsubaScene,
-    Point2f,
     Ray3f,
     Spectrum,
     SurfaceInteraction3f,
@@ -225,23 +223,25 @@ class PathIntegrator:
             vertex = Vertex(si, bsdf, d, depth, continues, throughput, stream, dimension, states)
             radiance, shadow = techniques.arrive(vertex, radiance, shadow)
             samples, number = self._emitter_samples(stream.index, all_specular)
-            end = number + samples
-            sampling = vertex.smooth
-            while dr.hint(
-                sampling, label="emitters", exclude=[stream, dimension, si, bsdf, samples, throughput, depth, end]
-            ):
-                point = stream.at(number).next_2d(dimension)
-                light, ds, tests = self.direct_light(si, bsdf, point, sampling, mi.Float(samples), vertex.arrival)
-                light = techniques.sample_emitter(vertex, ds, light)
-                radiance += self._clamp.limited(throughput * light, depth > 0) / mi.Float(samples)
+            count, last_number = mi.Float(samples), number + samples - 1
+            sampling = vertex.smooth & (number != last_number)
+            while dr.hint(sampling, label="emitters", exclude=[stream, dimension, si, bsdf, count, last_number]):
+                ds, emitted = self.light_sampler.sample_direction(si, stream.at(number).next_2d(dimension), sampling)
+                value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, si.to_local(ds.d), sampling)
+                light, tests = self._from_emitter(vertex, techniques, ds, emitted, value, pdf, count, sampling)
+                radiance += light
                 shadow += tests
                 number += 1
-                sampling &= number != end
+                sampling &= number != last_number
 
-            # ---- BSDF sampling ----
-            bs, weight = bsdf.sample(
-                context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), continues
+            # ---- the last emitter sample, and BSDF sampling: the surface is evaluated once for both ----
+            ds, emitted = self.light_sampler.sample_direction(si, stream.at(number).next_2d(dimension), vertex.smooth)
+            value, pdf, bs, weight = bsdf.eval_pdf_sample(
+                context, si, si.to_local(ds.d), stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), continues
             )
+            light, tests = self._from_emitter(vertex, techniques, ds, emitted, value, pdf, count, vertex.smooth)
+            radiance += light
+            shadow += tests
             passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
             states = techniques.scatter(vertex, Scattering(vertex, bs, weight))
             throughput *= weight
@@ -331,30 +331,46 @@ class PathIntegrator:
         """Emitter samples at the first surface that is not purely specular, of a pixel's path number ``sample``."""
         return mi.UInt32(1) if self._single_delta else first_emitter_samples(sample)[0]
 
-    def direct_light(
+    def _from_emitter(
+        self,
+        vertex: Vertex,
+        techniques: Techniques,
+        ds: DirectionSample3f,
+        emitted: Spectrum,
+        value: Spectrum,
+        pdf: Float,
+        samples: Float,
+        active: Bool,
+    ) -> tuple[Spectrum, UInt32]:
+        """A path's contribution by one of ``samples`` emitter samples at a vertex, and the shadow rays traced."""
+        light, tests = self.reflected(vertex.si, ds, emitted, value, pdf, active, samples, vertex.arrival)
+        light = techniques.sample_emitter(vertex, ds, light)
+        return self._clamp.limited(vertex.throughput * light, vertex.depth > 0) / samples, tests
+
+    def reflected(
         self,
         si: SurfaceInteraction3f,
-        bsdf: BSDFPtr,
-        point: Point2f,
+        ds: DirectionSample3f,
+        emitted: Spectrum,
+        value: Spectrum,
+        pdf: Float,
         active: Bool,
         samples: Float = 1,
         arrival: Arrival | None = None,
-    ) -> tuple[Spectrum, DirectionSample3f, UInt32]:
-        """Radiance toward ``si.wi`` from the emitter that ``point`` samples, that sample, and the shadow rays traced.
+    ) -> tuple[Spectrum, UInt32]:
+        """Radiance toward ``si.wi`` from the emitter sample ``ds``, and the shadow rays traced.
 
-        The radiance is divided by the pdf of the sample, and weighted by MIS against BSDF sampling, as one of
+        ``emitted`` is the emitter's radiance divided by the pdf of the sample; ``value`` (the BSDF times the cosine)
+        and ``pdf`` are those of its direction. The result is weighted by MIS against BSDF sampling, as one of
         ``samples`` emitter samples at this surface; and against light vertices where ``arrival`` is given.
         """
-        ds, light = self.light_sampler.sample_direction(si, point, active)
-        lit = active & (ds.pdf != 0) & (dr.max(light) > 0)
-        value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, si.to_local(ds.d), lit)
         weight = dr.select(ds.delta, 1, mis_weight(ds.pdf * samples, pdf))
-        reflected = value * light * weight
-        lit &= dr.max(reflected) > 0
+        reflected = value * emitted * weight
+        lit = active & (ds.pdf != 0) & (dr.max(emitted) > 0) & (dr.max(reflected) > 0)
         visible, tests = self.visibility(si, ds, lit)
         if arrival is not None:
-            reflected = value * light * arrival.weigh(si, ds, value, weight, ds.pdf * samples, tests <= 1, lit)
-        return dr.select(lit, reflected * visible, 0), ds, tests
+            reflected = value * emitted * arrival.weigh(si, ds, value, weight, ds.pdf * samples, tests <= 1, lit)
+        return dr.select(lit, reflected * visible, 0), tests
 
     def visibility(self, si: SurfaceInteraction3f, ds: DirectionSample3f, active: Bool) -> tuple[Spectrum, UInt32]:
         """Transmittance in [0, 1] from the emitter sample ``ds`` to the surface, and the shadow rays traced."""
