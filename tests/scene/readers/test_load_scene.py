@@ -75,7 +75,7 @@ def test_up_of_what_says_it_itself_is_refused():
         ("water.sdf", "obabel in.sdf"),
         ("room.splat", "SuperSplat"),
         ("tower.laz", "CloudCompare"),
-        ("points3D.txt", "colmap model_converter"),
+        ("points3D.txt", "COLMAP.s by its model_converter"),
         ("scan.xyzrgb", "CloudCompare"),
         ("brain.mgz", "mri_convert"),
         ("car.mtl", "name that"),

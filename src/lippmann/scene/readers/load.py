@@ -89,7 +89,7 @@ _ELSEWHERE = {
     ".zae": "unzip it, open the .dae in Blender, then File > Export > glTF 2.0 (.glb)",
     **dict.fromkeys((".splat", ".ksplat", ".lcc"), "open it in SuperSplat (superspl.at/editor), export it as .ply"),
     **dict.fromkeys((".las", ".laz", ".e57", ".pcd", ".pts", ".ptx", ".xyzrgb"), _CLOUD_COMPARE),
-    ".txt": "save clouds of points as .ply, COLMAP's by: colmap model_converter --output_type PLY",
+    ".txt": "save clouds of points as .ply, in CloudCompare for instance, COLMAP's by its model_converter",
     **dict.fromkeys((".mrc", ".map", ".ccp4"), "save it as .npy: numpy.save('a.npy', mrcfile.read('a.mrc'))"),
     ".xyz": "save molecules as .pdb, by: obabel in.xyz -O out.pdb; clouds of points as .ply, in CloudCompare",
     **{kind: _OPEN_BABEL.format(kind) for kind in (".sdf", ".mol", ".mol2", ".cube", ".gro")},
