@@ -51,6 +51,14 @@ def interlace(lippmann, frames, path, *options):
         return np.asarray(picture)
 
 
+def test_an_empty_folder_and_a_pattern_without_files_are_named(lippmann, tmp_path):
+    (tmp_path / "frames").mkdir()
+    for given in (tmp_path / "frames", tmp_path / "none*.jpg"):
+        outcome = lippmann("interlace", given, *SHEET, "--size", "30x20mm", "-o", tmp_path / "print.tif")
+        assert outcome.code == 2
+        assert "0 photographs are given; at least 2 are interlaced" in outcome.err
+
+
 @pytest.mark.long_cases("options0-print.tif")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["print.tif", "print.png"])

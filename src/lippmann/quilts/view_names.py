@@ -110,8 +110,10 @@ def _benchmark_columns(paths: Sequence[Path]) -> int | None:
 def line_of_grid(paths: Sequence[Path], *, down: bool = False) -> tuple[list[Path], tuple[str, ...]]:
     """Of a whole grid of cameras the middle row, or the middle column where views part ``down``; and notes.
 
-    Pictures of other names are returned as they are.
+    Pictures of other names are returned as they are, none as none.
     """
+    if not paths:
+        return [], ()
     try:
         by_place = places_of_views(paths)
     except PictureError:
