@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -48,9 +50,9 @@ def test_every_fourth_frame_is_a_key_frame():
     assert [key_of(frame) for frame in range(9)] == [0, 0, 0, 0, 4, 4, 4, 4, 8]
 
 
-def test_frames_after_a_key_frame_take_its_samples_in_one_stream(motion, display):
+def test_frames_after_a_key_frame_take_three_quarters_of_its_samples_in_one_stream(motion, display):
     asked = asked_of(motion, display, range(6))
-    assert [each[1:] for each in asked] == [(None, True), *[(8, False)] * 3, (None, True), (8, False)]
+    assert [each[1:] for each in asked] == [(None, True), *[(6, False)] * 3, (None, True), (6, False)]
     assert len({seed for seed, *_ in asked}) == 6
 
 
@@ -88,6 +90,6 @@ def test_frames_after_a_key_frame_are_denoised_once(engine, motion, display, mon
     assert len(runs) == 3
     key, after = (image.provenance for image in images)
     assert after.estimate == key.estimate
-    assert after.spp == key.spp
-    assert "the error are frame 4's" in " ".join(after.notes)
+    assert after.spp == math.ceil(0.75 * key.spp)
+    assert "the error is frame 4's" in " ".join(after.notes)
     assert not any("frame 4's" in note for note in key.notes)

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from lippmann.rendering.estimate.psnr import Estimate
     from lippmann.rendering.film.wavefront import Frame
     from lippmann.rendering.transport.integrator import Integrator
+    from lippmann.rendering.transport.path import PreparedLight
     from lippmann.rendering.transport.ray_source import RaySource
 
 #: Share of the free memory that is used where no limit is given.
@@ -229,16 +230,21 @@ class Session:
 
         if not isinstance(integrator, PathIntegrator):
             return integrator
-        light = prepare_light(
-            integrator,
-            self.request,
-            source,
-            memory_limit(self.request),
-            even_background(self.built, self.request),
-            own_exposure=self.counted_exposure(own_exposure),
-            stands_alone=not self.scene.lies_off_surfaces,
-            weighs_emitters=isinstance(self.built, BuiltScene) and not self.built.borrowed,
-        )
+
+        def prepare() -> PreparedLight:
+            return prepare_light(
+                integrator,
+                self.request,
+                source,
+                memory_limit(self.request),
+                even_background(self.built, self.request),
+                own_exposure=self.counted_exposure(own_exposure),
+                stands_alone=not self.scene.lies_off_surfaces,
+                weighs_emitters=isinstance(self.built, BuiltScene) and not self.built.borrowed,
+            )
+
+        keep = self.request.keep_light
+        light = prepare() if keep is None else keep(prepare, self.scene, self.built, own_exposure)
         # Drops the choices of an earlier picture.
         self.choices.clear()
         self.choices.update(light.choices)

@@ -27,11 +27,11 @@ from lippmann.sequences.cuts import Moment
 from lippmann.sequences.flicker import with_flicker
 from lippmann.sequences.forms import INTEGRAL, Form, QuiltForm, Shown
 from lippmann.sequences.kept_scene import KeptScene
-from lippmann.sequences.key_frames import KeyFrames, without_halves
+from lippmann.sequences.key_frames import KeyFrames
 from lippmann.sequences.motion import Motion, open_motion
 
 if TYPE_CHECKING:
-    from lippmann.image import IntegralImage
+    from lippmann.image import IntegralImage, Provenance
     from lippmann.quilts.quilt import Quilt
     from lippmann.tiles.tiled_render import Rendered, Runner
 
@@ -316,13 +316,15 @@ def render_frames(
     def trace(now: Moment, request: RenderRequest, report: ProgressCallback) -> Shown:
         return form.render(now.scene, display, replace(request, placement=now.placement), report, kept.build)
 
-    keys = KeyFrames(display, moment, lambda key: trace(key, of_frame(request, key.number), silent).provenance)
+    def trace_key(now: Moment) -> Provenance:
+        return trace(now, keys.request_of(of_frame(request, now.number), now.number, None), silent).provenance
+
+    keys: KeyFrames = KeyFrames(display, moment, trace_key)
 
     def render(position: int, frame: int) -> Shown:
-        now, own = moment(frame), of_frame(request, frame)
+        now = moment(frame)
         key = keys.before(now, request)
-        if key is not None:
-            own = without_halves(own, frame, key)
+        own = keys.request_of(of_frame(request, frame), frame, key)
         image = trace(now, own, _report_of_frame(progress, position, len(frames)))
         made = image.provenance
         keys.add(now, made)

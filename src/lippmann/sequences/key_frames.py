@@ -2,7 +2,7 @@
 
 The halves of a frame are denoised one by one, as each judges the other. Their mean is worse than a frame whose samples
 are of one stream and are denoised together: 0.3 to 0.7 dB (``docs/research/films.md``). So the frames after a key frame
-have no halves. They take as many samples, and the estimate of the error is the key frame's.
+have no halves. Three quarters of its samples give them about its error, and the estimate of it is the key frame's.
 
 Which frames are key frames follows from their numbers, so that a frame is the same whether it is rendered alone or with
 all others. A frame that shows another scene than its key frame, as after a cut, has halves itself.
@@ -10,6 +10,7 @@ all others. A frame that shows another scene than its key frame, as after a cut,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -17,9 +18,12 @@ from lippmann.display import Display
 from lippmann.image.picture import Provenance
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.sequences.cuts import Moment, is_cut
+from lippmann.sequences.kept_light import KeptLight
 
 #: A key frame and the frames that follow it, together.
 FRAMES_OF_KEY = 4
+#: Samples of a frame after a key frame, as a share of the key frame's.
+_SHARE = 0.75
 
 
 class KeyFrames:
@@ -45,6 +49,17 @@ class KeyFrames:
         self._moment = moment
         self._render = render
         self._last: tuple[Moment, Provenance] | None = None
+        self._light = KeptLight()
+
+    def request_of(self, request: RenderRequest, frame: int, key: Provenance | None) -> RenderRequest:
+        """The request of a ``frame``, which follows a ``key`` frame or, None, has halves of its own."""
+        if key is not None:
+            assert key.spp is not None
+            told = f"the estimate of the error is frame {key_of(frame)}'s, three quarters of whose samples this one has"
+            samples = math.ceil(_SHARE * key.spp)
+            return replace(request, spp=samples, judged_by=told, keep_light=self._light.of_next)
+        is_key = key_of(frame) == frame and _is_open(request)
+        return replace(request, keep_light=self._light.of_key) if is_key else request
 
     def add(self, moment: Moment, made: Provenance) -> None:
         """Remember how a frame was made, if it is a key frame."""
@@ -58,8 +73,7 @@ class KeyFrames:
         where the key frame's picture is no denoised one, and after a cut. A key frame that is missing is rendered.
         """
         key = key_of(moment.number)
-        is_open = request.spp is None and not request.is_open_ended and request.effort == "normal"
-        if key == moment.number or not is_open or request.fixed_noise:
+        if key == moment.number or not _is_open(request):
             return None
         last, made = self._last or (None, None)
         if last is None or last.number != key:
@@ -77,6 +91,7 @@ def key_of(frame: int) -> int:
     return frame - frame % FRAMES_OF_KEY
 
 
-def without_halves(request: RenderRequest, frame: int, key: Provenance) -> RenderRequest:
-    """The request of a ``frame`` that follows the ``key`` frame."""
-    return replace(request, spp=key.spp, judged_by=f"samples and the estimate of the error are frame {key_of(frame)}'s")
+def _is_open(request: RenderRequest) -> bool:
+    """Whether frames may follow key frames: nothing was asked for that each has to keep for itself."""
+    is_asked = request.spp is not None or request.is_open_ended or request.effort != "normal"
+    return not is_asked and not request.fixed_noise

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar, cast
@@ -145,6 +145,9 @@ class RenderRequest(MachineOptions, QualityOptions):
     judged_by:
         What tells the error of a picture without half-buffers, whose samples are of one stream and denoised together,
         for its notes; empty: half-buffers of its own.
+    keep_light:
+        Called with a function that prepares the picture's light and with what this depends on: the scene, its built
+        form and the camera's own exposure. Returns that light, or one of an earlier picture. None: prepared anew.
     plan:
         The plan that decided the values, with its reasons; None before :mod:`~lippmann.rendering.request.plan`.
     began:
@@ -164,6 +167,7 @@ class RenderRequest(MachineOptions, QualityOptions):
     placement: PlacementOptions | Placement = field(default_factory=PlacementOptions)
     fixed_noise: bool = False
     judged_by: str = ""
+    keep_light: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     plan: RenderPlan | None = field(default=None, compare=False, repr=False)
     began: float | None = field(default=None, compare=False)
 
