@@ -38,7 +38,7 @@ from harness import save, saved
 #: Frames of the two commands whose times are taken from each other; a film of one frame is a still.
 MANY, FEW = 5, 1
 #: Frames that are judged, and samples of each of their two references.
-JUDGED, REFERENCE_SAMPLES = 2, 128
+JUDGED, REFERENCE_SAMPLES = MANY, 64
 SEEDS = (991, 992)
 PLAIN = ["--method", "full", "--denoise", "none", "--caustics", "paths", "--spp", str(REFERENCE_SAMPLES)]
 #: What of a picture's options decides what its native pixels show.
