@@ -15,7 +15,7 @@ from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 from lippmann.rendering.preview import Preview
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.sequences.frames import find_stand, render_frames, render_sequence
-from lippmann.sequences.key_frames import key_of
+from lippmann.sequences.key_frames import estimate_of_next, key_of
 from lippmann.sequences.turntable import open_turntable
 
 ESTIMATE = {"psnr": 40.0, "psnr_low": 38.0, "psnr_high": 43.0, "by_chance": 46.0}
@@ -83,13 +83,24 @@ def test_without_the_estimate_of_a_denoised_key_frame_all_have_halves(motion, di
     assert [has_halves for *_, has_halves in asked] == [True] * 3
 
 
+def test_fewer_samples_lower_the_estimate_by_their_root_and_its_lower_end_by_their_share():
+    after = estimate_of_next({**ESTIMATE, "worst_lens": [3, 4]})
+    by_share = -10 * math.log10(0.75)
+    assert after["psnr"] == pytest.approx(40 - by_share / 2, abs=0.01)
+    assert after["by_chance"] == pytest.approx(46 - by_share / 2, abs=0.01)
+    assert after["psnr_low"] == pytest.approx(38 - by_share, abs=0.01)
+    assert (after["psnr_high"], after["worst_lens"]) == (43.0, [3, 4])
+
+
 def test_frames_after_a_key_frame_are_denoised_once(engine, motion, display, monkeypatch):
     runs, denoise = [], GuidedDenoiser.__call__
     monkeypatch.setattr(GuidedDenoiser, "__call__", lambda self, *args: runs.append(1) or denoise(self, *args))
     images = [image for _, image in render_sequence(motion, display, [4, 5], integrator="path", device="cpu")]
     assert len(runs) == 3
     key, after = (image.provenance for image in images)
-    assert after.estimate == key.estimate
+    for name in ("psnr", "psnr_low", "worst", "worst_low", "flicker_low"):
+        assert after.estimate[name] < key.estimate[name]
+    assert after.estimate["psnr_high"] == key.estimate["psnr_high"]
     assert after.spp == math.ceil(0.75 * key.spp)
-    assert "the error is frame 4's" in " ".join(after.notes)
+    assert "the error follows from frame 4's" in " ".join(after.notes)
     assert not any("frame 4's" in note for note in key.notes)

@@ -27,7 +27,7 @@ from lippmann.sequences.cuts import Moment
 from lippmann.sequences.flicker import with_flicker
 from lippmann.sequences.forms import INTEGRAL, Form, QuiltForm, Shown
 from lippmann.sequences.kept_scene import KeptScene
-from lippmann.sequences.key_frames import KeyFrames
+from lippmann.sequences.key_frames import KeyFrames, estimate_of_next
 from lippmann.sequences.motion import Motion, open_motion
 
 if TYPE_CHECKING:
@@ -328,7 +328,7 @@ def render_frames(
         image = trace(now, own, _report_of_frame(progress, position, len(frames)))
         made = image.provenance
         keys.add(now, made)
-        estimate = made.estimate if key is None else key.estimate
+        estimate = made.estimate if key is None or key.estimate is None else estimate_of_next(key.estimate)
         # Noise that stands still has no flicker that the frames' own errors would tell.
         if not request.fixed_noise:
             estimate = with_flicker(estimate)

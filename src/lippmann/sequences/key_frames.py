@@ -2,7 +2,7 @@
 
 The halves of a frame are denoised one by one, as each judges the other. Their mean is worse than a frame whose samples
 are of one stream and are denoised together: 0.3 to 0.7 dB (``docs/research/films.md``). So the frames after a key frame
-have no halves. Three quarters of its samples give them about its error, and the estimate of it is the key frame's.
+have no halves. They take three quarters of its samples, and the estimate of their error follows from the key frame's.
 
 Which frames are key frames follows from their numbers, so that a frame is the same whether it is rendered alone or with
 all others. A frame that shows another scene than its key frame, as after a cut, has halves itself.
@@ -13,11 +13,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import cast
 
 from lippmann.display import Display
 from lippmann.image.picture import Provenance
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.sequences.cuts import Moment, is_cut
+from lippmann.sequences.flicker import Figures
 from lippmann.sequences.kept_light import KeptLight
 
 #: A key frame and the frames that follow it, together.
@@ -55,7 +57,7 @@ class KeyFrames:
         """The request of a ``frame``, which follows a ``key`` frame or, None, has halves of its own."""
         if key is not None:
             assert key.spp is not None
-            told = f"the estimate of the error is frame {key_of(frame)}'s, three quarters of whose samples this one has"
+            told = f"the estimate of the error follows from frame {key_of(frame)}'s, with three quarters of its samples"
             samples = math.ceil(_SHARE * key.spp)
             return replace(request, spp=samples, judged_by=told, keep_light=self._light.of_next)
         is_key = key_of(frame) == frame and _is_open(request)
@@ -89,6 +91,18 @@ class KeyFrames:
 def key_of(frame: int) -> int:
     """The key frame of a frame, by their numbers."""
     return frame - frame % FRAMES_OF_KEY
+
+
+def estimate_of_next(key: Figures) -> Figures:
+    """The estimate of a frame after a key frame, whose own is ``key``, both as files hold them.
+
+    The MSE of a denoised picture is taken to fall with the square root of the number of samples, as it does on the
+    average (``docs/background/measurements.md``: 2.4 dB for four times as many), and at most in proportion to it: that
+    are the lower ends. The upper ends are the key frame's, as the frame is denoised as a whole.
+    """
+    most = -10 * math.log10(_SHARE)
+    less = {"psnr": most / 2, "worst": most / 2, "by_chance": most / 2, "psnr_low": most, "worst_low": most}
+    return {name: round(cast("float", value) - less[name], 2) if name in less else value for name, value in key.items()}
 
 
 def _is_open(request: RenderRequest) -> bool:
