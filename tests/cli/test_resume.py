@@ -192,7 +192,7 @@ def test_what_is_made_from_neighbours_goes_to_tiles_sooner():
 
     def asked(**more):
         request = RenderRequest(**{"memory": 1 << 30} | more)
-        return is_tiled(Path("a.tif"), None, load_display("panel-4k"), request, resume=False)
+        return is_tiled("tiff", load_display("panel-4k"), request, resume=False)
 
     assert not asked()
     assert asked(method="pooled", denoise="auto")

@@ -56,7 +56,9 @@ def test_another_program_s_file(tmp_path, display):
     # As the toolbox takes it apart: pixel (t, s) of every lens.
     for t, s in ((0, 0), (3, 13), (13, 5)):
         np.testing.assert_array_equal(found.values[t, s], codes[t::14, s::14])
-    with pytest.raises(PictureError, match=r"say display=..., with 14 x 14 pixels per lens and 3 x 2 lenses"):
+    with pytest.raises(
+        PictureError, match=r"its display has 14 x 14 pixels under each lens, for its views, and 3 x 2 lenses"
+    ):
         found.image()
     made = display("square", lenses=(6, 4), pixels=7)
     again = read_eslf(tmp_path / "x.png", grid=(7, 7))

@@ -86,7 +86,7 @@ def test_another_program_s_store(tmp_path, display):
     assert root is not None
     found = read_zarr(tmp_path / "x.zarr")
     np.testing.assert_array_equal(found.values, values)
-    with pytest.raises(PictureError, match=r"has no display in it; say display=\.\.\."):
+    with pytest.raises(PictureError, match=r"has no display in it; its display has 3 x 3 pixels under each lens"):
         found.image(where="x.zarr")
     assert found.image(display()).stored == "float32"
 

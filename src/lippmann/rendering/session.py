@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
     from lippmann.rendering.estimate.psnr import Estimate
     from lippmann.rendering.film.wavefront import Frame
     from lippmann.rendering.transport.integrator import Integrator
-    from lippmann.rendering.transport.path import PreparedLight
     from lippmann.rendering.transport.ray_source import RaySource
 
 #: Share of the free memory that is used where no limit is given.
@@ -230,19 +230,17 @@ class Session:
 
         if not isinstance(integrator, PathIntegrator):
             return integrator
-
-        def prepare() -> PreparedLight:
-            return prepare_light(
-                integrator,
-                self.request,
-                source,
-                memory_limit(self.request),
-                even_background(self.built, self.request),
-                own_exposure=self.counted_exposure(own_exposure),
-                stands_alone=not self.scene.lies_off_surfaces,
-                weighs_emitters=isinstance(self.built, BuiltScene) and not self.built.borrowed,
-            )
-
+        prepare = partial(
+            prepare_light,
+            integrator,
+            self.request,
+            source,
+            memory_limit(self.request),
+            even_background(self.built, self.request),
+            own_exposure=self.counted_exposure(own_exposure),
+            stands_alone=not self.scene.lies_off_surfaces,
+            weighs_emitters=isinstance(self.built, BuiltScene) and not self.built.borrowed,
+        )
         keep = self.request.keep_light
         light = prepare() if keep is None else keep(prepare, self.scene, self.built, own_exposure)
         # Drops the choices of an earlier picture.
