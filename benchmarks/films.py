@@ -1,15 +1,15 @@
 """Films: processor time of a frame, its error, flicker and memory, an earlier checkout and this one side by side.
 
-Time on two cores: an estimated two hours for all films on the seed display, and half an hour for one on a Portrait.
+Time on two cores: an estimated three hours for all films on the seed display, and an hour for one on a Portrait.
 
 python benchmarks/films.py OTHER [--today CHECKOUT] [--films "KIND OF SCENE"...] [--display NAME]
     [--given FOLDER] [--time-only]
 
 ``OTHER`` is the folder of an earlier checkout, run as ``defaults.py`` runs it. The seconds of a frame are those of a
 command for many frames less those of one for few, divided by how many more: starting up falls out. Processor time of
-the whole tree of processes, the two checkouts in turn, after a run that compiles the kernels. ``--depth-scale 0.5``
-is said everywhere, so that both show much the same native pixels; where the files say that they stand otherwise, each
-checkout has its own reference.
+the whole tree of processes, medians of three runs of the two checkouts in turn, after one that compiles the kernels.
+``--depth-scale 0.5`` is said everywhere, so that both show much the same native pixels; where the files say that they
+stand otherwise, each checkout has its own reference.
 
 A frame's error is against two long plain renderings with seeds of their own, A and B: the mean of (P - A)(P - B), in
 which their noise cancels. Flicker is the same of the differences of successive frames. Both are told of native pixels
@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import statistics
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -37,6 +38,8 @@ from harness import save, saved
 
 #: Frames of the two commands whose times are taken from each other; a film of one frame is a still.
 MANY, FEW = 5, 1
+#: Runs of each command, whose median counts: single ones differ by a quarter.
+RUNS = 3
 #: Frames that are judged, and samples of each of their two references.
 JUDGED, REFERENCE_SAMPLES = MANY, 64
 SEEDS = (991, 992)
@@ -101,16 +104,20 @@ def measure(
     for name, checkout in checkouts.items():
         (scratch / name).mkdir()
         render(checkout, film, display, MANY, scratch / name)  # compiles the kernels: not all are the first frame's
-    spent = {
-        (name, frames): render(checkout, film, display, frames, scratch / name)
-        for frames in (FEW, MANY)
-        for name, checkout in checkouts.items()
+    spent: dict[tuple[str, int], list[dict[str, float]]] = {}
+    for _ in range(RUNS):
+        for frames in (FEW, MANY):
+            for name, checkout in checkouts.items():
+                spent.setdefault((name, frames), []).append(render(checkout, film, display, frames, scratch / name))
+    medians = {
+        key: {what: statistics.median(run[what] for run in runs) for what in ("cpu", "peak")}
+        for key, runs in spent.items()
     }
     images = {name: read(scratch / name) for name in checkouts}
     shows = {name: [all_[0].provenance.options.get(key) for key in SHOWN] for name, all_ in images.items()}
     for name, side in sides.items():
-        side["seconds"] = (spent[name, MANY]["cpu"] - spent[name, FEW]["cpu"]) / (MANY - FEW)
-        side |= {"still_peak": spent[name, FEW]["peak"], "peak": spent[name, MANY]["peak"]}
+        side["seconds"] = (medians[name, MANY]["cpu"] - medians[name, FEW]["cpu"]) / (MANY - FEW)
+        side |= {"still_peak": medians[name, FEW]["peak"], "peak": medians[name, MANY]["peak"]}
         first = images[name][0].provenance
         side |= {"spp": first.spp, "stated": (first.estimate or {}).get("psnr")}
     if not judged:
