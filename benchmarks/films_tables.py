@@ -22,8 +22,8 @@ def describe(result: dict[str, Any]) -> str:
 
 `lippmann render SCENE --display NAME --depth-scale 0.5` for five frames and for one, whole commands in processes of
 their own with compiled kernels, in turn; commit {said}. The time of a frame is a quarter of the difference of their
-processor seconds, one run of each. A still is the first frame alone. Turntables have 48 frames, the
-swing covers 40 degrees. Films in italics are of bundled scenes; the others no setting was tuned on.
+processor seconds, of one run each or, since c9dc6c7e, the median of three. A still is the first frame alone. Turntables
+have 48 frames, the swing covers 40 degrees. Films in italics are of bundled scenes; the others no setting was tuned on.
 
 {(chr(10) * 2).join(parts)}
 """
