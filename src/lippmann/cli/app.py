@@ -21,7 +21,13 @@ from typer import BadParameter
 
 from lippmann._version import VERSION
 from lippmann.cli.shared import standard_streams
-from lippmann.cli.shared.command_options import HelpfulCommand, HelpfulGroup, commands_are
+from lippmann.cli.shared.command_options import (
+    HelpfulCommand,
+    HelpfulGroup,
+    commands_are,
+    in_options,
+    translated,
+)
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.errors import LippmannError, UsageError
 from lippmann.printable import one_line
@@ -188,8 +194,6 @@ def run(words: list[str], *, debug: bool = False) -> int:
     """Run one command; errors become one line on standard error unless ``debug`` asks for the traceback."""
     standard_streams.begin_command()
     atomic_write.remark("")
-    from lippmann.cli.app import app_of
-
     try:
         code = app_of(words)(words, prog_name="lippmann", standalone_mode=False)
         sys.stdout.flush()
@@ -209,8 +213,6 @@ def run(words: list[str], *, debug: bool = False) -> int:
 
 def _report_error(error: Exception) -> int:
     """The exit code of an error, which is told in one line."""
-    from lippmann.cli.shared.command_options import in_options
-
     if isinstance(error, LippmannError):
         line = in_options(error)
         left = "" if "--resume" in line else _left()
@@ -251,11 +253,7 @@ def stopped() -> int:
 
 def _left() -> str:
     text = atomic_write.last_remark()
-    if not text:
-        return ""
-    from lippmann.cli.shared.command_options import translated
-
-    return translated(text)
+    return translated(text) if text else ""
 
 
 def _is_interrupt(error: BaseException | None) -> bool:

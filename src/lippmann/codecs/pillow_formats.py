@@ -98,11 +98,11 @@ def _open_head(source: Path | BinaryIO, formats: tuple[str, ...]) -> Image.Image
     """The picture, of which the head alone is read. The common decoders come first: to load all takes long."""
     from PIL import Image, UnidentifiedImageError
 
-    for load_decoders in (Image.preinit, Image.init):
-        load_decoders()
-        with suppress(UnidentifiedImageError):
-            return Image.open(source, formats=[name for name in formats if name in Image.OPEN])
-    raise UnidentifiedImageError(f"cannot identify image file {source!r}")
+    Image.preinit()
+    with suppress(UnidentifiedImageError):
+        return Image.open(source, formats=[name for name in formats if name in Image.OPEN])
+    Image.init()
+    return Image.open(source, formats=[name for name in formats if name in Image.OPEN])
 
 
 def _size(picture: Image.Image) -> str:

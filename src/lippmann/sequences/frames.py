@@ -31,7 +31,7 @@ from lippmann.sequences.key_frames import KeyFrames, estimate_of_next
 from lippmann.sequences.motion import Motion, open_motion
 
 if TYPE_CHECKING:
-    from lippmann.image import IntegralImage, Provenance
+    from lippmann.image import IntegralImage
     from lippmann.quilts.quilt import Quilt
     from lippmann.tiles.tiled_render import Rendered, Runner
 
@@ -316,10 +316,7 @@ def render_frames(
     def trace(now: Moment, request: RenderRequest, report: ProgressCallback) -> Shown:
         return form.render(now.scene, display, replace(request, placement=now.placement), report, kept.build)
 
-    def trace_key(now: Moment) -> Provenance:
-        return trace(now, keys.request_of(of_frame(request, now.number), now.number, None), silent).provenance
-
-    keys: KeyFrames = KeyFrames(display, moment, trace_key)
+    keys = KeyFrames(display, moment, lambda key, own: trace(key, of_frame(own, key.number), silent).provenance)
 
     def render(position: int, frame: int) -> Shown:
         now = moment(frame)

@@ -38,14 +38,14 @@ class KeyFrames:
     moment:
         Returns a frame by its number.
     render:
-        Renders a frame; its provenance.
+        Renders a frame as a request asks, which has no seed of the frame's own yet; its provenance.
     """
 
     def __init__(
         self,
         display: Display,
         moment: Callable[[int], Moment],
-        render: Callable[[Moment], Provenance],
+        render: Callable[[Moment, RenderRequest], Provenance],
     ) -> None:
         self._display = display
         self._moment = moment
@@ -83,7 +83,7 @@ class KeyFrames:
         if is_cut(last, moment, self._display):
             return None
         if made is None:
-            made = self._render(last)
+            made = self._render(last, self.request_of(request, key, None))
             self.add(last, made)
         return made if made.estimate is not None and "by_chance" in made.estimate else None
 

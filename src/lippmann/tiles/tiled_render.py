@@ -372,7 +372,7 @@ def _whole(job: TileJob, store: TileStore) -> dict[str, Pixels]:
 
 def fits_whole(display: Display, request: RenderRequest) -> bool:
     """Whether a picture can be rendered in one piece within the memory that it may use; see
-    :func:`lippmann.rendering.film.memory_model.make_plan`.
+    :func:`lippmann.rendering.film.memory_model.cut_wavefronts`.
 
     Beside its own pixels that takes their errors and the codes of its file; more where it is pooled or denoised, and
     thrice as much where so are sub-pixels that keep all colours.

@@ -221,10 +221,10 @@ def make_finishes(
 
     ``compensates`` says whether light that is reflected more than once between microfacets is given back.
     """
-    groups = group(materials, variants, store)
+    families = group(materials, variants, store)
     finishes = [
-        _Maker([materials[variant.material] for variant in group], group, store, compensates).finish()
-        for group in groups
+        _Maker([materials[variant.material] for variant in family], family, store, compensates).finish()
+        for family in families
     ]
     store.finish()
     return finishes
