@@ -12,6 +12,7 @@ from lippmann.display import Display, load_display
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_profile import LensProfile
 from lippmann.errors import DisplayError
+from lippmann.optics.lens import Lens
 
 SQUARE, HEXAGONAL, CYLINDERS = (LensArray(layout, 1.0) for layout in ("square", "hexagonal", "lenticular"))
 
@@ -70,17 +71,50 @@ def test_a_display_checks_its_lens_and_keeps_it():
     assert "lens" not in display.in_words()
 
 
-@pytest.mark.parametrize("name", ["panel-4k", "mla-square", "mla-hexagonal"])
-def test_points_of_a_lens_fill_it_across_the_way_of_the_pixel(name):
+#: Even points of the square, ``s`` and ``t``.
+SQUARE_POINTS = tuple(each.ravel() for each in np.meshgrid(*(2 * [(np.arange(60) + 0.5) / 60]), indexing="ij"))
+
+
+def with_lens(name, diameter=None):
+    """A preset with a lens of so many pitches."""
     display = load_display(name)
-    s, t = (each.ravel() for each in np.meshgrid(*(2 * [(np.arange(9) + 0.5) / 9]), indexing="ij"))
-    assert display.aperture_point(s, t) == (0.0, 0.0)
-    pitch, lenses = display.lens_array.pitch, display.lens_array
-    full = replace(display, lens=LensProfile(3.0 * pitch, 4.0 * pitch))
-    narrow = replace(display, lens=LensProfile(3.0 * pitch, 4.0 * pitch, diameter=0.5 * pitch))
-    right, up = full.aperture_point(s, t)
-    np.testing.assert_allclose(np.array(narrow.aperture_point(s, t)), 0.5 * np.array([right, up]))
-    across, along = full.lattice.across(right, up), full.lattice.along(right, up)
-    np.testing.assert_allclose(across, (t - 0.5) * pitch, atol=1e-12)
-    high = 0.0 if lenses.layout == "lenticular" else lenses.row_spacing
-    np.testing.assert_allclose(along, (s - 0.5) * high, atol=1e-12)
+    pitch = display.lens_array.pitch
+    lens = LensProfile(3.0 * pitch, 4.0 * pitch, diameter=None if diameter is None else diameter * pitch)
+    return replace(display, lens=lens)
+
+
+def test_points_of_cylinders_and_square_lenses_fill_them_across_the_way_of_the_pixel():
+    s, t = SQUARE_POINTS
+    assert load_display("mla-square").aperture_point(s, t) == (0.0, 0.0)
+    for name, diameter, high in (("panel-4k", None, 0.0), ("panel-4k", 0.5, 0.0), ("mla-square", None, 1.0)):
+        display = with_lens(name, diameter)
+        right, up = display.aperture_point(s, t)
+        pitch = display.lens_array.pitch
+        across, along = display.lattice.across(right, up), display.lattice.along(right, up)
+        np.testing.assert_allclose(across, (t - 0.5) * (diameter or 1.0) * pitch, atol=1e-12)
+        np.testing.assert_allclose(along, (s - 0.5) * high * pitch, atol=1e-12)
+
+
+def test_points_of_a_hexagonal_lens_are_those_that_its_light_table_is_made_of():
+    display = with_lens("mla-hexagonal")
+    points, expected = display.aperture_point(*SQUARE_POINTS), Lens.of(display).samples(60)
+    for mine, other in zip(points, expected, strict=True):
+        np.testing.assert_allclose(np.sort(mine), np.sort(other), atol=1e-9)
+    assert np.abs(points[1]).max() > 0.5 * display.lens_array.row_spacing
+
+
+@pytest.mark.parametrize("name", ["mla-square", "mla-hexagonal"])
+def test_points_of_a_round_lens_cover_its_disc_evenly(name):
+    display = with_lens(name, 0.8)
+    radius = 0.4 * display.lens_array.pitch
+    x, y = np.array(display.aperture_point(*SQUARE_POINTS)) / radius
+    r = np.hypot(x, y)
+    assert r.max() <= 1.0 + 1e-12
+    # Rings and sectors of one area hold as many points each.
+    rings = np.histogram(r**2, bins=5, range=(0.0, 1.0))[0]
+    sectors = np.histogram(np.arctan2(y, x), bins=8, range=(-math.pi, math.pi))[0]
+    np.testing.assert_allclose(rings, len(r) / 5, rtol=0.13)
+    np.testing.assert_allclose(sectors, len(r) / 8, rtol=0.13)
+    # Across the way of the pixel, as in all lenses: the middle column and row of the square are diameters.
+    np.testing.assert_allclose(display.aperture_point(0.5, 0.9), (0.8 * radius, 0.0), atol=1e-12)
+    np.testing.assert_allclose(display.aperture_point(0.9, 0.5), (0.0, 0.8 * radius), atol=1e-12)

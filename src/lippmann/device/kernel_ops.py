@@ -134,6 +134,12 @@ class DeviceOps:
     def sqrt(self, x: Array, /) -> Array:
         return dr.sqrt(x)
 
+    def sin(self, x: Array, /) -> Array:
+        return dr.sin(x)
+
+    def cos(self, x: Array, /) -> Array:
+        return dr.cos(x)
+
     def minimum(self, a: Array, b: Array, /) -> Array:
         return dr.minimum(a, b)
 

@@ -24,6 +24,10 @@ class ArrayOps(Protocol):
 
     def sqrt(self, a: Array, /) -> Array: ...
 
+    def sin(self, a: Array, /) -> Array: ...
+
+    def cos(self, a: Array, /) -> Array: ...
+
     def abs(self, a: Array, /) -> Array: ...
 
     def minimum(self, a: Array, b: Array, /) -> Array: ...
@@ -42,6 +46,8 @@ class _NumpyOps:
 
     floor = staticmethod(np.floor)
     sqrt = staticmethod(np.sqrt)
+    sin = staticmethod(np.sin)
+    cos = staticmethod(np.cos)
     abs = staticmethod(np.abs)
     minimum = staticmethod(np.minimum)
     maximum = staticmethod(np.maximum)

@@ -323,21 +323,31 @@ class Display:
         aperture = length * 0.0 + self.aperture_distance
         return (*origin, aperture), (slope_x / length, slope_y / length, -1.0 / length)
 
-    def aperture_point(self, s: Array, t: Array) -> tuple[Array, Array]:
+    def aperture_point(self, s: Array, t: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
         """Point of a lens for ``s`` and ``t`` in [0, 1), in mm from its middle: all of its light has one direction.
 
-        Micro-lenses are taken for rectangles. Pinholes have no other point than their middle.
+        Areas are kept: even points of the square are even points of a cylinder's width, of a square or hexagonal cell
+        or, by the concentric map of Shirley and Chiu (1997), of a round lens. Pinholes have no other point than their
+        middle.
 
         ``s`` goes along the lens, not across it: where it is the place across a pixel, which decides the direction,
         places in the lens and directions are independent of each other, axis by axis.
         """
         if self.lens is None:
             return 0.0, 0.0
-        fill = 1.0 if self.lens.diameter is None else self.lens.diameter / self.lens_array.pitch
-        across = (t - 0.5) * fill * self.lens_array.pitch
-        if self.lens_array.layout == "lenticular":
-            return self.lattice.from_axes(across, 0.0)
-        return across, (s - 0.5) * fill * self.lens_array.row_spacing
+        array, diameter = self.lens_array, self.lens.diameter
+        if array.layout == "lenticular":
+            return self.lattice.from_axes((t - 0.5) * (diameter or array.pitch), 0.0)
+        if diameter is not None:
+            return _disc_point(diameter * (t - 0.5), diameter * (s - 0.5), ops)
+        # A rectangle as large as a cell, of which each point belongs to its nearest lens.
+        across, along = (t - 0.5) * array.pitch, (s - 0.5) * array.row_spacing
+        if array.layout == "square":
+            return across, along
+        lattice = self.lattice
+        x, y = across + lattice.origin_x, along + lattice.origin_y
+        center_x, center_y = lattice.center(*lattice.lens_at(x, y, ops), x, y, ops)
+        return x - center_x, y - center_y
 
     def pinhole_place(self, place: Array, ops: ArrayOps = NUMPY) -> Array:
         """Place across a lens, in mm from its axis, at which a pinhole at the gap has the direction of ``place``."""
@@ -558,6 +568,15 @@ def check_tables(values: Table) -> None:
     for name, kind in OPTIONAL_TABLES.items():
         if name in values:
             check_keys(values[name], kind, name)
+
+
+def _disc_point(x: Array, y: Array, ops: ArrayOps) -> tuple[Array, Array]:
+    """Point of a disc for one of the square about it, both about the origin; areas keep their ratios."""
+    is_wide = ops.abs(x) > ops.abs(y)
+    radius, other = ops.where(is_wide, x, y), ops.where(is_wide, y, x)
+    angle = 0.25 * math.pi * other / _nonzero(radius, ops)
+    near, far = radius * ops.cos(angle), radius * ops.sin(angle)
+    return ops.where(is_wide, near, far), ops.where(is_wide, far, near)
 
 
 def _nonzero(value: Array, ops: ArrayOps) -> Array:

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from lippmann.display import list_displays
+from lippmann.display import list_displays, load_display
+from lippmann.display.lens_profile import LensProfile
 
 pytestmark = pytest.mark.usefixtures("engine")
 
 TURN = np.array([[0.0, -2.0, 0.0, 5.0], [2.0, 0.0, 0.0, -7.0], [0.0, 0.0, 2.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
 
+#: Micro-lenses that fill their hexagons, and round ones.
+HEXAGONAL = replace(load_display("mla-hexagonal"), name="mla-hexagons", lens=LensProfile(6.0, 9.0))
+ROUND = replace(HEXAGONAL, name="mla-discs", lens=LensProfile(6.0, 9.0, diameter=0.9 * HEXAGONAL.lens_array.pitch))
+
 
 @pytest.mark.long_cases(
     but=[
         "looking-glass-portrait-True",
+        "mla-discs-False",
         "mla-hexagonal-True",
+        "mla-hexagons-False",
         "mla-square-True",
         "panel-8k-True",
         "print-60lpi-True",
@@ -24,7 +33,7 @@ TURN = np.array([[0.0, -2.0, 0.0, 5.0], [2.0, 0.0, 0.0, -7.0], [0.0, 0.0, 2.0, 1
 )
 @pytest.mark.slow
 @pytest.mark.parametrize("subpixels", [False, True])
-@pytest.mark.parametrize("display", list_displays(), ids=lambda display: display.name)
+@pytest.mark.parametrize("display", [*list_displays(), HEXAGONAL, ROUND], ids=lambda display: display.name)
 def test_device_rays_equal_numpy_rays(display, subpixels):
     import mitsuba as mi
 

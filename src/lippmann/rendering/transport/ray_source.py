@@ -120,7 +120,7 @@ class DisplayRays(OnePicture):
         else:
             x, y = self.display.panel_point(u, v)
         (ox, oy, oz), direction = self.display.light_ray(x, y, DEVICE)
-        aside_x, aside_y = self.display.aperture_point(mi.Float64(jitter.x), mi.Float64(jitter.y))
+        aside_x, aside_y = self.display.aperture_point(mi.Float64(jitter.x), mi.Float64(jitter.y), DEVICE)
         return (ox + aside_x, oy + aside_y, oz), direction
 
 
