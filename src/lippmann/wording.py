@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Mapping
 
 _MINUTE, _HOUR = 60.0, 3600.0  # seconds
@@ -30,6 +29,8 @@ def duration_in_words(seconds: float) -> str:
 
 def html_table(caption: str, facts: Mapping[str, str]) -> str:
     """A table of two columns, a row for each fact."""
+    import html
+
     rows = "".join(
         f'<tr><th style="text-align: left">{html.escape(name)}</th>'
         f'<td style="text-align: left">{html.escape(value)}</td></tr>'

@@ -37,7 +37,6 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import ClassVar, Literal
 
@@ -318,9 +317,9 @@ def _read_file(path: Path) -> Display:
 
 
 def _preset_texts() -> dict[str, str]:
-    folder = files("lippmann.display") / "presets"
-    presets = (entry for entry in folder.iterdir() if entry.name.endswith(".toml"))
-    return {entry.name[:-5]: entry.read_text(encoding="utf-8") for entry in sorted(presets, key=lambda e: e.name)}
+    # Not by importlib.resources, which loads what reads zip files.
+    presets = sorted((Path(__file__).parent.parent / "presets").glob("*.toml"))
+    return {path.stem: path.read_text(encoding="utf-8") for path in presets}
 
 
 def _device_called(name: str, presets: Mapping[str, str]) -> str | None:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class DenoiseTuning:
+class DenoiseTuning(NamedTuple):
     """Constants of the network's use, and of what goes past it.
 
     Attributes

@@ -41,6 +41,7 @@ from lippmann.rendering.estimate.psnr import (
     make_estimate,
     neighbourhood,
     parts_with_pixels,
+    quantiles,
 )
 from lippmann.rendering.estimate.tuning import TUNING
 
@@ -111,7 +112,7 @@ def estimate_denoised(errors: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     parts = _parts(errors, samples.squares, index, grid, middle)
     common = likely.quantiles((np.arange(TUNING.draws) + 0.5) / TUNING.draws) / middle
     largest, without_blur = _draw_worst(parts, common)
-    worst = *np.quantile(largest, (0.5, 0.975)), np.quantile(without_blur, 0.025) * TUNING.often_better**2
+    worst = *quantiles(largest, (0.5, 0.975)), quantiles(without_blur, 0.025) * TUNING.often_better**2
     return make_estimate((middle, worse, better, *worst, by_chance), int(index[np.argmax(parts.expected)]), grid)
 
 
@@ -153,7 +154,7 @@ def _parts(
     trust = between / (between + noise)
     expected = np.maximum(around + trust * (measured - around), 0.2 * around)
     # A part of few pixels, in a corner of the panel, has a larger variance.
-    fewer = TUNING.prior_pixels * np.maximum(1 / count - 1 / np.median(count), 0)
+    fewer = TUNING.prior_pixels * np.maximum(1 / count - 1 / quantiles(count, 0.5), 0)
     variance = np.log1p(trust * noise / np.square(expected)) + np.log1p(fewer)
     return PartErrors(index, expected, expected, variance, errors.shares_less(expected))
 

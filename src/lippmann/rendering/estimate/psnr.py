@@ -266,7 +266,7 @@ def estimate_plain(sums: ErrorSums, grid: tuple[int, int]) -> Estimate:
     largest, without_blur = parts.draw_largest()
     model = math.exp(TUNING.model_uncertainty)
     # Shrinkage raises the estimates beside a bad part, so the lower quantile is 0.01, not 0.025.
-    worst = *np.quantile(largest, (0.5, 0.975)) * (1, model), np.quantile(without_blur, 0.01) / model
+    worst = *quantiles(largest, (0.5, 0.975)) * (1, model), quantiles(without_blur, 0.01) / model
     return make_estimate((average, *ends, *worst, average), int(index[np.argmax(expected)]), grid)
 
 
@@ -324,11 +324,16 @@ def shrink(measured: Real, around: Real, noise: Real) -> tuple[Real, Real]:
     """
     is_clear = around > 0.25 * around.mean()
     beyond = (np.square(measured - around) / 0.455 - noise)[is_clear] / np.square(around[is_clear])
-    usual = max(0.02, float(np.median(beyond))) * np.square(around)
+    usual = max(0.02, float(quantiles(beyond, 0.5))) * np.square(around)
     other = np.where(measured > around, np.square(measured - around) - 9 * noise, 0.0)
     between = np.maximum(usual, other)
     trust = between / (between + noise)
     return np.maximum(around + trust * (measured - around), 1e-3 * around.mean()), trust
+
+
+def quantiles(values: Real, shares: Sequence[float] | float) -> Real:
+    """Quantiles of ``values (n,)`` as by ``np.quantile``, which would load all of NumPy's masked arrays."""
+    return np.asarray(np.interp(np.multiply(shares, len(values) - 1), np.arange(len(values)), np.sort(values)))
 
 
 def neighbourhood(values: Real, index: NDArray[np.intp], grid: tuple[int, int]) -> tuple[Real, Real]:

@@ -5,11 +5,10 @@ All were set on ``estimate_coverage.py``, whose scenes are made to mislead estim
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class EstimateTuning:
+class EstimateTuning(NamedTuple):
     """Constants of the jackknife, of intervals, and of the prior of a denoiser's bias.
 
     Attributes

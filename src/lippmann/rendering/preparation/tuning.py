@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class PreparationTuning:
+class PreparationTuning(NamedTuple):
     """Constants of specular chains, exposure, emitter weights, photon passes and light vertices.
 
     Attributes

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class SharingTuning:
+class SharingTuning(NamedTuple):
     """Constants of the filters across lenses, and across the views of a quilt.
 
     Weights across lenses are ``(1 - sum / faded)^8`` for a sum of squared differences, which is nearly

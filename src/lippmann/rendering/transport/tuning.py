@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class TransportTuning:
+class TransportTuning(NamedTuple):
     """Constants of paths, of chains of seen light, of photons' look-ups and of light vertices.
 
     Attributes
