@@ -69,6 +69,17 @@ class PixelSet:
             return self.arrange(values)
         return np.concatenate([values, np.zeros((1, 3), np.float32)])[self.blocks]
 
+    def arrange_colors(self, values: Floats) -> Floats:
+        """The picture ``(height, channels * width, 3)`` with all colours of the sub-pixels, those of a place beside
+        each other.
+        """
+        with_black = np.concatenate([values, np.zeros((1, 3), np.float32)])
+        return with_black[self.number].reshape(self.number.shape[0], -1, 3)
+
+    def own_colors(self, picture: Floats) -> Floats:
+        """The picture ``(height, width, 3)`` of what :meth:`arrange_colors` gave: each sub-pixel keeps its own."""
+        return np.diagonal(picture.reshape(*self.number.shape, 3), axis1=2, axis2=3)
+
     def arrange_from_lenses(self, picture: Floats) -> Floats:
         """The picture ``(height, width, 3)`` of what :meth:`arrange_lenses` gave."""
         if self.blocks is None:

@@ -62,9 +62,12 @@ BLOCKS = Display("blocks", Panel(192, 128, 0.25), LensArray("square", 1.0), 1.0,
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("display", [pytest.param(FINE, marks=pytest.mark.long), BLOCKS], ids=["fine", "blocks"])
-def test_noise_is_taken_out_of_the_eyes_view(display):
-    """In a room, whose walls are noisy: the network does not smooth edges, which are most of the error elsewhere."""
+@pytest.mark.parametrize(("display", "most"), [(FINE, 0.38), (BLOCKS, 0.7)], ids=["fine", "blocks"])
+def test_noise_is_taken_out_of_the_eyes_view(display, most):
+    """In a room, whose walls are noisy: the network does not smooth edges, which are most of the error elsewhere.
+
+    Of sub-pixels it gets all colours: one colour of each leaves 0.43 of the error, as their noise looks like texture.
+    """
     room = lippmann.load_scene("room")
 
     def shown(**options):
@@ -76,7 +79,7 @@ def test_noise_is_taken_out_of_the_eyes_view(display):
     assert clean.provenance.options["denoise_effort"] == "fast"
     assert asked.provenance.options["denoise_effort"] == "high"
     error = np.mean((noisy.pixels - many) ** 2)
-    assert np.mean((clean.pixels - many) ** 2) < 0.7 * error
+    assert np.mean((clean.pixels - many) ** 2) < most * error
     assert np.mean((asked.pixels - many) ** 2) < 0.5 * error
 
 
