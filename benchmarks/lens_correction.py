@@ -1,18 +1,15 @@
-"""What true directions and corrected pixels gain, as an eye sees them through the lens: docs/background/optics.md.
+"""What whole lenses, true directions and corrected pixels gain, as an eye sees them: docs/background/optics.md.
 
 python benchmarks/lens_correction.py [SCENE ...]
 
 Each bundled scene, or each scene or file named, is rendered for a 60-lpi print whose crest is at best focus, and 20 %
-above the paraxial focus. Rays go through the middles of lenses, as for pinholes, or all across them, as `render` sends
-them where a lens is given. Pictures of rays through the middles: along the directions of a pinhole at thickness over
-index (`t/n`), of one at the gap (`gap`), and along true directions (`true`). Pictures of rays across: `t/n across`,
-`true across`, and `corrected`.
+above the paraxial focus. Pictures: `pinhole`, rays through the middles of lenses along the directions of a pinhole at
+thickness over index; `t/n`, the same directions all across the lenses; `plain`, all across along true directions, which
+`render` makes; `least squares`; and `corrected`, the step toward these that `--correct lens` takes (`share`).
 
-The light that each picture sends through the lens is compared with rays in directions that were not solved for: the
-middles of thirds of pixels, where the correction knows halves. Under `psnr` these rays go across the lenses: a lens has
-one colour to an eye, and the mean of the scene behind it is nearest to the scene. Under `psnr of middles` they go
-through the middles. `bound` is the best that any pixels between black and white can do, and `bound without limits` the
-best of any pixels at all: solved for these very directions, of this very light. Writes
+The light that each picture sends through the lens is compared with rays all across the lenses in directions that were
+not solved for: the middles of thirds of pixels, where the correction knows halves. `bound` is the best that any pixels
+between black and white can do: solved for these very directions, of this very light. Writes
 benchmarks/results/lens_correction.json, where other scenes keep their rows.
 """
 
@@ -21,7 +18,6 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -71,16 +67,15 @@ def seen_error(table, columns, truth):
 
 
 def best(table, truth, steps=400):
-    """Columns of the pixels of least error: without limits, and between black and white."""
-    free = np.linalg.lstsq(table, truth, rcond=1e-9)[0]
+    """Columns of the pixels between black and white of least error."""
     normal, goal = table.T @ table, table.T @ truth
     step, t = 1.0 / np.linalg.norm(normal, 2), 1.0
-    solved = ahead = np.clip(free, 0.0, 1.0)
+    solved = ahead = np.clip(np.linalg.lstsq(table, truth, rcond=1e-9)[0], 0.0, 1.0)
     for _ in range(steps):
         after = np.clip(ahead - step * (normal @ ahead - goal), 0.0, 1.0)
         t, before = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * t * t)), t
         ahead, solved = after + (before - 1.0) / t * (after - solved), after
-    return free, solved
+    return solved
 
 
 def decibels(error):
@@ -90,44 +85,39 @@ def decibels(error):
 def measure(scene, crest):
     own = load_display(SHEET + CRESTS[crest])
     exposure = choose_exposure(scene, own, RenderRequest(integrator="direct", threads=1))
-    pinhole = replace(own, distortion=None)
-    simple = replace(pinhole, gap=own.lens.thickness / own.lens.index)
-    middles = partial(replace, lens=None)
-
-    def halves(display):
-        # Each has random numbers of its own: else the noise of both would be the same.
-        return [
-            render(scene, display, exposure, SAMPLES // 2, beside=each, width=0.5, seed=2 + number)
-            for number, each in enumerate(parts_beside())
+    simple = replace(own, distortion=None, gap=own.lens.thickness / own.lens.index)
+    # Each has random numbers of its own: else the noise of all would be the same.
+    halves = [
+        [
+            render(scene, own, exposure, SAMPLES // 4, beside=each, width=0.5, seed=2 + part + 10 * half)
+            for part, each in enumerate(parts_beside())
         ]
-
-    middle, across = halves(middles(own)), halves(own)
+        for half in range(2)
+    ]
+    correction, light = LensCorrection(own), np.mean(halves, axis=0)
+    step = correction.step([(0, halves)])
     pictures = {
-        "t/n": render(scene, middles(simple), exposure, SAMPLES),
-        "gap": render(scene, middles(pinhole), exposure, SAMPLES),
-        "true": np.mean(middle, axis=0),
-        "t/n across": render(scene, simple, exposure, SAMPLES),
-        "true across": np.mean(across, axis=0),
-        "corrected": LensCorrection(own).rows(across),
+        "pinhole": render(scene, replace(simple, lens=None), exposure, SAMPLES),
+        "t/n": render(scene, simple, exposure, SAMPLES),
+        "plain": light.mean(axis=0),
+        "least squares": correction.rows(light),
+        "corrected": correction.rows(light, share=step.share),
     }
     columns = {name: columns_of(pixels) for name, pixels in pictures.items()}
-    table, row = light_table_of(own, own), {}
-    for key, display in (("psnr", own), ("psnr of middles", middles(own))):
-        thirds = (render(scene, display, exposure, TRUTH_SAMPLES, beside=each, width=1 / 3, seed=1) for each in JUDGED)
-        truth = np.concatenate([columns_of(pixels) for pixels in thirds])
-        free, bounded = best(table, truth)
-        judged = {**columns, "bound": bounded, "bound without limits": free}
-        if key == "psnr":
-            row["gain where off"] = {
-                name: [
-                    gain_where_off(own, value, factor, columns[name], columns["corrected"], truth)
-                    for value in ("radius", "thickness", "index")
-                    for factor in (1 - TOLERANCE, 1 + TOLERANCE)
-                ]
-                for name in ("true", "true across")
-            }
-        row[key] = {name: decibels(seen_error(table, each, truth)) for name, each in judged.items()}
-    return row
+    table = light_table_of(own, own)
+    thirds = (render(scene, own, exposure, TRUTH_SAMPLES, beside=each, width=1 / 3, seed=1) for each in JUDGED)
+    truth = np.concatenate([columns_of(pixels) for pixels in thirds])
+    judged = {**columns, "bound": best(table, truth)}
+    off = {
+        name: [
+            gain_where_off(own, value, factor, columns["plain"], columns[name], truth)
+            for value in ("radius", "thickness", "index")
+            for factor in (1 - TOLERANCE, 1 + TOLERANCE)
+        ]
+        for name in ("least squares", "corrected")
+    }
+    psnr = {name: decibels(seen_error(table, each, truth)) for name, each in judged.items()}
+    return {"psnr": psnr, "share": step.share, "told": step.gains, "gain where off": off}
 
 
 def gain_where_off(own, value, factor, before, after, truth):
@@ -145,6 +135,12 @@ for given in sys.argv[1:] or names():
     for crest in CRESTS:
         row = measure(scene, crest)
         rows.append({"scene": name, "crest": crest, **row})
-        figures = [{name: round(value, 2) for name, value in row[key].items()} for key in ("psnr", "psnr of middles")]
-        print(name, crest, *figures, *(round(min(each), 2) for each in row["gain where off"].values()), flush=True)
+        figures = {name: round(value, 2) for name, value in row["psnr"].items()}
+        print(
+            name,
+            crest,
+            figures,
+            round(row["share"], 2),
+            *(round(min(each), 2) for each in row["gain where off"].values()),
+        )
     save("lens_correction", {"machine": machine(), "sheet": SHEET, "samples": SAMPLES, "rows": rows}, show=False)

@@ -44,7 +44,8 @@ def render_part(scene, exposure, beside, samples, seed=0):
 def gain(display, there, rows, before, after, truth):
     """Decibels by which eyes see ``after`` nearer to the truth, in windows of so many rows."""
     judge = type("Windows", (SlantedRows,), {"window": rows})(display, display.panel.subpixel_offsets, JUDGED)
-    worse, better = judge.squared_errors([np.ascontiguousarray(each) for each in (before, after)], truth, 0, there)
+    lights, (goal,) = judge.eyes(there)([np.ascontiguousarray(each) for each in (before, after)], [truth], 0)
+    worse, better = (np.mean((light - goal) ** 2) for light in lights)
     return 10.0 * float(np.log10(worse / better))
 
 
@@ -54,12 +55,20 @@ for given in sys.argv[1:] or names():
     scene, name = load_scene(given), Path(given).parent.name or given
     rows = [row for row in rows if row["scene"] != name]
     exposure = choose_exposure(scene, DISPLAY, RenderRequest(integrator="direct", threads=1))
-    parts = [render_part(scene, exposure, beside, SAMPLES // 2) for beside in parts_beside()]
+    # Each has random numbers of its own: else the noise of all would be the same.
+    halves = [
+        [
+            render_part(scene, exposure, beside, SAMPLES // 4, seed=2 + part + 10 * half)
+            for part, beside in enumerate(parts_beside())
+        ]
+        for half in range(2)
+    ]
     plain = render(scene, DISPLAY, exposure, SAMPLES)
     simple = render(scene, SIMPLE, exposure, SAMPLES)
     truth = np.stack([render_part(scene, exposure, beside, TRUTH_SAMPLES, seed=1) for beside in JUDGED])
     correction = LensCorrection(DISPLAY, subpixels=True)
-    corrected = correction.rows(parts)
+    step = correction.step([(0, halves)])
+    corrected = correction.rows(np.mean(halves, axis=0), share=step.share)
     exact, over_simple = (
         {str(n): gain(DISPLAY, DISPLAY, n, before, corrected, truth) for n in WINDOWS} for before in (plain, simple)
     )
@@ -68,8 +77,9 @@ for given in sys.argv[1:] or names():
         for factor in (1 - TOLERANCE, 1 + TOLERANCE):
             there = replace(DISPLAY, lens=replace(DISPLAY.lens, **{value: factor * getattr(DISPLAY.lens, value)}))
             off[f"{value} x {factor:g}"] = gain(DISPLAY, there, WINDOWS[0], plain, corrected, truth)
-    told = correction.gains(corrected, parts)["exact"]
-    rows.append({"scene": name, "gain": exact, "gain over t/n": over_simple, "told": told, "gain where off": off})
+    told = step.gains["exact"]
+    gains = {"gain": exact, "gain over t/n": over_simple, "told": told, "gain where off": off}
+    rows.append({"scene": name, "share": step.share, **gains})
     shown = [{k: round(v, 2) for k, v in gains.items()} for gains in (exact, over_simple)]
-    print(name, *shown, round(told, 2), round(min(off.values()), 2), flush=True)
+    print(name, *shown, round(step.share, 2), round(told, 2), round(min(off.values()), 2), flush=True)
     save("slanted_correction", {"machine": machine(), "samples": SAMPLES, "rows": rows}, show=False)

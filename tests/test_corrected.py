@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import lippmann
-from lippmann.corrected import finer_display, parts_of
+from lippmann.corrected import finer_display, halves_of
 from lippmann.display import load_display
 from lippmann.errors import DisplayError, UsageError
 from lippmann.optics.correction import LensCorrection, parts_beside
@@ -32,11 +32,11 @@ def test_parts_lie_beside_the_middles_of_subpixels(name, channel):
         np.testing.assert_allclose(x[part::2], own + beside * display.panel.pixel_pitch, atol=1e-12)
 
 
-def test_parts_are_means_of_what_lies_within_a_pixel():
+def test_halves_are_what_lies_in_the_upper_and_the_lower_half_of_a_pixel():
     pixels = np.arange(2 * 4 * 3, dtype=np.float32).reshape(2, 4, 3)
-    left, right = parts_of(pixels)
-    np.testing.assert_array_equal(left, pixels.mean(axis=0)[None, 0::2])
-    np.testing.assert_array_equal(right, pixels.mean(axis=0)[None, 1::2])
+    for half, (left, right) in enumerate(halves_of(pixels)):
+        np.testing.assert_array_equal(left, pixels[None, half, 0::2])
+        np.testing.assert_array_equal(right, pixels[None, half, 1::2])
 
 
 @pytest.mark.slow
@@ -70,7 +70,9 @@ def test_an_eye_sees_the_corrected_picture_nearer_to_what_rays_meet(engine, monk
     pinhole = replace(image.display, lens=None, distortion=None)
     plain = lippmann.render("teapot", pinhole, spp=16, **options, placement=placed(image))
     judge = lippmann.render("teapot", finer_display(image.display), spp=16, seed=1, **options, placement=placed(image))
-    gain = LensCorrection(image.display).eye_errors((plain.pixels, image.pixels), parts_of(judge.pixels))
+    gain = LensCorrection(image.display).eye_errors(
+        (plain.pixels, image.pixels), np.mean(halves_of(judge.pixels), axis=0)
+    )
     assert 10.0 * np.log10(gain[0] / gain[1]) > 2.0
 
 

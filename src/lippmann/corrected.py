@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from lippmann.display import Display
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
 from lippmann.image.stored_values import FloatArray
-from lippmann.optics.correction import PARTS, LensCorrection, report_rows
+from lippmann.optics.correction import PARTS, LensCorrection, judged_rows
 from lippmann.options.choices import PROPERTIES
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.picture import render_picture
@@ -55,10 +57,11 @@ def render_corrected(
         asked = replace(asked, pixel_filter="box", spp=_SAMPLES)
     # The display stands where its own depth budget has it.
     finer = render_picture(scene, finer_display(display), asked, progress, stands_as=display)
-    parts = parts_of(finer.pixels)
-    pixels = correction.rows(parts)
-    middle = report_rows(display.panel.height)
-    options, note = correction.describe(pixels[middle], [part[middle] for part in parts], middle.start)
+    halves = halves_of(finer.pixels)
+    judged = judged_rows(display.panel.height)
+    step = correction.step([(rows.start, [[part[rows] for part in half] for half in halves]) for rows in judged])
+    pixels = correction.rows(np.mean(halves, axis=0), share=step.share)
+    options, note = step.describe(float(np.mean((pixels <= 0.0) | (pixels >= 1.0))))
     # A sample of each finer pixel is several of a pixel: why those have no estimate is not why this one has none.
     of_finer = why_no_estimate(replace(asked, spp=finer.provenance.spp))
     why = "no estimate of the error: pixels are solved for, so that the error of samples is not theirs"
@@ -86,8 +89,11 @@ def finer_display(display: Display) -> Display:
     return replace(display, panel=finer, sheet=None, pixel=None)
 
 
-def parts_of(pixels: FloatArray) -> list[FloatArray]:
-    """The parts of each pixel, from left to right, of a picture on a :func:`finer_display`."""
+def halves_of(pixels: FloatArray) -> list[list[FloatArray]]:
+    """The parts of each pixel, from left to right, of the upper and of the lower half of it.
+
+    ``pixels`` is the picture on a :func:`finer_display`. The halves have samples of their own.
+    """
     height, width = (side // PARTS for side in pixels.shape[:2])
-    rows = pixels.reshape(height, PARTS, width, PARTS, 3).mean(axis=1)
-    return [rows[:, :, part] for part in range(PARTS)]
+    cells = pixels.reshape(height, PARTS, width, PARTS, 3)
+    return [[cells[:, half, :, part] for part in range(PARTS)] for half in range(PARTS)]

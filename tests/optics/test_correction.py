@@ -95,12 +95,42 @@ def test_a_lens_that_is_three_percent_off_loses_little(solved, changed):
 
 
 def test_it_tells_what_it_gains(solved):
-    _, correction, parts, pixels = solved
-    options, note = correction.describe(pixels, parts)
-    assert options["correction_gain_exact"] > max(
-        options[f"correction_gain_{k}"] for k in ("radius", "thickness", "index")
-    )
-    assert f"{options['correction_gain_exact']:+.1f} dB in the directions solved for" in note
+    _, correction, parts, _ = solved
+    step = correction.step([(0, [parts])])
+    assert step.share == 1.0
+    assert step.gains["exact"] > max(step.gains[name] for name in ("radius", "thickness", "index"))
+    options, note = step.describe(0.25)
+    assert options["correction_gain_exact"] == step.gains["exact"]
+    assert f"{step.gains['exact']:+.1f} dB in the directions solved for" in note
+
+
+def noisy_halves(parts, noise, seed):
+    rng = np.random.default_rng(seed)
+    return [[(part + noise * rng.standard_normal(part.shape)).astype(np.float32) for part in parts] for _ in range(2)]
+
+
+def test_noise_alone_is_not_sharpened(solved):
+    _, correction, parts, _ = solved
+    halves = noisy_halves([np.full_like(part, 0.5) for part in parts], 0.02, 5)
+    step = correction.step([(0, halves)])
+    assert step.share < 0.1
+    pixels = correction.rows(np.mean(halves, axis=0), share=0.0)
+    np.testing.assert_allclose(pixels, np.mean(halves, axis=(0, 1)), atol=1e-6)
+    assert "not corrected for its lens" in replace(step, share=0.0).describe(0.0)[1]
+
+
+def test_the_step_and_its_gain_are_those_of_least_error_against_light_without_noise(solved):
+    _, correction, parts, _ = solved
+    halves = noisy_halves(parts, 0.08, 6)
+    step = correction.step([(0, halves)])
+    mean = np.clip(np.mean(halves, axis=0), 0.0, 1.0)
+    shares = np.linspace(0.0, 1.0, 21)
+    plain, *errors = correction.eye_errors([correction.rows(mean, share=share) for share in (0.0, *shares)], parts)
+    assert 0.1 < step.share < 0.9
+    assert step.share == pytest.approx(shares[np.argmin(errors)], abs=0.1)
+    assert step.gains["exact"] == pytest.approx(10.0 * np.log10(plain / min(errors)), abs=0.1)
+    # As samples are solved for by themselves, one half alone believes in more than there is.
+    assert correction.step([(0, [list(mean)])]).gains["exact"] > step.gains["exact"] + 0.3
 
 
 def test_light_beyond_white_is_white(solved):

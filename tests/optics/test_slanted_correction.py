@@ -139,6 +139,17 @@ def test_rows_with_others_about_them_are_those_of_the_whole_picture(solved):
 
 
 def test_it_tells_what_it_gains(solved):
-    _, correction, parts, _, corrected = solved
-    options, _ = correction.describe(corrected[5:60], [part[5:60] for part in parts], 5)
-    assert options["correction_gain_exact"] > 0.8
+    _, correction, parts, _, _ = solved
+    step = correction.step([(5, [[part[5:60] for part in parts]])])
+    assert step.share > 0.9
+    assert step.gains["exact"] > 0.8
+
+
+def test_the_gain_of_noisy_light_is_that_against_light_without_noise(solved):
+    _, correction, parts, _, _ = solved
+    rng = np.random.default_rng(7)
+    halves = [[(part + 0.1 * rng.standard_normal(part.shape)).astype(np.float32) for part in parts] for _ in range(2)]
+    step = correction.step([(0, halves)])
+    mean = np.clip(np.mean(halves, axis=0), 0.0, 1.0)
+    plain, stepped = correction.eye_errors([correction.rows(mean, share=share) for share in (0.0, step.share)], parts)
+    assert step.gains["exact"] == pytest.approx(10.0 * np.log10(plain / stepped), abs=0.2)

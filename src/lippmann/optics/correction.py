@@ -4,6 +4,10 @@ Box-constrained least squares: with W the shares of pixels in the light of each 
 meant, the pixels P between black and white that make ``|W P - T|`` least, by FISTA from the picture along true
 directions. All rows under upright cylinders have the same ``W``; of it only ``W'W``, a band, is kept. Slanted ones are
 those of :mod:`lippmann.optics.slanted_correction`.
+
+Least squares sharpens the noise of the light that is meant, and may gain less than that costs. So pixels go from the
+picture along true directions so far toward it that the error of the light to eyes is expected to be least: estimated
+without bias by cross-fitting two independent halves of the samples.
 """
 
 from __future__ import annotations
@@ -17,9 +21,9 @@ from numpy.typing import NDArray
 from lippmann.display.display import Display
 from lippmann.display.lens_profile import INDICES, LensProfile
 from lippmann.errors import DisplayError
-from lippmann.optics.lens import Lens
+from lippmann.optics.lens import Lens, Real
 from lippmann.optics.pixel_shares import PixelShares, pixel_shares
-from lippmann.optics.slanted_correction import MOST_ROWS, SlantedRows, pixel_crossing
+from lippmann.optics.slanted_correction import MOST_ROWS, Eyes, SlantedRows, pixel_crossing
 from lippmann.runtime.engine_lock import cached_property
 from lippmann.runtime.machine import usable_cores
 from lippmann.runtime.row_threads import Bands
@@ -35,9 +39,8 @@ _STEPS = 15
 #: Relative errors of radius, thickness and index whose cost is told.
 TOLERANCE = 0.03
 
-
-#: Rows about the middle of a picture by which its correction is judged.
-_REPORT_ROWS = 64
+#: Bands of rows, spread over a picture, by which its correction is judged, and rows of each.
+_BANDS, _BAND_ROWS = 4, 24
 
 
 def parts_beside() -> tuple[float, ...]:
@@ -45,13 +48,51 @@ def parts_beside() -> tuple[float, ...]:
     return tuple((part + 0.5) / PARTS - 0.5 for part in range(PARTS))
 
 
-def report_rows(height: int) -> slice:
-    """The rows of a picture by which its correction is judged."""
-    first = max(0, (height - _REPORT_ROWS) // 2)
-    return slice(first, min(height, first + _REPORT_ROWS))
+def judged_rows(height: int) -> list[slice]:
+    """The bands of rows of a picture by which its correction is judged; the whole of a low one."""
+    if height <= _BANDS * _BAND_ROWS:
+        return [slice(0, height)]
+    firsts = (round((band + 0.5) * height / _BANDS - 0.5 * _BAND_ROWS) for band in range(_BANDS))
+    return [slice(first, first + _BAND_ROWS) for first in firsts]
 
 
 _NO_LIMITS = (0.0, np.inf)
+
+#: Mean squared error of values of 16 bits: less is none.
+_ROUNDING = 1.0 / (12.0 * 65535.0**2)
+
+
+@dataclass(frozen=True)
+class CorrectionStep:
+    """How far pixels go toward those of least squares, and what an eye is expected to gain by that.
+
+    Attributes
+    ----------
+    share:
+        0 for the picture along true directions to 1 for least squares.
+    gains:
+        Decibels over the picture along true directions, of the light to eyes in the directions solved for: ``exact``,
+        and ``radius``, ``thickness`` and ``index``, each the worse of 3 % more and less.
+    """
+
+    share: float
+    gains: dict[str, float]
+
+    def describe(self, limited: float) -> tuple[dict[str, object], str]:
+        """Metadata, and a line for people. ``limited`` is the share of values at black or white."""
+        options: dict[str, object] = {"correct": "lens", "correction_share": self.share, "correction_limited": limited}
+        options |= {f"correction_gain_{name}": gain for name, gain in self.gains.items()}
+        if self.share == 0.0:
+            return options, (
+                "not corrected for its lens: the noise of its samples would grow by more than the correction gains; "
+                "more samples leave it more to gain"
+            )
+        worst = min(("radius", "thickness", "index"), key=lambda name: self.gains[name])
+        return options, (
+            f"corrected for its lens: {self.gains['exact']:+.1f} dB in the directions solved for, "
+            f"{self.gains[worst]:+.1f} dB where the lens's {worst} is {TOLERANCE:.0%} off; "
+            f"{limited:.0%} of the values at black or white"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,55 +124,79 @@ class LensCorrection:
         """Rows beyond which others have no say in a row."""
         return self._rows.margin
 
-    def rows(self, parts: Sequence[Floats], first: int = 0) -> Floats:
+    def rows(self, parts: Sequence[Floats], first: int = 0, share: float = 1.0) -> Floats:
         """Corrected pixels ``(rows, width, 3)`` of the rows from ``first`` on, as if there were no others.
 
         ``parts`` is the light that is meant, one such array for each part of a pixel. Light is linear, with white at 1.
+        ``share`` is that of a :class:`CorrectionStep`; 1 is least squares.
         """
         meant = _clipped(parts)
+        plain: Floats = np.asarray(np.mean(meant, axis=0, dtype=np.float32))
+        if share == 0.0:
+            return plain
         solved = [self._rows.solve(np.ascontiguousarray(meant[..., c]), c, first) for c in range(3)]
-        return np.stack(solved, axis=-1)
+        stepped: Floats = plain + np.float32(share) * (np.stack(solved, axis=-1) - plain)
+        return stepped
 
-    def eye_errors(
-        self, pictures: Sequence[Floats], parts: Sequence[Floats], profile: LensProfile | None = None, first: int = 0
-    ) -> list[float]:
+    def eye_errors(self, pictures: Sequence[Floats], parts: Sequence[Floats], first: int = 0) -> list[float]:
         """Mean squared errors of the light that an eye sees of each picture, over all lenses and directions meant.
 
-        ``profile`` is the lens that is there; by default the display's own. ``first`` is the number of the first row.
+        ``first`` is the number of the first row.
         """
-        there = self.display if profile is None else replace(self.display, lens=profile)
-        return self._rows.squared_errors(pictures, _clipped(parts), first, there)
+        lights, (goal,) = self._rows.eyes(self.display)(pictures, [_clipped(parts)], first)
+        return [float(np.mean((light - goal) ** 2)) for light in lights]
 
-    def describe(self, pixels: Floats, parts: Sequence[Floats], first: int = 0) -> tuple[dict[str, object], str]:
-        """Metadata of corrected ``pixels``, and a line for people."""
-        gains = self.gains(pixels, parts, first)
-        limited = float(np.mean((pixels <= 0.0) | (pixels >= 1.0)))
-        options: dict[str, object] = {"correct": "lens", "correction_limited": limited}
-        options |= {f"correction_gain_{name}": gain for name, gain in gains.items()}
-        worst = min(("radius", "thickness", "index"), key=lambda name: gains[name])
-        return options, (
-            f"corrected for its lens: {gains['exact']:+.1f} dB in the directions solved for, {gains[worst]:+.1f} dB "
-            f"where the lens's {worst} is {TOLERANCE:.0%} off; {limited:.0%} of the values at black or white"
-        )
+    def step(self, bands: Sequence[tuple[int, Sequence[Sequence[Floats]]]]) -> CorrectionStep:
+        """The step toward least squares after which eyes are expected to see the least error.
 
-    def gains(self, pixels: Floats, parts: Sequence[Floats], first: int = 0) -> dict[str, float]:
-        """Decibels by which corrected ``pixels`` send light nearer to ``parts`` than the mean of these does.
+        Parameters
+        ----------
+        bands:
+            Number of the first row of each band, and independent halves of the light that is meant of its rows: two
+            lists of parts, whose mean it is. One list alone is light without noise.
 
-        They are a bound from above: those of the very directions that were solved for, with their noise.
-        Keys: ``exact``, and ``radius``, ``thickness`` and ``index``, each the worse of 3 % more and less.
+        Notes
+        -----
+        With x the picture made of light T, W x what eyes see of it, and A and B the halves, the expectation of
+        ``|W x|^2 - (W x_A) T_B - (W x_B) T_A + T_A T_B`` is that of ``|W x - T|^2`` with T free of noise and x as noisy
+        as it is. It is a parabola of the step.
         """
-        before = np.mean(_clipped(parts), axis=0)
+        pictures = []
+        for first, halves in bands:
+            plain = [self.rows(half, first, 0.0) for half in halves]
+            solved = [self.rows(half, first) for half in halves]
+            pictures.append((first, [*plain, *solved], [_clipped(half) for half in halves]))
 
-        def gain(profile: LensProfile | None) -> float:
-            worse, better = self.eye_errors((before, pixels), parts, profile, first)
-            return 10.0 * float(np.log10(max(worse, 1e-12) / max(better, 1e-12)))
+        def parabola(profile: LensProfile) -> Real:
+            """Error of the plain picture and of that of least squares, and mean square of what is between them."""
+            sums, count, eyes = np.zeros(3), 0, self._rows.eyes(replace(self.display, lens=profile))
+            for first, band, meant in pictures:
+                lights, goals = eyes(band, meant, first)
+                pairs = [(lights[k], lights[k + len(goals) - 1]) for k in (0, len(goals))]
+                plain, solved = (0.5 * (a + b) for a, b in pairs)
+                errors = [
+                    light @ light - a @ goals[-1] - b @ goals[0] + goals[0] @ goals[-1]
+                    for light, (a, b) in zip((plain, solved), pairs, strict=True)
+                ]
+                sums += (*errors, (solved - plain) @ (solved - plain))
+                count += plain.size
+            return sums / max(count, 1)
 
         lens = Lens.of(self.display).profile
-        gains = {"exact": gain(None)}
+        exact = parabola(lens)
+        plain, solved, between = exact
+        share = float(np.clip(0.5 * (plain - solved + between) / max(between, _ROUNDING), 0.0, 1.0))
+
+        def gain(parabola: Real) -> float:
+            plain, solved, between = parabola
+            error = plain + share * (solved - plain - between) + share**2 * between
+            return 10.0 * float(np.log10(max(plain, _ROUNDING) / max(error, _ROUNDING)))
+
+        gains = {"exact": gain(exact)}
         for name, limits in (("radius", _NO_LIMITS), ("thickness", _NO_LIMITS), ("index", INDICES)):
             changed = np.clip([getattr(lens, name) * (1.0 + e) for e in (-TOLERANCE, TOLERANCE)], *limits)
-            gains[name] = min(gain(replace(lens, **{name: float(value)})) for value in changed)
-        return gains
+            gains[name] = min(gain(parabola(replace(lens, **{name: float(value)}))) for value in changed)
+        return CorrectionStep(share, gains)
 
     @cached_property
     def _rows(self) -> _UprightRows | SlantedRows:
@@ -172,16 +237,21 @@ class _UprightRows:
         )
         return solved
 
-    def squared_errors(self, pictures: Sequence[Floats], meant: Floats, first: int, there: Display) -> list[float]:
-        """Mean squared errors of what eyes see of pictures ``(rows, width, 3)`` against ``(parts, rows, width, 3)``."""
-        squares = []
-        for channel in range(3):
-            is_own = there is self.display
-            shares = self._systems[channel][0] if is_own else self._shares(there, channel)
-            goal = np.moveaxis(meant[..., channel], 0, -1).reshape(meant.shape[1], -1)
-            lights = (shares.gather(pixels[..., channel].astype(np.float64)) for pixels in pictures)
-            squares.append([np.mean((light - goal) ** 2) for light in lights])
-        return [float(error) for error in np.mean(squares, axis=0)]
+    def eyes(self, there: Display) -> Eyes:
+        """Light that eyes see through the lenses that are there, of the directions that are meant."""
+        is_own = there == self.display
+        shares = [self._systems[c][0] if is_own else self._shares(there, c) for c in range(3)]
+
+        def lights(pictures: Sequence[Floats], meant: Sequence[Floats], first: int) -> tuple[list[Real], list[Real]]:
+            del first
+            seen = [
+                np.concatenate([shares[c].gather(pixels[..., c].astype(np.float64)).ravel() for c in range(3)])
+                for pixels in pictures
+            ]
+            # By channel, row, and pixel and part, as they are gathered.
+            return seen, [parts.transpose(3, 1, 2, 0).ravel().astype(np.float64) for parts in meant]
+
+        return lights
 
     @cached_property
     def _systems(self) -> list[tuple[PixelShares, Floats]]:

@@ -11,7 +11,7 @@ uneven in others. So rows are not independent; but the shares of a pixel depend 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +26,10 @@ from lippmann.runtime.row_threads import Bands
 
 Floats = NDArray[np.float32]
 Offset = tuple[int, int, int]
+
+#: What eyes see of pictures ``(rows, width, 3)``, and are meant to see of light ``(parts, rows, width, 3)``, of rows
+#: from a first one on: for each picture and each light an array ``(n,)``.
+Eyes = Callable[[Sequence[Floats], Sequence[Floats], int], tuple[list[Real], list[Real]]]
 
 #: Directions, and places whose stencils are known, for each pixel under a lens; a sub-pixel is a third of one wide.
 _DIRECTIONS, _PLACES = 8, 40
@@ -111,51 +115,60 @@ class SlantedRows:
             now, ahead = ahead, now
         return solved[self.margin : -self.margin]
 
-    def squared_errors(self, pictures: Sequence[Floats], meant: Floats, first: int, there: Display) -> list[float]:
-        """Mean squared errors of what eyes see of pictures ``(rows, width, 3)``, against ``(parts, rows, width, 3)``.
+    def eyes(self, there: Display) -> Eyes:
+        """Light that eyes see through the lenses that are there, of the directions that are meant.
 
-        Light is that over the light of a white panel, whose unevenness no picture can take away. ``there`` is the
-        display with the lens that is there.
+        Light is that over the light of a white panel, whose unevenness no picture can take away.
         """
         from lippmann.optics.eye_light_kernel import gather_light
 
         display, n = self.display, len(self._row_shares)
-        count = np.arange(0, meant.shape[1] - n + 1, _JUDGED)
         lens = np.arange(display.lens_grid.columns, dtype=np.float64)
         axis, place = (each[:, ::_JUDGED] for each in self._directions(lens))
         light = _even_light(self.display, there)
         number, middle = light.nearest(self._slopes(place), np.zeros_like(place))
         middle[..., 0] += axis
-        shape = (len(count), place.size)
-        numbers = np.broadcast_to(number.ravel(), shape)
-        places = np.broadcast_to(middle.reshape(-1, 2), (*shape, 2))
-        lines = np.broadcast_to((count[:, None] + np.array([0.0, self.window]))[:, None], (*shape, 2)) + float(first)
         tables = light.weights.reshape(-1, *light.weights.shape[2:])
         cells = np.array(((self.offsets,),), dtype=np.float64)
-        white, *eyes = (np.zeros((*shape, 3), dtype=np.float32) for _ in range(1 + len(pictures)))
-        for values, result in zip((np.ones_like(meant[0]), *pictures), (white, *eyes), strict=True):
-            Bands(usable_cores()).lines(
-                gather_light,
-                len(count),
-                values,
-                first,
-                panel_frame(display),
-                cells,
-                tables,
-                light.step,
-                numbers,
-                places,
-                lines,
-                result,
+
+        def lights(pictures: Sequence[Floats], meant: Sequence[Floats], first: int) -> tuple[list[Real], list[Real]]:
+            count = np.arange(0, len(pictures[0]) - n + 1, _JUDGED)
+            shape = (len(count), place.size)
+            numbers = np.broadcast_to(number.ravel(), shape)
+            places = np.broadcast_to(middle.reshape(-1, 2), (*shape, 2))
+            lines = np.broadcast_to((count[:, None] + np.array([0.0, self.window]))[:, None], (*shape, 2)) + float(
+                first
             )
-        eyes = [np.divide(eye, white, out=np.zeros_like(eye), where=white > 0.0) for eye in eyes]
-        squares = []
-        for channel in range(3):
-            goal, is_there = self._meant(meant[..., channel], channel, first, axis, place)
-            windows = np.array([self._row_shares @ goal[k : k + n] for k in count])
-            inside = np.array([is_there[k : k + n].all(axis=0) for k in count])
-            squares.append([np.mean((eye[..., channel] - windows)[inside] ** 2) for eye in eyes])
-        return [float(error) for error in np.mean(squares, axis=0)]
+            white, *seen = (np.zeros((*shape, 3), dtype=np.float32) for _ in range(1 + len(pictures)))
+            for values, result in zip((np.ones_like(pictures[0]), *pictures), (white, *seen), strict=True):
+                Bands(usable_cores()).lines(
+                    gather_light,
+                    len(count),
+                    values,
+                    first,
+                    panel_frame(display),
+                    cells,
+                    tables,
+                    light.step,
+                    numbers,
+                    places,
+                    lines,
+                    result,
+                )
+            is_lit = white > 0.0
+            seen = [np.divide(each, white, out=np.zeros_like(each), where=is_lit) for each in seen]
+            goals, inside = [], np.empty((*shape, 3), dtype=bool)
+            for parts in meant:
+                windows = np.empty((*shape, 3))
+                for channel in range(3):
+                    goal, is_there = self._meant(parts[..., channel], channel, first, axis, place)
+                    for line, k in enumerate(count):
+                        windows[line, :, channel] = self._row_shares @ goal[k : k + n]
+                        inside[line, :, channel] = is_there[k : k + n].all(axis=0)
+                goals.append(windows)
+            return [each[inside].astype(np.float64) for each in seen], [each[inside] for each in goals]
+
+        return lights
 
     @property
     def _row_shares(self) -> Real:

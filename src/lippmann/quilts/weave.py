@@ -32,7 +32,7 @@ from lippmann.quilts.quilt import Quilt
 from lippmann.runtime.engine_lock import cached_property
 
 if TYPE_CHECKING:
-    from lippmann.optics.correction import LensCorrection
+    from lippmann.optics.correction import CorrectionStep, LensCorrection
 
 Real = NDArray[np.float64]
 ViewChoice = Literal["nearest", "linear"]
@@ -168,19 +168,19 @@ class Weaving:
         """Rows ``first`` to before ``last``, ``(rows, width, 3)`` float32 linear RGB."""
         if self._correction is None:
             return weave_window(self.quilt, self.display, self.choice, (first, last))
-        margin = self._correction.margin
-        start, stop = max(0, first - margin), min(self.display.panel.height, last + margin)
-        return self._correction.rows(self._parts(start, stop), start)[first - start : last - start]
+        correction, step = self._correction
+        start, stop = max(0, first - correction.margin), min(self.display.panel.height, last + correction.margin)
+        return correction.rows(self._parts(start, stop), start, step.share)[first - start : last - start]
 
     def describe_correction(self) -> tuple[dict[str, object], tuple[str, ...]]:
-        """Metadata of the correction, and lines for people: both of the rows about the middle."""
+        """Metadata of the correction, and lines for people."""
         if self._correction is None:
             return {}, ()
-        from lippmann.optics.correction import report_rows
+        from lippmann.optics.correction import judged_rows
 
-        rows = report_rows(self.display.panel.height)
-        parts = self._parts(rows.start, rows.stop)
-        options, note = self._correction.describe(self._correction.rows(parts, rows.start), parts, rows.start)
+        bands = [self.rows(rows.start, rows.stop) for rows in judged_rows(self.display.panel.height)]
+        pixels = np.concatenate(bands)
+        options, note = self._correction[1].describe(float(np.mean((pixels <= 0.0) | (pixels >= 1.0))))
         return options, (note,)
 
     def _parts(self, first: int, last: int) -> list[FloatArray]:
@@ -196,12 +196,14 @@ class Weaving:
         return len(set(self.display.panel.subpixel_offsets)) > 1
 
     @cached_property
-    def _correction(self) -> LensCorrection | None:
+    def _correction(self) -> tuple[LensCorrection, CorrectionStep] | None:
         if self.correct == "none":
             return None
-        from lippmann.optics.correction import LensCorrection
+        from lippmann.optics.correction import LensCorrection, judged_rows
 
-        return LensCorrection(self.display, self._has_subpixels)
+        correction = LensCorrection(self.display, self._has_subpixels)
+        bands = judged_rows(self.display.panel.height)
+        return correction, correction.step([(rows.start, [self._parts(rows.start, rows.stop)]) for rows in bands])
 
 
 def weave_provenance(
