@@ -111,9 +111,14 @@ def test_a_codec_that_cannot_be(tmp_path, monkeypatch):
     encoder = mp4_film._Encoder("libnone", {}, "none", 4096)
     monkeypatch.setitem(mp4_film._ENCODERS, "av1", encoder)
     with pytest.raises(
-        OutputError, match=r"a\.mp4: the codec is not installed; PyAV as it is installed has no libnone"
+        OutputError,
+        match=r"a\.mp4: the codec av1 is not installed; PyAV as it is installed has no libnone; take h264 or hevc",
     ):
         write_animation(frames(), tmp_path / "a.mp4", codec="av1")
+    for name in mp4_film._ENCODERS:
+        monkeypatch.setitem(mp4_film._ENCODERS, name, encoder)
+    with pytest.raises(OutputError, match=r"no libnone; write an animation \(\.png\)"):
+        write_animation(frames(), tmp_path / "a.mp4")
     assert os.listdir(tmp_path) == []
 
 
@@ -235,6 +240,19 @@ def test_a_frame_is_made_while_another_is_written(tmp_path, monkeypatch):
     monkeypatch.setattr("lippmann.codecs.apng.write_apng", written)
     video_file.write_codes(made(), tmp_path / "a.png")
     assert (tmp_path / "a.png").read_bytes() == b"film"
+
+
+def test_no_frame_is_held_while_the_next_is_made(tmp_path):
+    def codes():
+        for number in range(3):
+            frame = np.full((64, 64, 3), 40 * number, np.uint8)
+            is_free = threading.Event()
+            weakref.finalize(frame, is_free.set)
+            yield frame
+            del frame
+            assert is_free.wait(20)
+
+    video_file.write_codes(codes(), tmp_path / "a.mp4")
 
 
 def test_a_writer_that_fails_ends_the_making(tmp_path, monkeypatch):

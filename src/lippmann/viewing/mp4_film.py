@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
@@ -53,7 +54,7 @@ _QUIET = "log-level=error"
 #: Encoders look few frames ahead and keep few for reference: each takes 17 MB of a quilt of 3360 x 3360 pixels,
 #: 100 MB of one of 8192 x 8192, several times over. libx265 has no B-frames: of a film of two frames it gave decoding
 #: times that it never set.
-_LEAN = {"rc-lookahead": "1", "refs": "1", "bf": "1", "thread_type": "slice"}
+_LEAN = {"rc-lookahead": "1", "refs": "1", "bf": "0", "thread_type": "slice"}
 _LEAN_HEVC = f"{_QUIET}:rc-lookahead=1:ref=1:bframes=0:frame-threads=1"
 _LEAN_VP9 = {"deadline": "good", "row-mt": "1", "lag-in-frames": "0"}
 #: SVT-AV1's own groups of 32 frames take 1.9 GB of such quilts, groups of 4 without looking ahead 0.7 GB.
@@ -108,8 +109,6 @@ def check_film(place: Path, size: tuple[int, int], codec: Codec, *, exact: bool 
     UsageError
         Each pixel counts, and the codec mixes colours of neighbours.
     """
-    import av
-
     encoder = _ENCODERS[codec]
     if exact and not encoder.is_exact:
         raise UsageError(
@@ -118,11 +117,11 @@ def check_film(place: Path, size: tuple[int, int], codec: Codec, *, exact: bool 
             rule="behind lenses each pixel counts",
             fix="take h264-rgb or vp9-rgb",
         )
-    try:
-        av.codec.Codec(encoder.name, "w")
-    except av.codec.codec.UnknownCodecError:
+    if not _is_built_in(encoder):
         rule = f"PyAV as it is installed has no {encoder.name}"
-        raise OutputError("the codec is not installed", where=str(place), rule=rule, fix="write H.264") from None
+        others = [name for name, other in _ENCODERS.items() if _is_built_in(other)]
+        fix = f"take {' or '.join(others)}" if others else "write an animation (.png)"
+        raise OutputError(f"the codec {codec} is not installed", where=str(place), rule=rule, fix=fix)
     if max(size) > encoder.widest:
         raise OutputError(
             f"a film of {size[0]} x {size[1]} pixels",
@@ -130,6 +129,16 @@ def check_film(place: Path, size: tuple[int, int], codec: Codec, *, exact: bool 
             rule=f"{codec} takes sides of at most {encoder.widest}",
             fix="choose another codec, or make the frames smaller",
         )
+
+
+def _is_built_in(encoder: _Encoder) -> bool:
+    import av
+
+    try:
+        av.codec.Codec(encoder.name, "w")
+    except av.codec.codec.UnknownCodecError:
+        return False
+    return True
 
 
 def write_mp4(
@@ -155,8 +164,10 @@ def write_mp4(
             container.metadata["title"] = place.stem
             if quilt is not None:
                 container.metadata["comment"] = layout_text(quilt)
-            for number, codes in enumerate(frames):
-                if number == 0:
+            stream: Any = None
+            numbers = count()  # enumerate would hold a frame while the next is waited for
+            for codes in frames:
+                if stream is None:
                     size = codes.shape[1], codes.shape[0]
                     codec = codec_for(size, codec)
                     check_film(place, size, codec)
@@ -166,7 +177,7 @@ def write_mp4(
                     _open(stream.codec_context, encoder, (frame.width, frame.height))
                 else:
                     frame = _frame(codes, encoder, quilt)
-                frame.pts, frame.time_base = number, 1 / rate
+                frame.pts, frame.time_base = next(numbers), 1 / rate
                 container.mux(stream.encode(frame))
                 del frame, codes  # while the next is waited for
             container.mux(stream.encode())
