@@ -253,9 +253,7 @@ def test_what_is_not_honoured_is_noted(material, picture):
 @pytest.mark.parametrize(
     ("statements", "message"),
     [
-        ("Kd 1 0 0\nmap_Kd none.png\n", r"m\.mtl:3: texture 'none\.png' not found"),
         ("map_Kd\n", r"m\.mtl:2: map_Kd without a file"),
-        ("map_Kd -s 1 1\n", r"m\.mtl:2: texture '1' not found"),
         ("bump -bm x y.png\n", r"m\.mtl:2: 'bump -bm x y\.png'; -bm takes"),
         ("bump -bm 1\n", r"m\.mtl:2: 'bump -bm 1'; -bm takes"),
         ("Kd 1 0 nan\n", r"m\.mtl:2: 'Kd 1 0 nan'; Kd takes finite numbers"),
@@ -267,6 +265,21 @@ def test_what_is_not_honoured_is_noted(material, picture):
 def test_bad_statements(material, statements, message):
     with pytest.raises(SceneError, match=message):
         material(statements)
+
+
+@pytest.mark.parametrize(
+    ("statements", "color"), [("Kd 1 0 0", (1.0, 0.0, 0.0)), ("Kd 0 0 0", (0.8, 0.8, 0.8)), ("Ns 1", (0.8, 0.8, 0.8))]
+)
+def test_missing_textures_are_named_and_left_out(material, statements, color):
+    statements += "\nKe 0 0 0\nmap_Kd none.png\nmap_Ke none.png\nmap_d -s 1 1\nnorm none.png\n"
+    left = material(statements)
+    assert left.base_color == pytest.approx(color)
+    assert left.emission == (0.0, 0.0, 0.0)
+    assert left.alpha_mode == "opaque"
+    assert left.base_color_texture is left.emission_texture is left.normal_texture is None
+    notes = material(statements, notes=True)
+    assert "m.mtl:4: texture 'none.png' not found: shown without it" in notes
+    assert "m.mtl:6: texture '1' not found: shown without it" in notes
 
 
 def test_a_damaged_texture_is_named_with_its_line(material, tmp_path):

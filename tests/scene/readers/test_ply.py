@@ -272,8 +272,9 @@ def test_bad_files(read, data, message):
 def test_a_missing_texture(read):
     comment = "comment TextureFile none.png\n"
     data = text_file().replace(b"element vertex", comment.encode() + b"element vertex")
-    with pytest.raises(SceneError, match=r"model\.ply: texture 'none\.png' not found"):
-        read(data)
+    scene = read(data)
+    assert "model.ply: texture 'none.png' not found: shown without it" in scene.notes
+    assert [material.base_color_texture for material in scene.materials] == [None]
 
 
 @pytest.mark.parametrize("numbered", [True, False])

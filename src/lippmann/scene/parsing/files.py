@@ -39,6 +39,10 @@ _NAMING_FILES = frozenset(
 class MissingFileError(SceneError):
     """A file that a scene file names and that is not found."""
 
+    def note(self, consequence: str) -> str:
+        """The line that says what is missing, where it is named, and what is shown instead."""
+        return f"{self.where}: {self.what}{f' ({self.fix})' if self.fix else ''}: {consequence}"
+
 
 def read_bytes(path: Path, most: int = -1) -> bytes:
     """A scene file, or its first ``most`` bytes.
@@ -257,7 +261,7 @@ def _near_miss(path: Path, *, asset: bool = False) -> str:
         entries = [Path(entry.name) for entry in path.parent.iterdir() if entry.is_file()]
         names = sorted(entry.name for entry in entries if entry.suffix.lower() not in foreign)
     except OSError:
-        return f"there is no folder '{path.parent}'"
+        return f"there is no folder '{path.parent.name if asset else path.parent}'"
     folded = {name.casefold(): name for name in names}
     close = difflib.get_close_matches(path.name.casefold(), folded, n=1, cutoff=0.75)
     return f"is '{folded[close[0]]}' meant?" if close else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,8 @@ from lippmann.errors import PictureError, SceneError
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.values.description import Environment
 
-#: Channels of red, green and blue: luminance alone is grey.
-_COLORS = (("R", "G", "B"), ("Y", "Y", "Y"))
+#: Channels of red, green and blue: luminance or red alone is grey.
+_COLORS = (("R", "G", "B"), ("Y", "Y", "Y"), ("R", "R", "R"))
 
 
 def read_environment(path: Path) -> Environment:
@@ -26,39 +27,56 @@ def read_environment(path: Path) -> Environment:
         The file is missing, damaged or neither EXR nor HDR; it has no three colours; a value is negative, not finite
         or beyond 32-bit floats; it is less than two pixels high or wide, or not about twice as wide as high.
     """
-    data = read_bytes(path)
-    where = path.name
-    notes: tuple[str, ...] = ()
-    if data.startswith(SIGNATURE):
-        pixels, of_header = _read_exr(path, where)
-        notes = tuple(f"{where}: {note}" for note in of_header)
-    elif data.startswith(radiance.MAGICS):
-        pixels = _read_hdr(data, where)
-    else:
-        raise SceneError("is no environment picture", where=where, rule="OpenEXR (.exr) and Radiance (.hdr) are read")
-    _check(pixels, where)
+    pixels, notes = read_linear(path, check_size=lambda height, width: _check_size(height, width, path.name))
+    _check(pixels, path.name)
     return Environment(pixels, name=path.name, notes=notes)
 
 
-def _read_exr(path: Path, where: str) -> tuple[NDArray[np.float32], tuple[str, ...]]:
+def read_linear(
+    path: Path, *, check_size: Callable[[int, int], None] = lambda height, width: None
+) -> tuple[NDArray[np.float32], tuple[str, ...]]:
+    """Linear pixels ``(h, w, 3)`` of an OpenEXR or Radiance picture in the primaries of Rec. 709, and notes.
+
+    Parameters
+    ----------
+    check_size:
+        Is given height and width before the pixels are decoded, and may raise.
+
+    Raises
+    ------
+    SceneError
+        The file is missing, damaged or neither EXR nor HDR, or has no three colours.
+    """
+    data, where = read_bytes(path), path.name
+    if data.startswith(SIGNATURE):
+        return _read_exr(path, where, check_size)
+    if data.startswith(radiance.MAGICS):
+        return _read_hdr(data, where, check_size), ()
+    raise SceneError("is no environment picture", where=where, rule="OpenEXR (.exr) and Radiance (.hdr) are read")
+
+
+def _read_exr(
+    path: Path, where: str, check_size: Callable[[int, int], None]
+) -> tuple[NDArray[np.float32], tuple[str, ...]]:
     try:
         header = read_exr_header(path)
         names = next((names for names in _COLORS if set(names) <= header.channels.keys()), None)
         if names is None:
             held = ", ".join(sorted(header.channels))
             raise SceneError(f"has the channels {held}", where=where, rule="R, G and B are needed")
-        _check_size(header.height, header.width, where)
+        check_size(header.height, header.width)
         channels = read_exr(path, header)
         pixels = np.stack([np.asarray(channels[name], np.float32) for name in names], axis=-1)
-        return pixels if names == ("Y", "Y", "Y") else header.rec709(pixels), header.notes
+        notes = tuple(f"{where}: {note}" for note in header.notes)
+        return pixels if len(set(names)) == 1 else header.rec709(pixels), notes
     except PictureError as error:
         raise _undecodable(error.what, where) from None
 
 
-def _read_hdr(data: bytes, where: str) -> NDArray[np.float32]:
+def _read_hdr(data: bytes, where: str, check_size: Callable[[int, int], None]) -> NDArray[np.float32]:
     try:
         header = radiance.read_header(data, where)
-        _check_size(header.height, header.width, where)
+        check_size(header.height, header.width)
         return radiance.read_radiance(data, header, where)
     except PictureError as error:
         raise SceneError(error.what, where=where, fix=error.fix) from None

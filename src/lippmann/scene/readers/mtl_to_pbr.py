@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.scene.parsing import texture_maps
-from lippmann.scene.parsing.files import NamedFiles, read_image
+from lippmann.scene.parsing.files import MissingFileError, NamedFiles, read_image
 from lippmann.scene.readers.mtl import MapReference, MtlRecord
 from lippmann.scene.values.description import Color, Image, Material, Texture, Wrap
 
@@ -48,8 +48,9 @@ class MaterialMapper:
         Raises
         ------
         SceneError
-            A texture is missing or damaged; the error names the file and line that ask for it.
+            A texture is damaged; the error names the file and line that ask for it.
         """
+        record = self._without_missing_maps(record)
         if record.remark:
             self._note_once(record.remark)
         if record.ignored:
@@ -72,6 +73,20 @@ class MaterialMapper:
         material = self._with_opacity(material, record, illum)
         material = self._with_relief(material, record)
         return self._with_coats(material, record)
+
+    def _without_missing_maps(self, record: MtlRecord) -> MtlRecord:
+        """The record without maps whose files are missing, each with a note, and without factors of 0 beside them."""
+        maps, numbers = dict(record.maps), dict(record.numbers)
+        for key, reference in record.maps.items():
+            try:
+                self._path(reference)
+            except MissingFileError as error:
+                self._note_once(error.note("shown without it"))
+                del maps[key]
+                factor = key.removeprefix("map_")
+                if max(numbers.get(factor, (1.0,))) <= 0.0:
+                    del numbers[factor]
+        return replace(record, maps=maps, numbers=numbers)
 
     def _with_highlight(self, material: Material, record: MtlRecord, illum: int) -> Material:
         physical = bool({"pr", "pm"} & set(record.numbers) or {"map_pr", "map_pm"} & set(record.maps))
@@ -203,8 +218,11 @@ class MaterialMapper:
             self._note(record, f"{key.capitalize()} above 1 is taken as 1")
         return _clip(color, 1.0 if clip else np.inf)
 
+    def _path(self, reference: MapReference) -> Path:
+        return self._named.find_on_line(reference.file, where=reference.where, what="texture")
+
     def _texture(self, reference: MapReference, *, srgb: bool) -> Texture:
-        path = self._named.find_on_line(reference.file, where=reference.where, what="texture")
+        path = self._path(reference)
         if path not in self._images:
             self._images[path] = read_image(path, where=reference.where)
         ignored = sorted(set(reference.options) & {"-mm", "-t", "-cc"})

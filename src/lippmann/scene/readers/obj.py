@@ -96,7 +96,7 @@ def read_obj(path: Path, *, files: NamedFiles | None = None) -> SceneDescription
     Raises
     ------
     SceneError
-        The file is missing, cut short or malformed; an index or texture is not found.
+        The file is missing, cut short or malformed; an index is not found.
     """
     where = path.name
     statements = _split_statements(decode_text(read_bytes(path), where), where)
@@ -373,8 +373,7 @@ def _read_libraries(libraries: Lines, file: str, named: NamedFiles) -> tuple[dic
             try:
                 library = named.find(name, where=where, what="material library")
             except MissingFileError as error:
-                hint = f" ({error.fix})" if error.fix else ""
-                notes.append(f"{where}: {error.what}{hint}: its materials are plain grey")
+                notes.append(error.note("its materials are plain grey"))
                 continue
             for key, record in parse_mtl(library).items():
                 records.setdefault(key, record)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.far_origin import near_origin
-from lippmann.scene.parsing.files import NamedFiles, read_bytes, read_image
+from lippmann.scene.parsing.files import MissingFileError, NamedFiles, read_bytes, read_image
 from lippmann.scene.parsing.ply_body import Columns, Integers, Lists, Numbers, read_body
 from lippmann.scene.parsing.ply_header import Element, read_header
 from lippmann.scene.parsing.triangulation import triangulate
@@ -76,8 +76,13 @@ def read_ply(path: Path, *, files: NamedFiles | None = None) -> SceneDescription
         notes.append("colours of faces are not shown: vertices have their own")
     textures: list[Texture | None] = []
     for name in header.textures:
-        image = NamedFiles.of(path, files).find(name, where=where, what="texture")
-        textures.append(Texture(read_image(image, where=where), srgb=True))
+        try:
+            image = NamedFiles.of(path, files).find(name, where=where, what="texture")
+        except MissingFileError as error:
+            notes.append(error.note("shown without it"))
+            textures.append(None)
+        else:
+            textures.append(Texture(read_image(image, where=where), srgb=True))
     if textures and not mesh.uvs:
         notes.append("the texture is not used: the file gives no texture coordinates")
         textures = []

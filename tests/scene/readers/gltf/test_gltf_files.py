@@ -170,12 +170,17 @@ def test_absent_buffer_is_named(writer, tmp_path):
         read_gltf(path)
 
 
-def test_absent_texture_is_named(writer, read):
+def test_absent_textures_are_named_and_left_out(writer, read):
     image = writer.add("images", uri="wood.png")
     texture = writer.add("textures", source=image)
-    writer.add("materials", normalTexture={"index": texture})
+    writer.add(
+        "materials", normalTexture={"index": texture}, emissiveTexture={"index": texture}, emissiveFactor=[1, 1, 1]
+    )
     writer.triangle(material=0)
-    assert "texture 'wood.png' not found" in _refusal(read, writer)
+    scene = read(writer)
+    assert list(scene.notes) == ["texture 'wood.png' not found: shown without it (textures[0])"]
+    assert scene.materials[0].normal_texture is scene.materials[0].emission_texture is None
+    assert scene.materials[0].emission == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image as Pillow
 
+from lippmann.codecs.exr import write_exr
 from lippmann.errors import SceneError
 
 from .conftest import HEAD
@@ -246,6 +247,32 @@ def test_transformed_coordinates_of_another_set(read):
     assert (u, 1 - v) == pytest.approx((-0.75 + 0.125, 1 + 0.25))
 
 
+@pytest.mark.parametrize(
+    ("more", "color"), [("", (0.18, 0.18, 0.18)), ("float4 inputs:fallback = (1, 0, 0.5, 1)", (1.0, 0.0, 0.5))]
+)
+def test_missing_textures_leave_the_fallback(read, more, color):
+    inputs = "color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>"
+    scene = read(surface(inputs, texture(file="none.png", more=more)))
+    assert "stage.usda: texture 'none.png' not found: shown without it" in scene.notes
+    assert scene.materials[0].base_color == pytest.approx(color)
+    assert scene.materials[0].base_color_texture is None
+
+
+@pytest.mark.parametrize("names", ["RGB", "R", "Y"])
+def test_pictures_of_light_are_linear_textures(read, tmp_path, names):
+    values = np.array([[0.5, 2.0]], np.float32)
+    write_exr(tmp_path / "light.exr", dict.fromkeys(names, values), text={})
+    inputs = (
+        "color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>\n"
+        "color3f inputs:emissiveColor.connect = </mat/t.outputs:rgb>"
+    )
+    scene = read(surface(inputs, texture(file="t.exr")), files={"t.exr": (tmp_path / "light.exr").read_bytes()})
+    base, emission = scene.materials[0].base_color_texture, scene.materials[0].emission_texture
+    assert (base.srgb, emission.srgb) == (False, False)
+    assert emission.image.pixels == pytest.approx(np.repeat(values[..., None], 3, axis=2))
+    assert base.image.pixels == pytest.approx(np.minimum(emission.image.pixels, 1.0))  # no surface adds light
+
+
 def test_other_surfaces_are_named(read):
     scene = read(surface("").replace("UsdPreviewSurface", "ND_lama_surface"))
     assert scene.notes == [
@@ -257,7 +284,6 @@ def test_other_surfaces_are_named(read):
 @pytest.mark.parametrize(
     ("file", "line"),
     [
-        ("none.png", "stage.usda: texture 'none.png' not found"),
         (
             "../../secret.png",
             "stage.usda: texture '../../secret.png' lies outside the scene's folder; a scene file may",

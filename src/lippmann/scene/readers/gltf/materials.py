@@ -149,14 +149,16 @@ class Materials:
         extension = fields.extension("KHR_materials_emissive_strength")
         if extension is not None:
             strength = extension.number("emissiveStrength", 1.0, minimum=0.0)
-        emission = self._fractions(fields, "emissiveFactor", _BLACK)
+        emission_texture = self.textures.read(fields, "emissiveTexture", srgb=True)
+        is_lost = emission_texture is None and fields.has("emissiveTexture")  # the factor alone would light all of it
+        emission = _BLACK if is_lost else self._fractions(fields, "emissiveFactor", _BLACK)
         if fields.has("occlusionTexture"):
             self.document.notes.add("occlusion textures are left out: light is traced into corners", fields.place)
         return {
             "normal_texture": self.textures.read(fields, "normalTexture"),
             "normal_scale": 1.0 if normal is None else normal.number("scale", 1.0),
             "emission": (emission[0] * strength, emission[1] * strength, emission[2] * strength),
-            "emission_texture": self.textures.read(fields, "emissiveTexture", srgb=True),
+            "emission_texture": emission_texture,
             "alpha_mode": _ALPHA_MODES[mode],
             "alpha_cutoff": fields.number("alphaCutoff", 0.5, minimum=0.0),
             "double_sided": fields.flag("doubleSided"),

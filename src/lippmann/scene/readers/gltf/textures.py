@@ -9,7 +9,7 @@ import numpy as np
 
 from lippmann.codecs.ktx2 import IDENTIFIER, Ktx2Error, decode_ktx2
 from lippmann.errors import SceneError
-from lippmann.scene.parsing.files import decode_image
+from lippmann.scene.parsing.files import MissingFileError, decode_image
 from lippmann.scene.readers.gltf.buffers import Buffers, read_uri
 from lippmann.scene.readers.gltf.document import BASISU, Document, texture_extension_is_readable
 from lippmann.scene.readers.gltf.json_fields import Fields
@@ -32,7 +32,7 @@ class Textures:
     _files: dict[str, Image] = field(default_factory=dict)
 
     def read(self, owner: Fields, key: str, *, srgb: bool = False) -> Texture | None:
-        """The texture that member ``key`` of a material points to, or None without one.
+        """The texture that member ``key`` of a material points to; None without one, or, with a note, without its file.
 
         Parameters
         ----------
@@ -42,7 +42,7 @@ class Textures:
         Raises
         ------
         SceneError
-            A reference leads nowhere, or the image is absent or damaged.
+            A reference leads nowhere, or the image is damaged.
         """
         info = owner.child(key)
         if info is None:
@@ -53,6 +53,11 @@ class Textures:
         if source is None:
             self.document.notes.add("a texture has no image that is understood and is left out", fields.place)
             return None
+        try:
+            image = self._image(source)
+        except MissingFileError as error:
+            self.document.notes.add(f"{error.what}: shown without it", fields.place)
+            return None
         wrap_u, wrap_v, texel_filter = self._sampler(fields)
         transform = info.extension("KHR_texture_transform")
         uv_set = info.optional_integer("texCoord") or 0
@@ -61,7 +66,7 @@ class Textures:
         if uv_set >= _MOST_UV_SETS:
             raise info.error("texCoord", f"up to {_MOST_UV_SETS} sets of texture coordinates are understood")
         return Texture(
-            image=self._image(source),
+            image=image,
             srgb=srgb,
             wrap_u=wrap_u,
             wrap_v=wrap_v,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,7 +18,7 @@ from lippmann.runtime.atomic_write import scratch_folder
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import MissingFileError, NamedFiles, decode_image, read_bytes
 from lippmann.scene.parsing.texture_maps import unit
-from lippmann.scene.readers.environment_map import read_environment
+from lippmann.scene.readers.environment_map import read_environment, read_linear
 from lippmann.scene.readers.usd.records import Record
 from lippmann.scene.values.description import Image
 
@@ -27,6 +29,7 @@ _DEEPEST = 4
 
 #: Pictures of light, whose values are not bounded.
 _LIGHT_SUFFIXES = (".exr", ".hdr")
+_WHITE_SKY = np.ones((2, 4, 3), np.float32)
 
 
 def check_package(path: Path) -> None:
@@ -66,16 +69,22 @@ class Assets:
     _images: dict[str, Image | None] = field(default_factory=dict)
 
     def image(self, asset: Record) -> Image | None:
-        """A texture; None, with a note, of one in tiles (``<UDIM>``).
+        """A texture; None, with a note, of one in tiles (``<UDIM>``) and of one that is not found.
+
+        Pictures of light (OpenEXR, Radiance) are linear float32, finite and not negative.
 
         Raises
         ------
         SceneError
-            It is not found, lies outside the stage's folder, or cannot be decoded.
+            It lies outside the stage's folder, or cannot be decoded.
         """
         key = asset["found"] or f"{asset['folder']}\0{asset['name']}"
         if key not in self._images:
-            self._images[key] = self._load(asset)
+            try:
+                self._images[key] = self._load(asset)
+            except MissingFileError as error:
+                self.notes[error.note("shown without it")] = None
+                self._images[key] = None
         return self._images[key]
 
     def _load(self, asset: Record) -> Image | None:
@@ -84,12 +93,16 @@ class Assets:
             self.notes[f"texture '{name}' is in tiles, which are not read"] = None
             return None
         if name.lower().endswith(_LIGHT_SUFFIXES):
-            self.notes[f"texture '{name}' is a picture of light, which surfaces do not take, and is left out"] = None
-            return None
+            with self._file(asset) as path:
+                pixels, notes = read_linear(path)
+            self.notes.update(dict.fromkeys(notes))
+            return Image(path.name, np.maximum(np.nan_to_num(pixels, posinf=0.0, neginf=0.0), 0.0))
         return decode_image(self._bytes(asset), Path(name).name, where=self.stage.name)
 
     def environment(self, asset: Record) -> NDArray[np.float32]:
         """The pixels ``(h, w, 3)`` of a picture of the surroundings, linear; an ordinary one is sRGB-coded.
+
+        White, with a note, where it is not found.
 
         Raises
         ------
@@ -97,23 +110,31 @@ class Assets:
             As :meth:`image`, and as :func:`lippmann.scene.readers.environment_map.read_environment`.
         """
         if asset["name"].lower().endswith(_LIGHT_SUFFIXES):
-            path = self._path(asset)
-            if path is not None:
-                return self._sky(path)
-            with scratch_folder("lippmann-usd-") as folder:
-                path = Path(folder) / Path(asset["name"]).name
-                path.write_bytes(self._bytes(asset))
-                return self._sky(path)
+            try:
+                with self._file(asset) as path:
+                    sky = read_environment(path)
+            except MissingFileError as error:
+                self.notes[error.note("white light in its place")] = None
+                return _WHITE_SKY
+            self.notes.update(dict.fromkeys(sky.notes))
+            return sky.pixels
         image = self.image(asset)
         if image is None:
-            return np.ones((2, 4, 3), np.float32)
+            return _WHITE_SKY
         values = unit(image)[..., :3]
         return np.asarray(decode_srgb(np.broadcast_to(values, (*values.shape[:2], 3))), np.float32)
 
-    def _sky(self, path: Path) -> NDArray[np.float32]:
-        sky = read_environment(path)
-        self.notes.update(dict.fromkeys(sky.notes))
-        return sky.pixels
+    @contextmanager
+    def _file(self, asset: Record) -> Iterator[Path]:
+        """The file of a picture, while it is needed: a copy of one within a package."""
+        path = self._path(asset)
+        if path is not None:
+            yield path
+            return
+        with scratch_folder("lippmann-usd-") as folder:
+            path = Path(folder) / Path(asset["name"]).name
+            path.write_bytes(self._bytes(asset))
+            yield path
 
     def _path(self, asset: Record) -> Path | None:
         """The file; None of one within a package."""

@@ -63,7 +63,7 @@ class LightReader:
         Raises
         ------
         SceneError
-            A texture is missing or damaged.
+            A texture is damaged.
         """
         kind = record["kind"]
         if kind is None:

@@ -60,7 +60,7 @@ class SurfaceReader:
         Raises
         ------
         SceneError
-            A texture is missing or damaged.
+            A texture is damaged.
         """
         self._uv_names = []
         inputs = record["inputs"]
@@ -167,7 +167,7 @@ class SurfaceReader:
             return min(max(_scalar_of(value, default), 0.0), 1.0), None
         texture = self._texture(source)
         if texture is None:
-            return min(max(_fallback(source["texture"])[0], 0.0), 1.0), None
+            return min(max(_fallback(source["texture"], default)[0], 0.0), 1.0), None
         values = _values(texture, source["texture"], self._is_srgb(source["texture"], texture.image))
         channel = min(_CHANNELS.get(source["channel"], 0), values.shape[2] - 1)
         plane = np.clip(values[..., channel : channel + 1], 0.0, 1.0)
@@ -184,9 +184,11 @@ class SurfaceReader:
             return _color_of(source, default), None
         texture = self._texture(source)
         if texture is None:
-            red, green, blue, _ = _fallback(source["texture"])
+            red, green, blue, _ = _fallback(source["texture"], *default)
             return (max(red, 0.0), max(green, 0.0), max(blue, 0.0)), None
         srgb = self._is_srgb(source["texture"], texture.image)
+        if texture.image.pixels.dtype != np.uint8 and name != "emissiveColor":  # linear light may exceed 1
+            texture = replace(texture, image=replace(texture.image, pixels=np.minimum(texture.image.pixels, 1.0)))
         scale, bias = _scale_bias(source["texture"])
         pixels = texture.image.pixels
         whole = source["channel"] in ("rgb", "") or pixels.shape[2] == 1
@@ -317,9 +319,10 @@ def _scale_bias(node: Record) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return _numbers(node.get("scale"), 4, 1.0), _numbers(node.get("bias"), 4, 0.0)
 
 
-def _fallback(node: Record) -> tuple[float, ...]:
+def _fallback(node: Record, *default: float) -> tuple[float, ...]:
+    """The colour in place of a picture: the node's own, else the input's default, as the schema's black hides shape."""
     given = node.get("fallback")
-    return _numbers(given, 4, 0.0) if given is not None else (0.0, 0.0, 0.0, 1.0)
+    return _numbers(given, 4, 0.0) if given is not None else (*default, 1.0)
 
 
 def _numbers(source: Record | None, count: int, default: float) -> tuple[float, ...]:

@@ -70,7 +70,7 @@ def describe(tree: Record, arrays: Sequence[NDArray[np.generic]], path: Path, as
     Raises
     ------
     SceneError
-        A mesh does not fit itself, a texture is missing or damaged, or nothing is shown.
+        A mesh does not fit itself, a texture is damaged, or nothing is shown.
     """
     notes: dict[str, None] = dict.fromkeys(tree["notes"])
     scene_from_stage = _scene_from_stage(tree, path)
