@@ -142,7 +142,7 @@ def _parts(
     power = TUNING.neighbour_power
     around = np.maximum(apart, least) ** (1 - power) * np.maximum(near, least) ** power
     around *= mean / float((around * count).sum() / count.sum())
-    # The second moment of one part is noisy itself: that of all parts, in proportion, is a prior.
+    # The second moment of a single part is a noisy estimate: it is shrunk towards that of all parts together.
     overall = float(errors.squares.sum()) / float((np.square(around) * count).sum())
     noise = (errors.squares + TUNING.prior_pixels * overall * np.square(around)) / (count + TUNING.prior_pixels) / count
     measured = errors.values / count

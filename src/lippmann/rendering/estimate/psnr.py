@@ -254,7 +254,7 @@ def estimate_plain(sums: ErrorSums, grid: tuple[int, int]) -> Estimate:
     ends = average * math.exp(spread) * doubt, average * math.exp(-spread) * (1 - sums.share_less(average))
 
     mean = sums.values / count
-    # The second moment of one part is noisy itself: its neighbours' is a prior.
+    # The second moment of a single part is a noisy estimate: it is shrunk towards that of its neighbours.
     (near, squares_near), neighbours = neighbourhood(np.stack([mean, squares / count]), index, grid)
     noise = (squares + TUNING.prior_pixels * squares_near) / (count + TUNING.prior_pixels) / count
     # Means of neighbours are shrunk towards the mean of all, and each part towards its neighbours.

@@ -125,7 +125,7 @@ def _trace_tile(
     """Sums over the samples of one pass, for every pixel and channel in the order of lanes: colours, world-space
     normals, heights, and hits of any surface by the first and by the second half of all passes' samples."""
     lanes = tile.rows * plan.width * plan.channels * run.count
-    # Lanes are those of a picture.
+    # Pixels, streams and the order of lanes are the same as for a wavefront of paths.
     pixels, stream = samples_of_tile(source, plan, tile, run, seed, box_filter)
     ray = pixels.ray(stream)
     albedo, normal, distance, covered = surfaces.features(ray)

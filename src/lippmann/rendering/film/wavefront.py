@@ -86,8 +86,8 @@ class Frame:
         Further layers ``(height, width)`` of the methods that have any.
     shares:
         Shares of pixels that were traced, reprojected and interpolated; empty where all were traced.
-    seen, excess:
-        The specular light in ``pixels`` and its excess; None where they are not separated.
+    specular, excess:
+        Specular light in ``pixels``, and its part above the clamp on single chains; None where not separated.
     coverage:
         Coverage of the pixels by surfaces; None where it is not known.
     """

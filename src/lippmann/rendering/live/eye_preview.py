@@ -40,8 +40,8 @@ def render_eye_preview(
     eye:
         Its place in the display's frame, mm.
     request:
-        Of a whole picture. Only ``full`` light is traced, whatever the method. Its noise is taken out where ``denoise``
-        asks for that; left "auto", where light is sampled.
+        Of a whole picture. The method is always ``full``. The view is denoised if ``denoise`` asks for it, or is "auto"
+        and the integrator samples light.
     size:
         Width and height that the picture, which has the panel's shape, keeps to.
 

@@ -134,7 +134,7 @@ def _has_place(emitters: list[mi.Emitter]) -> NDArray[np.bool_]:
 
 
 def _region_about(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Corners ``(2, 3)`` of a box about points ``(n, 3)`` that are seen, wider by its longest side; None for none."""
+    """Corners ``(2, 3)`` of the box of visible points ``(n, 3)``, outliers apart, padded; None without points."""
     if not len(points):
         return None
     corners: NDArray[np.float64] = np.quantile(points, [NEAR_SHARE, 1 - NEAR_SHARE], axis=0)

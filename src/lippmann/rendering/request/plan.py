@@ -45,7 +45,7 @@ def make_plan(
     Raises
     ------
     UsageError, PictureError
-        The request cannot be rendered as it asks.
+        An option of the request does not fit the scene.
     """
     if scene.lies_off_surfaces:
         check_off_surfaces(request, scene)
