@@ -209,10 +209,11 @@ def test_bounds_in_another_frame_are_those_of_the_vertices():
     assert scene.bounds_in(eighth) == pytest.approx(np.stack([corners.min(axis=0), corners.max(axis=0)]))
 
 
+@pytest.mark.parametrize("share", [0.0, 0.03])
 @pytest.mark.parametrize(("thin", "toward"), [(0, (1, 0, 0)), (1, (0, 1, 0)), (2, (0, 0, 1))])
-def test_a_flat_scene_is_framed_from_its_face(thin, toward):
+def test_a_flat_scene_is_framed_from_its_face(thin, toward, share):
     size = np.array([2.0, 3.0, 4.0])
-    size[thin] = 0.0
+    size[thin] *= share
     bounds = np.stack([-size / 2, size / 2]) + np.array([1.0, -2.0, 0.5])
     camera = framing_camera(bounds)
     frame = camera.world_from_camera
@@ -224,6 +225,6 @@ def test_a_flat_scene_is_framed_from_its_face(thin, toward):
 
 
 def test_scenes_with_a_depth_are_framed_from_the_front():
-    for size in ((2.0, 3.0, 4.0), (0.1, 3.0, 4.0), (0.0, 0.0, 2.0), (0.0, 1.0, 0.001)):
+    for size in ((2.0, 3.0, 4.0), (0.2, 3.0, 4.0), (0.0, 0.0, 2.0), (0.0, 1.0, 0.001)):
         bounds = np.stack([-np.array(size) / 2, np.array(size) / 2])
         np.testing.assert_allclose(framing_camera(bounds).world_from_camera[:3, 2], (0, 0, 1))

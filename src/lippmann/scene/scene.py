@@ -48,7 +48,9 @@ _EXACT_VERTICES = 20_000_000
 _POINTS_AT_A_TIME = 1 << 20
 _FRAMING_FOV = np.radians(30.0)
 # A scene is flat along an axis where it is thinner than this share of its other sides.
-_FLAT = 0.01
+_FLAT = 0.05
+# A side below this share of another is no side: such scenes are lines.
+_LINE = 0.01
 
 # A box smaller than this share of its largest coordinate is a single point: a rotation's rounding, a few units in the
 # last place of double precision, leaves nothing of its extent.
@@ -323,12 +325,12 @@ def find_camera(cameras: Sequence[Camera], name: str) -> Camera:
 def thin_axis(bounds: Bounds) -> int | None:
     """The axis, 0 for x or 1 for y, along which a scene is flat, so that it is seen edge-on from +z; None if it is not.
 
-    Flat is a box less than a hundredth as thick as it is wide along both other axes; a line is not.
+    Flat is a box less than a twentieth as thick as it is wide along both other axes; a line is not.
     """
     _, size = box(bounds)
     axis = int(np.argmin(size))
     narrow, wide = sorted(np.delete(size, axis))
-    return axis if axis != 2 and size[axis] < _FLAT * narrow and narrow > _FLAT * wide else None
+    return axis if axis != 2 and size[axis] < _FLAT * narrow and narrow > _LINE * wide else None
 
 
 def framing_camera(bounds: Bounds) -> Camera:

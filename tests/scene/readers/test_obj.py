@@ -267,12 +267,12 @@ def test_indices_into_tables_that_the_file_lacks_are_dropped(tmp_path):
             SQUARE + "f 1 2 99999999999999999999\n",
             r"model\.obj:5: face .*9{8}|model\.obj:5: face uses vertex 9223372036854775807",
         ),
-        (SQUARE, r"model\.obj: holds no faces, lines or points; points are drawn where 'p' names them"),
         (SQUARE + "l 1 1\n", r"model\.obj: holds nothing but lines without length"),
         (SQUARE + "f 1 2 3\np 5\n", r"model\.obj:6: '5' is no vertex; the file has 1 to 4"),
         (SQUARE + "f 1 2 3\nl 1 x\n", r"model\.obj:6: 'x' is no vertex; the file has 1 to 4"),
         (SQUARE + "f 1 2 3\nl 1 -5\n", r"model\.obj:6: index -5 counts back beyond the first of 4 entries"),
         ("p 1\n", r"model\.obj:1: '1' is no vertex; the file has no vertex"),
+        (SQUARE + "vt 0 0\n", r"model\.obj: holds no faces, lines or points; is it cut short\?"),
         ("# nothing\n", r"model\.obj: holds no faces, lines or points; is it an OBJ file\?"),
         ("<html>\n", r"model\.obj: holds no faces, lines or points; is it an OBJ file\?"),
         (SQUARE + "f 1 2 \\", r"model\.obj:5: the file ends in a continued line"),
@@ -288,16 +288,37 @@ def test_bad_files(read, text, message):
 
 
 def test_every_cut_short_file_is_refused_or_whole(read):
-    """A file cut anywhere gives an error, or fewer whole faces: never a wild one."""
+    """A file cut anywhere gives an error, its vertices as a cloud, or fewer whole faces: never a wild one."""
     text = SQUARE + "vt 0 0\nvn 0 0 1\n" + "f 1/1/1 2/1/1 3/1/1 4/1/1\n" * 3
     whole = corner_positions(read(text).meshes[0])
     outcomes = set()
     for end in range(len(text)):
         try:
-            found = corner_positions(read(text[:end]).meshes[0])
+            scene = read(text[:end])
         except SceneError:
             outcomes.add("refused")
+            continue
+        if any(note.startswith("points are drawn as balls") for note in scene.notes):
+            outcomes.add("cloud")
+            assert end <= len(SQUARE) + 1
         else:
             outcomes.add("shorter")
+            found = corner_positions(scene.meshes[0])
             assert (found == whole[: len(found)]).all()
-    assert outcomes == {"refused", "shorter"}
+    assert outcomes == {"refused", "cloud", "shorter"}
+
+
+@pytest.mark.parametrize("colored", [True, False])
+def test_vertices_alone_are_a_cloud(tmp_path, colored):
+    colors = [" 1 0 0", " 0 1 0"] if colored else ["", ""]
+    path = tmp_path / "cloud.obj"
+    path.write_text(f"v 0 0 0{colors[0]}\nv 1 2 3{colors[1]}\n")
+    scene = read_obj(path)
+    assert any(note.startswith("points are drawn as balls") for note in scene.notes)
+    (material,) = scene.materials
+    assert material.unlit == colored
+    (mesh,) = scene.meshes
+    low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
+    assert ((low < 0.0) & (high > (1.0, 2.0, 3.0))).all()
+    if colored:
+        assert {tuple(color) for color in mesh.colors.tolist()} == {(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)}

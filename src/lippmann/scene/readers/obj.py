@@ -20,6 +20,7 @@ from lippmann.scene.parsing.far_origin import near_origin
 from lippmann.scene.parsing.files import MissingFileError, NamedFiles, decode_text, is_file, read_bytes, uncommented
 from lippmann.scene.parsing.points_lines import as_material
 from lippmann.scene.parsing.triangulation import triangulate
+from lippmann.scene.point_clouds import describe_cloud
 from lippmann.scene.readers.mtl import MtlRecord, parse_mtl
 from lippmann.scene.readers.mtl_to_pbr import MaterialMapper
 from lippmann.scene.readers.obj_points_lines import draw_points_and_lines
@@ -101,8 +102,10 @@ def read_obj(path: Path, *, files: NamedFiles | None = None) -> SceneDescription
     where = path.name
     statements = _split_statements(decode_text(read_bytes(path), where), where)
     if not (statements.faces.bodies or statements.points.bodies or statements.lines.bodies):
-        fix = "points are drawn where 'p' names them" if statements.positions.bodies else "is it an OBJ file?"
-        raise SceneError("holds no faces, lines or points", where=where, fix=fix)
+        if not statements.positions.bodies or statements.uvs.bodies:  # clouds have no texture coordinates
+            fix = "is it cut short?" if statements.uvs.bodies else "is it an OBJ file?"
+            raise SceneError("holds no faces, lines or points", where=where, fix=fix)
+        return _cloud(path.stem, *_assemble(statements, where))
     geometry, notes = _assemble(statements, where)
     named = NamedFiles.of(path, files)
     records, missing = _read_libraries(statements.libraries, where, named)
@@ -135,6 +138,21 @@ def read_obj(path: Path, *, files: NamedFiles | None = None) -> SceneDescription
         instances=[Instance(index, np.eye(4)) for index in range(len(meshes))],
         notes=[*missing, *notes, *sizes, *mapper.notes],
     )
+
+
+def _cloud(name: str, geometry: _Geometry, notes: list[str]) -> SceneDescription:
+    """Vertices alone, as scanners' programs write clouds of points."""
+    points = np.arange(len(geometry.positions), dtype=np.uint32)[:, None]
+    colors = _linear_colors(geometry)
+    thin = Mesh(
+        name,
+        geometry.positions.astype(np.float32),
+        points,
+        0,
+        colors=None if colors is None else colors.astype(np.float32),
+    )
+    plain = (0.7, 0.7, 0.7) if colors is None else (1.0, 1.0, 1.0)
+    return describe_cloud(thin, Material(name, base_color=plain, roughness=0.6, double_sided=True), notes)
 
 
 def _split_statements(text: str, where: str) -> _Statements:
