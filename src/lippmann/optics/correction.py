@@ -40,7 +40,7 @@ _STEPS = 15
 TOLERANCE = 0.03
 
 #: Bands of rows, spread over a picture, by which its correction is judged, and rows of each.
-_BANDS, _BAND_ROWS = 4, 24
+_BANDS, _BAND_ROWS = 4, 16
 
 
 def parts_beside() -> tuple[float, ...]:
