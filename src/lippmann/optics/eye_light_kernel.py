@@ -59,12 +59,12 @@ def gather_light(
     lines: Real,
     out: FloatArray,
 ) -> None:
-    """Fill rows ``first`` to ``last`` of ``out`` ``(rows, columns, 3)`` with the light of the panel's sub-pixels.
+    """Add the light of the panel's sub-pixels to rows ``first`` to ``last`` of ``out`` ``(rows, columns, 3, n)``.
 
     Parameters
     ----------
     values:
-        ``(n, width, 3)`` linear RGB of the panel's rows from row ``top`` on.
+        ``(rows, width, 3, n)`` linear RGB of the panel's rows from row ``top`` on, of n pictures.
     panel:
         Width and height in pixels, pixel pitch in mm, sine and cosine of the slant.
     cells:
@@ -86,7 +86,6 @@ def gather_light(
         for m in range(out.shape[1]):
             table = weights[numbers[n, m]]
             across, along = places[n, m, 0], places[n, m, 1]
-            red, green, blue = 0.0, 0.0, 0.0
             if is_line:
                 begin, end = lines[n, m, 0], lines[n, m, 1]
             else:
@@ -105,11 +104,5 @@ def gather_light(
                         right = (place_x * cosine - place_y * sine - across) / step
                         weight = share * weight_at(table, (place_y - along) / step, right)
                         if weight != 0.0:
-                            light = weight * values[row - top, column, channel]
-                            if channel == 0:
-                                red += light
-                            elif channel == 1:
-                                green += light
-                            else:
-                                blue += light
-            out[n, m, 0], out[n, m, 1], out[n, m, 2] = red, green, blue
+                            for picture in range(values.shape[3]):
+                                out[n, m, channel, picture] += weight * values[row - top, column, channel, picture]

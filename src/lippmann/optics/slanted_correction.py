@@ -134,27 +134,17 @@ class SlantedRows:
         def lights(pictures: Sequence[Floats], meant: Sequence[Floats], first: int) -> tuple[list[Real], list[Real]]:
             count = np.arange(0, len(pictures[0]) - n + 1, _JUDGED)
             shape = (len(count), place.size)
-            numbers = np.broadcast_to(number.ravel(), shape)
-            places = np.broadcast_to(middle.reshape(-1, 2), (*shape, 2))
-            lines = np.broadcast_to((count[:, None] + np.array([0.0, self.window]))[:, None], (*shape, 2)) + float(
-                first
-            )
-            white, *seen = (np.zeros((*shape, 3), dtype=np.float32) for _ in range(1 + len(pictures)))
-            for values, result in zip((np.ones_like(pictures[0]), *pictures), (white, *seen), strict=True):
-                Bands(usable_cores()).lines(
-                    gather_light,
-                    len(count),
-                    values,
-                    first,
-                    panel_frame(display),
-                    cells,
-                    tables,
-                    light.step,
-                    numbers,
-                    places,
-                    lines,
-                    result,
-                )
+            # A point a row, so that both few rows and few points are shared out between threads.
+            points = len(count) * place.size, 1
+            numbers = np.broadcast_to(number.ravel(), shape).reshape(points)
+            places = np.broadcast_to(middle.reshape(-1, 2), (*shape, 2)).reshape(*points, 2)
+            windows_of = count[:, None] + np.array([0.0, self.window]) + first
+            lines = np.broadcast_to(windows_of[:, None], (*shape, 2)).reshape(*points, 2)
+            values = np.stack([np.ones_like(pictures[0]), *pictures], axis=-1)
+            gathered = np.zeros((*points, *values.shape[2:]), dtype=np.float32)
+            geometry = panel_frame(display), cells, tables, light.step, numbers, places, lines
+            Bands(usable_cores()).pixels(gather_light, len(gathered), values, first, *geometry, gathered)
+            white, *seen = np.moveaxis(gathered.reshape(*shape, *values.shape[2:]), -1, 0)
             is_lit = white > 0.0
             seen = [np.divide(each, white, out=np.zeros_like(each), where=is_lit) for each in seen]
             goals, inside = [], np.empty((*shape, 3), dtype=bool)

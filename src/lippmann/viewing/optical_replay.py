@@ -114,6 +114,6 @@ def _gathered(image: Picture, light: EyeLight, eye: Eye, size: tuple[int, int], 
         tables = light.weights.reshape(-1, *light.weights.shape[2:])
         cells = np.array(panel.cells, dtype=np.float64)
         values = np.ascontiguousarray(image.rows(top, bottom), dtype=np.float32)
-        gathering = values, top, panel_frame(display), cells, tables, light.step, number, place, lines, out
-        Bands(usable_cores()).lines(gather_light, len(v), *gathering)
+        gathering = values[..., None], top, panel_frame(display), cells, tables, light.step, number, place, lines
+        Bands(usable_cores()).lines(gather_light, len(v), *gathering, out[..., None])
     return out
