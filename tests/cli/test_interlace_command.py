@@ -206,3 +206,18 @@ def test_errors_name_the_option(lippmann, frames, tmp_path, options, message):
 def test_other_formats_are_refused(lippmann, frames, tmp_path):
     outcome = lippmann("interlace", *frames, *SHEET, "--size", "30x20mm", "-o", tmp_path / "print.exr")
     assert (outcome.code, "a print is a .png or .tif file" in outcome.err) == (2, True)
+
+
+def test_outputs_are_named_after_the_input(lippmann, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "shots").mkdir()
+    for number in range(2):
+        Image.new("RGB", (64, 48), (90 * number, 20, 40)).save(tmp_path / "shots" / f"{number}.png")
+    Image.new("RGB", (512, 256)).save(tmp_path / "a_qs2x1a1.png")
+    for command, made in (
+        (("interlace", "shots", *SHEET, "--size", "30x20mm"), "shots-native.tif"),
+        (("quilt", "unpack", "a_qs2x1a1.png"), "a_qs2x1a1-views"),
+    ):
+        outcome = lippmann(*command)
+        assert outcome.code == 0, outcome.err
+        assert (tmp_path / made).exists()

@@ -72,9 +72,14 @@ def stored_in(layout: str, image_stored: Stored, bits: int | None) -> Stored:
     return "float32" if 32 in known else "uint8"
 
 
+def ending_of(layout: str) -> str:
+    """The ending of the layout's files; none if they are folders."""
+    return _layout(layout).ending
+
+
 def with_ending(layout: str, path: Path) -> Path:
     """``path`` with the ending that the layout's files have, where it has none."""
-    return path if path.suffix else path.with_suffix(_layout(layout).ending)
+    return path if path.suffix else path.with_suffix(ending_of(layout))
 
 
 def check_target(layout: str, path: Path) -> None:

@@ -9,14 +9,23 @@ import typer
 
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
+from lippmann.cli.shared.outputs import output_of
 
 _LAYOUTS = "hci (4D Light Field Benchmark), lftoolbox (.mat), eslf (.png), zarr, views, or a plugin's"
 
 
 def export(
     picture: options.Picture,
-    output: Annotated[Path, typer.Option("--output", "-o", help="File or folder to write.")],
     layout: Annotated[str, typer.Option("--as", help=f"Layout: {_LAYOUTS}.")],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="File or folder to write. By default named after picture and layout, in this folder.",
+            show_default=False,
+        ),
+    ] = None,
     distance: Annotated[
         float | None,
         typer.Option("--distance", help="Distance of the cameras in mm, for hci and displays of parallel views."),
@@ -31,12 +40,12 @@ def export(
 ) -> None:
     """Export a picture to the layout of another light-field tool."""
     from lippmann.exchange import export_image
-    from lippmann.exchange.layouts import check_target, is_folder, with_ending
+    from lippmann.exchange.layouts import check_target, ending_of, is_folder, with_ending
     from lippmann.image import read_picture
     from lippmann.runtime.atomic_write import check_folder_writable, check_writable
 
     console = Console(quiet, as_json)
-    output = with_ending(layout, output)
+    output = with_ending(layout, output_of(output, picture, f"-{layout}{ending_of(layout)}"))
     check_target(layout, output)
     (check_folder_writable if is_folder(layout) else check_writable)(output)
     image = read_picture(picture, display=parse.display(display))
@@ -57,7 +66,7 @@ def export(
 
 def import_(
     source: Annotated[Path, typer.Argument(help="File or folder of another light-field tool.")],
-    output: options.Output,
+    output: options.OptionalOutput = None,
     layout: Annotated[str | None, typer.Option("--as", help=f"Layout: {_LAYOUTS}. Default: recognized.")] = None,
     display: Annotated[
         str | None,
@@ -73,7 +82,7 @@ def import_(
     from lippmann.exchange import import_image
     from lippmann.image.write import check_output
 
-    console = Console(quiet, as_json)
+    console, output = Console(quiet, as_json), output_of(output, source, "-native.exr")
     check_output(output, bits)
     with console.progress() as progress:
         image, notes = import_image(source, layout, display=parse.display(display), progress=progress)

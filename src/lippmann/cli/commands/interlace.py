@@ -12,6 +12,7 @@ import typer
 from lippmann.cli.shared import options
 from lippmann.cli.shared.command_options import with_options, without
 from lippmann.cli.shared.console import Console
+from lippmann.cli.shared.outputs import output_of
 from lippmann.cli.shared.scene_source import print_of, sheet_of
 from lippmann.errors import UsageError
 from lippmann.options.prints import FinishOptions, PrintOptions
@@ -35,7 +36,7 @@ def interlace(
     photos: Annotated[
         list[Path], typer.Argument(help="Photographs or frames, in natural order, or stereo pairs; or their folder.")
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The .tif or .png file to write.")],
+    output: options.OptionalOutput = None,
     display: Annotated[
         str | None,
         typer.Option("--display", "-d", help="A lenticular display in place of a print, such as lkg-portrait."),
@@ -84,7 +85,7 @@ def interlace(
     from lippmann.quilts.photos import natural_order, read_photos
     from lippmann.quilts.view_names import line_of_grid
 
-    console = Console(quiet, as_json)
+    console, output = Console(quiet, as_json), output_of(output, photos[0], "-native.tif")
     check_interlaced_path(output)
     across = lenses == "across"
     target, asked_finish = sheet_of(_display(display, printed, turned=across), replace(finishing, icc=icc))

@@ -105,7 +105,7 @@ def micro_images(
 
 def compose(
     folder: Annotated[Path, typer.Argument(help="Folder written by 'lippmann views' or 'lippmann micro-images'.")],
-    output: options.Output,
+    output: options.OptionalOutput = None,
     bits: options.Bits = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -114,7 +114,7 @@ def compose(
     from lippmann.image import compose as compose_folder
     from lippmann.image.write import check_output
 
-    console = Console(quiet, as_json)
+    console, output = Console(quiet, as_json), output_of(output, folder, "-native.exr")
     check_output(output, bits)
     with console.progress() as progress:
         image = compose_folder(folder, progress=progress)

@@ -187,7 +187,7 @@ def pack(
 @quilt.command("unpack", cls=HelpfulCommand)
 def unpack(
     picture: Annotated[Path, typer.Argument(help="A quilt: PNG, EXR, TIFF, JPEG, WebP or AVIF.")],
-    output: options.Folder,
+    output: options.OptionalFolder = None,
     layout: Layout = None,
     aspect: Aspect = None,
     format: Format = None,
@@ -199,7 +199,7 @@ def unpack(
     from lippmann.quilts.files import read_quilt, write_views
     from lippmann.runtime.atomic_write import check_folder_writable
 
-    console = Console(quiet, as_json)
+    console, output = Console(quiet, as_json), output_of(output, picture, "-views")
     check_folder_writable(output)
     quilt = read_quilt(picture, layout_of(layout, aspect))
     console.remark(*quilt.notes)
