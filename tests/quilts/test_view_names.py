@@ -86,3 +86,10 @@ def test_views_of_the_benchmark_lie_in_rows_as_their_parameters_say(tmp_path):
     (tmp_path / "parameters.cfg").write_text("[extrinsics]\nnum_cams_x = 4\nnum_cams_y = 3\n")
     assert places_of_views(paths)[2, 3] == paths[11]
     assert line_of_grid(paths)[0] == paths[4:8]
+
+
+def test_views_of_the_benchmark_without_parameters_are_a_square_if_all_are_there(tmp_path):
+    paths = [tmp_path / f"input_Cam{number:03}.png" for number in range(25)]
+    assert line_of_grid(paths)[0] == paths[10:15]
+    assert line_of_grid(paths[10:14])[0] == paths[10:14]
+    assert places_of_views(paths[:24])[(23,)] == paths[23]

@@ -137,7 +137,8 @@ def read_photos(
     """
     sources = [source for path in paths for source in _views_in(path)]
     if len(sources) < 2:
-        raise UsageError(f"{len(sources)} photographs are given", rule="at least 2 are interlaced")
+        what, rule = f"{len(sources)} photographs are given", f"at least 2 are interlaced, of {', '.join(ENDINGS)}"
+        raise UsageError(what, rule=rule, fix="weave views of other formats")
     if fit is not None and fit not in get_args(Fit):
         raise UsageError.unknown("fit", fit, get_args(Fit), parameter="fit")
     headers = [_header(source) for source in sources]

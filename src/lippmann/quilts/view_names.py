@@ -2,12 +2,14 @@
 
 Numbers that all names share say nothing. Of the others the last one counts the views, or the last two side by side are
 row and column, where rows and columns repeat. Folders of the 4D Light Field Benchmark count row by row, in rows as long
-as their ``parameters.cfg`` says. The names of the Stanford light field archive also hold where the camera stood,
-``out_ROW_COLUMN_Y_X``, in mm, x to the right and y downwards; their rows and columns run either way.
+as their ``parameters.cfg`` says; without it a square number of views, counted from 0, is a square grid. Names of the
+Stanford light field archive also hold where the camera stood, ``out_ROW_COLUMN_Y_X``, in mm, x to the right and y
+downwards; their rows and columns run either way.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -99,9 +101,12 @@ def _stanford_places(stems: Sequence[str]) -> list[Place]:
 
 def _benchmark_columns(paths: Sequence[Path]) -> int | None:
     """Views in a row of a folder of the 4D Light Field Benchmark, None of other folders."""
-    parameters = paths[0].with_name("parameters.cfg")
-    if not all(_HCI.fullmatch(path.stem) for path in paths) or not parameters.is_file():
+    if not all(_HCI.fullmatch(path.stem) for path in paths):
         return None
+    parameters, side = paths[0].with_name("parameters.cfg"), math.isqrt(len(paths))
+    if not parameters.is_file():
+        is_square = {int(path.stem[len("input_Cam") :]) for path in paths} == set(range(side * side))
+        return side if is_square else None
     with parameters.open("rb") as file:
         match = _HCI_COLUMNS.search(file.read(1 << 16))
     return int(match[1]) if match else None
