@@ -66,11 +66,12 @@ def test_scene_files_that_will_not_do(lippmann, tmp_path, kept, name, content):
     refuse(lippmann("render", path, *FAST, "-o", kept), "" if len(name) > 255 else name)
 
 
-def test_absent_texture_names_the_texture(lippmann, tmp_path, kept):
-    (tmp_path / "a.mtl").write_text("newmtl wood\nmap_Kd gone.png\n")
+def test_a_damaged_texture_is_named(lippmann, tmp_path, kept):
+    (tmp_path / "a.mtl").write_text("newmtl wood\nmap_Kd cut.png\n")
+    (tmp_path / "cut.png").write_bytes(b"\x89PNG\r\n\x1a\n")
     obj = tmp_path / "a.obj"
     obj.write_text("mtllib a.mtl\nusemtl wood\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n")
-    refuse(lippmann("render", obj, *FAST, "-o", kept), "gone.png")
+    refuse(lippmann("render", obj, *FAST, "-o", kept), "cut.png")
 
 
 def test_nan_vertices(lippmann, tmp_path, kept):
@@ -81,7 +82,7 @@ def test_nan_vertices(lippmann, tmp_path, kept):
 
 def test_a_scene_without_geometry(lippmann, tmp_path, kept):
     obj = tmp_path / "a.obj"
-    obj.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n")
+    obj.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n")
     refuse(lippmann("render", obj, *FAST, "-o", kept), "a.obj")
 
 
