@@ -143,8 +143,8 @@ class LensCorrection:
 
         ``first`` is the number of the first row.
         """
-        lights, (goal,) = self._rows.eyes(self.display)(pictures, [_clipped(parts)], first)
-        return [float(np.mean((light - goal) ** 2)) for light in lights]
+        goal = self._rows.light_meant(_clipped(parts), first)
+        return [float(np.nanmean((light - goal) ** 2)) for light in self._rows.eyes(self.display)(pictures, first)]
 
     def step(self, bands: Sequence[tuple[int, Sequence[Sequence[Floats]]]]) -> CorrectionStep:
         """The step toward least squares after which eyes are expected to see the least error.
@@ -165,13 +165,15 @@ class LensCorrection:
         for first, halves in bands:
             plain = [self.rows(half, first, 0.0) for half in halves]
             solved = [self.rows(half, first) for half in halves]
-            pictures.append((first, [*plain, *solved], [_clipped(half) for half in halves]))
+            goals = [self._rows.light_meant(_clipped(half), first) for half in halves]
+            inside = np.isfinite(goals[0])
+            pictures.append((first, [*plain, *solved], inside, [goal[inside] for goal in goals]))
 
         def parabola(profile: LensProfile) -> Real:
             """Error of the plain picture and of that of least squares, and mean square of what is between them."""
             sums, count, eyes = np.zeros(3), 0, self._rows.eyes(replace(self.display, lens=profile))
-            for first, band, meant in pictures:
-                lights, goals = eyes(band, meant, first)
+            for first, band, inside, goals in pictures:
+                lights = [light[inside].astype(np.float64) for light in eyes(band, first)]
                 pairs = [(lights[k], lights[k + len(goals) - 1]) for k in (0, len(goals))]
                 plain, solved = (0.5 * (a + b) for a, b in pairs)
                 errors = [
@@ -238,20 +240,24 @@ class _UprightRows:
         return solved
 
     def eyes(self, there: Display) -> Eyes:
-        """Light that eyes see through the lenses that are there, of the directions that are meant."""
+        """The light to eyes through the lenses that are there, in the order of :meth:`light_meant`."""
         is_own = there == self.display
         shares = [self._systems[c][0] if is_own else self._shares(there, c) for c in range(3)]
 
-        def lights(pictures: Sequence[Floats], meant: Sequence[Floats], first: int) -> tuple[list[Real], list[Real]]:
+        def lights(pictures: Sequence[Floats], first: int) -> Sequence[Real]:
             del first
-            seen = [
+            return [
                 np.concatenate([shares[c].gather(pixels[..., c].astype(np.float64)).ravel() for c in range(3)])
                 for pixels in pictures
             ]
-            # By channel, row, and pixel and part, as they are gathered.
-            return seen, [parts.transpose(3, 1, 2, 0).ravel().astype(np.float64) for parts in meant]
 
         return lights
+
+    def light_meant(self, parts: Floats, first: int) -> Real:
+        """Light ``(n,)`` that eyes are meant to see of ``(parts, rows, width, 3)``."""
+        del first
+        # By channel, row, and pixel and part, as they are gathered.
+        return parts.transpose(3, 1, 2, 0).ravel().astype(np.float64)
 
     @cached_property
     def _systems(self) -> list[tuple[PixelShares, Floats]]:

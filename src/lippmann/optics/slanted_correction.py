@@ -27,9 +27,8 @@ from lippmann.runtime.row_threads import Bands
 Floats = NDArray[np.float32]
 Offset = tuple[int, int, int]
 
-#: What eyes see of pictures ``(rows, width, 3)``, and are meant to see of light ``(parts, rows, width, 3)``, of rows
-#: from a first one on: for each picture and each light an array ``(n,)``.
-Eyes = Callable[[Sequence[Floats], Sequence[Floats], int], tuple[list[Real], list[Real]]]
+#: Light ``(n,)`` that eyes see of each of the pictures ``(rows, width, 3)`` of the rows from a first one on.
+Eyes = Callable[[Sequence[Floats], int], Sequence[Real]]
 
 #: Directions, and places whose stencils are known, for each pixel under a lens; a sub-pixel is a third of one wide.
 _DIRECTIONS, _PLACES = 8, 40
@@ -116,23 +115,21 @@ class SlantedRows:
         return solved[self.margin : -self.margin]
 
     def eyes(self, there: Display) -> Eyes:
-        """Light that eyes see through the lenses that are there, of the directions that are meant.
+        """The light to eyes through the lenses that are there, in the order of :meth:`light_meant`.
 
         Light is that over the light of a white panel, whose unevenness no picture can take away.
         """
         from lippmann.optics.eye_light_kernel import gather_light
 
-        display, n = self.display, len(self._row_shares)
-        lens = np.arange(display.lens_grid.columns, dtype=np.float64)
-        axis, place = (each[:, ::_JUDGED] for each in self._directions(lens))
+        display, (axis, place) = self.display, self._judged_directions
         light = _even_light(self.display, there)
         number, middle = light.nearest(self._slopes(place), np.zeros_like(place))
         middle[..., 0] += axis
         tables = light.weights.reshape(-1, *light.weights.shape[2:])
         cells = np.array(((self.offsets,),), dtype=np.float64)
 
-        def lights(pictures: Sequence[Floats], meant: Sequence[Floats], first: int) -> tuple[list[Real], list[Real]]:
-            count = np.arange(0, len(pictures[0]) - n + 1, _JUDGED)
+        def lights(pictures: Sequence[Floats], first: int) -> Sequence[Real]:
+            count = self._judged_windows(len(pictures[0]))
             shape = (len(count), place.size)
             # A point a row, so that both few rows and few points are shared out between threads.
             points = len(count) * place.size, 1
@@ -146,19 +143,30 @@ class SlantedRows:
             Bands(usable_cores()).pixels(gather_light, len(gathered), values, first, *geometry, gathered)
             white, *seen = np.moveaxis(gathered.reshape(*shape, *values.shape[2:]), -1, 0)
             is_lit = white > 0.0
-            seen = [np.divide(each, white, out=np.zeros_like(each), where=is_lit) for each in seen]
-            goals, inside = [], np.empty((*shape, 3), dtype=bool)
-            for parts in meant:
-                windows = np.empty((*shape, 3))
-                for channel in range(3):
-                    goal, is_there = self._meant(parts[..., channel], channel, first, axis, place)
-                    for line, k in enumerate(count):
-                        windows[line, :, channel] = self._row_shares @ goal[k : k + n]
-                        inside[line, :, channel] = is_there[k : k + n].all(axis=0)
-                goals.append(windows)
-            return [each[inside].astype(np.float64) for each in seen], [each[inside] for each in goals]
+            return [np.divide(each, white, out=np.zeros_like(each), where=is_lit).ravel() for each in seen]
 
         return lights
+
+    def light_meant(self, parts: Floats, first: int) -> Real:
+        """Light ``(n,)`` that eyes are to see of ``(parts, rows, width, 3)``; NaN where a lens has not all rows."""
+        axis, place = self._judged_directions
+        n, count = len(self._row_shares), self._judged_windows(parts.shape[1])
+        windows = np.empty((len(count), place.size, 3))
+        for channel in range(3):
+            goal, is_there = self._meant(parts[..., channel], channel, first, axis, place)
+            for line, k in enumerate(count):
+                inside = is_there[k : k + n].all(axis=0)
+                windows[line, :, channel] = np.where(inside, self._row_shares @ goal[k : k + n], np.nan)
+        return windows.ravel()
+
+    @property
+    def _judged_directions(self) -> tuple[Real, Real]:
+        axis, place = self._directions(np.arange(self.display.lens_grid.columns, dtype=np.float64))
+        return axis[:, ::_JUDGED], place[:, ::_JUDGED]
+
+    def _judged_windows(self, rows: int) -> NDArray[np.int64]:
+        """The first row of each window."""
+        return np.arange(0, rows - len(self._row_shares) + 1, _JUDGED)
 
     @property
     def _row_shares(self) -> Real:
