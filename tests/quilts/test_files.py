@@ -13,7 +13,7 @@ from lippmann.color.primaries import REC709
 from lippmann.errors import OutputError, PictureError
 from lippmann.image import PictureFile, encoding
 from lippmann.quilts import files as quilt_files
-from lippmann.quilts.files import read_quilt, read_views, write_quilt, write_views
+from lippmann.quilts.files import is_quilt, read_quilt, read_views, write_quilt, write_views
 from lippmann.quilts.quilt import Quilt, QuiltLayout
 
 LAYOUT = QuiltLayout(8, 6, 0.75)
@@ -92,13 +92,39 @@ def test_kinds_of_pixels(tmp_path, mode, color, code):
     assert read_quilt(tmp_path / "x_qs4x2a2.png").values[0, 0, 1] == code
 
 
-def test_transparent_quilts_and_other_formats_are_named(tmp_path):
-    Image.new("RGBA", (512, 256), (200, 100, 50, 128)).save(tmp_path / "x_qs4x2a2.png")
-    with pytest.raises(PictureError, match="is partly transparent"):
-        read_quilt(tmp_path / "x_qs4x2a2.png")
-    Image.new("RGB", (512, 256)).save(tmp_path / "x_qs4x2a2.bmp")
-    with pytest.raises(PictureError, match=r"unknown ending '\.bmp'"):
-        read_quilt(tmp_path / "x_qs4x2a2.bmp")
+@pytest.mark.parametrize("ending", ["png", "webp", "tga"])
+def test_transparent_parts_lie_on_black(tmp_path, ending):
+    picture = Image.new("RGBA", (512, 256), (200, 100, 50, 51))
+    picture.paste((200, 100, 50, 255), (0, 0, 256, 256))
+    picture.save(tmp_path / f"x_qs4x2a2.{ending}", lossless=True)
+    values = read_quilt(tmp_path / f"x_qs4x2a2.{ending}").values
+    assert values[0, [0, 256]].tolist() == [[200, 100, 50], [40, 20, 10]]
+
+
+def test_other_formats_are_named(tmp_path):
+    Image.new("RGB", (512, 256)).save(tmp_path / "x_qs4x2a2.jp2")
+    with pytest.raises(PictureError, match=r"unknown ending '\.jp2'"):
+        read_quilt(tmp_path / "x_qs4x2a2.jp2")
+
+
+@pytest.mark.parametrize("ending", ["bmp", "ppm", "gif", "tga"])
+def test_quilts_of_older_formats_are_read(tmp_path, ending):
+    codes = np.random.default_rng(1).choice(np.array([0, 90, 255], np.uint8), (256, 512, 3))
+    Image.fromarray(codes).save(tmp_path / f"x_qs4x2a2.{ending}")
+    np.testing.assert_array_equal(read_quilt(tmp_path / f"x_qs4x2a2.{ending}").values, codes)
+
+
+def test_four_views_of_leia_begin_at_the_top_left(tmp_path):
+    picture = Image.new("RGB", (512, 256))
+    for number in range(4):
+        picture.paste((number, 0, 0), (number % 2 * 256, number // 2 * 128, 512, 256))
+    picture.save(tmp_path / "photo_2x2.png")
+    quilt = read_quilt(tmp_path / "photo_2x2.png")
+    assert is_quilt(tmp_path / "photo_2x2.png")
+    assert quilt.layout == (2, 2, 2.0)
+    assert [quilt.view_values(number)[0, 0, 0] for number in range(4)] == [0, 1, 2, 3]
+    asked = read_quilt(tmp_path / "photo_2x2.png", QuiltLayout(2, 2, 2.0))
+    assert [asked.view_values(number)[0, 0, 0] for number in range(4)] == [2, 3, 0, 1]
 
 
 def test_webp_quilts_are_read(tmp_path):
@@ -232,16 +258,18 @@ def test_a_quilt_is_not_written_under_another_s_name(tmp_path):
 # ---- Folders ---------------------------------------------------------------------------------------------------------
 
 
-def test_views_may_be_numbered_from_one_and_without_zeros(folder, tmp_path):
+@pytest.mark.parametrize(("first", "notes"), [(1, ()), (1021, ("views are numbered from 1021: that is the leftmost",))])
+def test_views_may_be_numbered_from_any_number(first, notes, folder, tmp_path):
     other = tmp_path / "other"
     other.mkdir()
     (other / "notes.txt").write_text("no view")
     for number in range(LAYOUT.views):
-        (folder / f"shot2_{number:03}.png").rename(other / f"v{number + 1}.png")
+        (folder / f"shot2_{number:03}.png").rename(other / f"v{number + first}.png")
     np.testing.assert_array_equal(
         read_views(other, LAYOUT).view(11), read_views(other).view(11), "in a grid and in a row"
     )
     assert read_views(other).layout == (48, 1, None)
+    assert read_views(other).notes == notes
     write_views(read_views(other), tmp_path / "out")
     np.testing.assert_array_equal(Image.open(tmp_path / "out" / "view_11.png"), codes_of(11))
 
@@ -288,7 +316,6 @@ def test_a_damaged_view_is_named(folder):
     [
         ([], "there are no views"),
         (["a.png"], "the name has no number"),
-        (["a_2.png", "a_3.png"], "the first view is 2"),
         (["a_0.png", "b_0.png"], r"b_0\.png: is the same view as a_0\.png"),
         (["a_0.png", "lippmann.json"], "a folder of integral views"),
     ],

@@ -15,7 +15,7 @@ import numpy as np
 from lippmann.codecs import orientation as orientations
 from lippmann.codecs.icc import rgb_profile
 from lippmann.codecs.picture_notes import aspect_note, pictures_note
-from lippmann.codecs.tiff_colors import UnreadColorsError, check_colors, gray_or_rgb, is_stored_so, stored_type
+from lippmann.codecs.tiff_colors import UnreadColorsError, check_colors, gray_or_rgb, is_cmyk, is_stored_so, stored_type
 from lippmann.codecs.types import Pixels, StoredType
 from lippmann.errors import PictureError
 from lippmann.runtime.engine_lock import cached_property
@@ -196,7 +196,7 @@ class TiffPicture:
     description:
         The text of ``ImageDescription``; empty without.
     icc:
-        ICC profile of the values; empty without.
+        ICC profile of the values; empty without, and of CMYK, which is read as sRGB.
     notes:
         What of it is not shown, each in one line.
 
@@ -238,7 +238,7 @@ class TiffPicture:
             self.height, self.width = self.width, self.height
         self.in_pieces = has_plain_tiles and self.orientation <= 1
         self.description = text if isinstance(text, str) else ""
-        self.icc = profile if isinstance(profile, bytes) else b""
+        self.icc = profile if isinstance(profile, bytes) and not is_cmyk(page) else b""
 
     def read(self) -> Pixels:
         """All values, ``(H, W, 1 to 4)``, upright: codes of 8 or 16 bits, or floats.
@@ -320,7 +320,7 @@ def _reported(path: Path) -> Iterator[None]:
     try:
         yield
     except UnreadColorsError as error:
-        rule = "grey, RGB, palettes, L*a*b* and YCbCr are read"
+        rule = "grey, RGB, CMYK, palettes, L*a*b* and YCbCr are read"
         raise PictureError(str(error), where=str(path), rule=rule, fix="convert it to RGB") from None
     except (tifffile.TiffFileError, *_LIBRARY_ERRORS) as error:
         raise PictureError(f"this TIFF is damaged: {error}", where=str(path), fix="make or fetch it anew") from error

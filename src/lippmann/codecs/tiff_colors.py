@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.codecs.icc import convert_cmyk
 from lippmann.codecs.types import Pixels
 from lippmann.color.primaries import rec709_from_xyz
 from lippmann.color.transfer import encode_srgb
 
 #: Values of PhotometricInterpretation.
-_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE, _YCBCR, _CIELAB, _ICCLAB = 0, 1, 2, 3, 6, 8, 9
+_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE, _CMYK, _YCBCR, _CIELAB, _ICCLAB = 0, 1, 2, 3, 5, 6, 8, 9
 #: The value of ExtraSamples for alpha that colours were multiplied by.
 _ASSOCIATED = 1
 #: JPEG and old JPEG, whose decoders give RGB for YCbCr.
@@ -32,6 +33,7 @@ def check_colors(page: Any) -> None:
     read = kind in (_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE)
     read |= kind == _YCBCR and (int(page.compression) in _JPEG or _is_plain_ycbcr(page))
     read |= kind in (_CIELAB, _ICCLAB) and bits in (8, 16) and page.samplesperpixel >= 3
+    read |= is_cmyk(page) and bits in (8, 16)
     read &= kind not in (_WHITE_IS_ZERO, _PALETTE) or page.dtype is None or np.dtype(page.dtype).kind != "f"
     if not read:
         name = getattr(page.photometric, "name", str(kind))
@@ -40,12 +42,17 @@ def check_colors(page: Any) -> None:
         raise UnreadColorsError(f"its colours are {name} of {bits} bits")
 
 
+def is_cmyk(page: Any) -> bool:
+    """Whether the page's colours are of four inks, which :func:`gray_or_rgb` makes sRGB."""
+    return int(page.photometric) == _CMYK and page.samplesperpixel >= 4 and int(page.compression) not in _JPEG
+
+
 def stored_type(page: Any) -> str:
     """NumPy type name of what :func:`gray_or_rgb` gives."""
     dtype = np.dtype(page.dtype)
     if dtype.kind == "f":
         return "float32"
-    if int(page.photometric) == _PALETTE or dtype.kind == "b":
+    if int(page.photometric) == _PALETTE or dtype.kind == "b" or is_cmyk(page):
         return "uint8"
     return str(dtype.name)
 
@@ -81,6 +88,11 @@ def gray_or_rgb(page: Any, values: Pixels) -> Pixels:
         return _looked_up(values[..., 0], np.asarray(page.colormap))
     if kind == _YCBCR and int(page.compression) not in _JPEG:
         return np.concatenate([_rgb_of_ycbcr(page, values[..., :3]), values[..., 3:]], axis=-1)
+    if is_cmyk(page):
+        from PIL import Image
+
+        codes = (values[..., :4] >> (page.bitspersample - 8)).astype(np.uint8)
+        return convert_cmyk(Image.fromarray(codes, "CMYK"), page.iccprofile or b"")
     if kind in (_CIELAB, _ICCLAB):
         return _srgb_of_lab(values[..., :3], biased=kind == _ICCLAB)
     if values.dtype.kind == "f":

@@ -113,7 +113,8 @@ class PictureFile:
         Parameters
         ----------
         as_srgb:
-            Whether codes are converted to sRGB, as for a picture that is to be looked at. Those of a display are not.
+            Whether codes are converted to sRGB and transparent parts lie on black, as for a picture to be looked at.
+            Codes of a display are not, and are opaque.
 
         Raises
         ------
@@ -131,7 +132,7 @@ class PictureFile:
         layers = self._decode()
         values = layers.pop("")
         self.check_stored(values.dtype.name)
-        return opaque_colors(values, self.path, self.icc if as_srgb else b""), layers
+        return opaque_colors(values, self.path, self.icc if as_srgb else b"", on_black=as_srgb), layers
 
     def check_stored(self, stored: str) -> Stored:
         """``stored``, a NumPy type name; a :class:`PictureError` if this format is not read with such values."""
@@ -292,15 +293,16 @@ def _plausible(file: PictureFile, size: int | None) -> PictureFile:
     return file
 
 
-def opaque_colors(values: Layer, path: Path, icc: bytes = b"") -> Values:
+def opaque_colors(values: Layer, path: Path, icc: bytes = b"", *, on_black: bool = False) -> Values:
     """``(H, W, 3)`` values of ``(H, W)`` or ``(H, W, 1 to 4)`` grey or RGB values, with or without an opaque alpha.
 
-    Codes of the profile ``icc`` become those of sRGB.
+    Codes of the profile ``icc`` become those of sRGB. ``on_black``: transparent parts lie on black, the colours of
+    floats, as OpenEXR has them, multiplied by their alpha already.
 
     Raises
     ------
     PictureError
-        If the shape is another, alpha hides anything, or the profile is damaged; names ``path``.
+        If the shape is another, alpha hides anything without ``on_black``, or the profile is damaged; names ``path``.
     """
     if values.ndim == 2:
         values = values[..., None]
@@ -309,9 +311,12 @@ def opaque_colors(values: Layer, path: Path, icc: bytes = b"") -> Values:
         raise PictureError(f"holds an array of shape {values.shape}", where=str(path), rule="it must be grey or RGB")
     if channels in (2, 4):
         opaque = 1 if values.dtype.kind == "f" else np.iinfo(values.dtype.name).max
-        if (values[..., -1] != opaque).any():
-            raise PictureError("is partly transparent", where=str(path), rule="a panel is not", fix="flatten it")
-        values = values[..., :-1]
+        alpha, values = values[..., -1:], values[..., :-1]
+        if (alpha != opaque).any():
+            if not on_black:
+                raise PictureError("is partly transparent", where=str(path), rule="a panel is not", fix="flatten it")
+            if values.dtype.kind == "u":
+                values = (values.astype(np.uint32) * alpha.astype(np.uint32) // opaque).astype(values.dtype)
     if icc and values.dtype.kind == "u":
         try:
             values = convert_codes(values, icc)

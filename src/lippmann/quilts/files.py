@@ -37,9 +37,12 @@ from lippmann.quilts.view_names import list_views, middle_row, places_of_views
 from lippmann.runtime.atomic_write import replacing_folder
 from lippmann.runtime.regular_file import check_kind
 
-#: Endings of the picture files that are read; photographs are not written.
-_PHOTOGRAPHS = (".jpg", ".jpeg", ".webp", ".avif")
+#: Formats by Pillow's names, with their endings, that are read and not written.
+_KINDS = ("JPEG", "WEBP", "AVIF", "BMP", "PPM", "GIF", "TGA")
+_PHOTOGRAPHS = (".jpg", ".jpeg", ".webp", ".avif", ".bmp", ".ppm", ".gif", ".tga")
 READ = (*FORMATS, *_PHOTOGRAPHS)
+#: End of the names of four views in the shape of the whole picture, the leftmost at the top left: Leia's.
+_FROM_TOP = "_2x2"
 
 
 def is_quilt(path: Path) -> bool:
@@ -50,16 +53,14 @@ def is_quilt(path: Path) -> bool:
     PictureError
         If the file is missing or damaged.
     """
-    if path.suffix.lower() in _PHOTOGRAPHS:
-        return names_layout(path)
-    text = open_file(path).text
+    text = "" if path.suffix.lower() in _PHOTOGRAPHS else open_file(path).text
     if not text:
-        return names_layout(path)
+        return names_layout(path) or path.stem.endswith(_FROM_TOP)
     return metadata_of_text(text, str(path)) is not None
 
 
 def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
-    """Read a quilt: PNG, OpenEXR, TIFF, JPEG, WebP or AVIF.
+    """Read a quilt: PNG, OpenEXR, TIFF, JPEG, WebP, AVIF, BMP, PPM, GIF or TGA; transparent parts lie on black.
 
     Parameters
     ----------
@@ -67,6 +68,7 @@ def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
         The file.
     layout:
         Columns, rows and aspect ratio. None: as the file's name says, such as ``_qs8x6a0.75``, or else its metadata.
+        Leia's four views, ``_2x2``, begin at the top left.
 
     Raises
     ------
@@ -76,7 +78,10 @@ def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
     _check_ending(path)
     with open_view(path) as file:
         metadata = metadata_of_text(file.text, str(path))
-        if layout is None:
+        from_top = layout is None and metadata is None and path.stem.endswith(_FROM_TOP)
+        if from_top:
+            layout = QuiltLayout(2, 2, file.size[0] / file.size[1])
+        elif layout is None:
             # A name that says nothing is refused only where the metadata says nothing either.
             layout = metadata.layout if metadata and not names_layout(path) else layout_of_name(path)
         if layout.aspect is None and metadata is not None:
@@ -85,6 +90,8 @@ def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
             layout = layout._replace(aspect=file.size[0] / file.size[1])
         check_size(*file.size, layout, str(path))
         values = file.read()
+    if from_top:
+        values = np.concatenate(np.split(values, 2)[::-1])
     stored = cast("Stored", values.dtype.name)
     if metadata is None:
         return Quilt(values, layout, stored, notes=file.notes)
@@ -97,8 +104,8 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
     Parameters
     ----------
     folder:
-        The folder. Views are numbered in their file names, from 0 or 1, that of the leftmost camera first; of a grid of
-        cameras, named by row and column, the middle row is taken.
+        The folder. Views are numbered in their file names, that of the leftmost camera first; of a grid of cameras,
+        named by row and column, the middle row is taken.
     layout:
         Columns, rows and aspect ratio of the quilt. None: one row of all views.
     progress:
@@ -241,13 +248,14 @@ def _numbered(folder: Path) -> tuple[Sequence[Path], tuple[str, ...]]:
         raise PictureError("is a folder of integral views", where=str(folder), rule=rule, fix="compose it")
     by_number, rows = middle_row(places_of_views(list_views(folder, READ)))
     first = min(by_number)
-    if first > 1:
-        rule, fix = "views are numbered from 0 or 1", "interlace them: 'lippmann interlace' takes any names"
-        raise PictureError(f"the first view is {first}", where=str(folder), rule=rule, fix=fix)
+    notes: tuple[str, ...] = ()
     if missing := _first_missing(by_number, first):
         raise PictureError(f"view {missing} is missing", where=str(folder), rule=f"views run to {max(by_number)}")
-    note = f"of {rows} rows of cameras the middle one is taken: the views of a quilt stand side by side"
-    return [by_number[number] for number in sorted(by_number)], (note,) if rows > 1 else ()
+    if rows > 1:
+        notes += (f"of {rows} rows of cameras the middle one is taken: the views of a quilt stand side by side",)
+    if first > 1:
+        notes += (f"views are numbered from {first}: that is the leftmost",)
+    return [by_number[number] for number in sorted(by_number)], notes
 
 
 def _first_missing(numbers: Iterable[int], first: int) -> int | None:
@@ -284,11 +292,13 @@ def open_view(path: Path) -> Iterator[OpenView]:
         return
     check_kind(path, PictureError)
     try:
-        with path.open("rb") as stream, open_photograph(stream, path, ("JPEG", "WEBP", "AVIF")) as photograph:
+        with path.open("rb") as stream, open_photograph(stream, path, _KINDS) as photograph:
             if max(photograph.size) > MOST_SIDE:
                 raise PictureError(f"it has {photograph.size[0]} x {photograph.size[1]} pixels", where=str(path))
-            yield OpenView(
-                photograph.size, lambda: "uint8", lambda: opaque_colors(photograph.srgb_codes(), path), photograph.notes
-            )
+
+            def codes() -> Values:
+                return opaque_colors(photograph.srgb_codes(), path, on_black=True)
+
+            yield OpenView(photograph.size, lambda: "uint8", codes, photograph.notes)
     except (OSError, SyntaxError) as error:
         raise PictureError(f"cannot be read: {error}", where=str(path)) from None

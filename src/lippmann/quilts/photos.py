@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 Fit = Literal["cover", "contain", "stretch"]
 
 #: Endings of the pictures in a folder of photographs.
-ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".avif", ".bmp", *PAIRS)
+ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".avif", ".bmp", ".ppm", ".gif", ".tga", *PAIRS)
 
 #: The code of white paper.
 _PAPER = 255

@@ -38,6 +38,8 @@ QUILT_NAME = re.compile(
     r"\A.*qs(\d{1,4})x(\d{1,4})(?:a(\d{0,4}(?:[.,]\d{1,17})?)(?<=\d)(?![\d.,]*\d)|$)", re.IGNORECASE | re.DOTALL
 )
 _PAIR = re.compile(r"_(?:half_)?2x1$")
+#: Columns and rows in a name without ``qs``: the size of anything.
+_SIZE = re.compile(r"(?<!\d)(\d{1,2})(?:x|by)(\d{1,2})(?!\d)", re.IGNORECASE)
 _CONVENTION = "a quilt's name ends in columns x rows and aspect ratio, such as _qs8x6a0.75.png"
 
 
@@ -334,7 +336,9 @@ def layout_of_name(path: Path) -> QuiltLayout:
         return QuiltLayout(2, 1, None)
     match = QUILT_NAME.search(path.stem)
     if match is None:
-        raise PictureError("the name does not say how many views there are", where=str(path), rule=_CONVENTION)
+        size = _SIZE.search(path.stem)
+        fix = f"say the columns and rows of views: --layout {'x'.join(size.groups()) if size else '8x6'}"
+        raise PictureError("the name does not say how many views there are", where=str(path), rule=_CONVENTION, fix=fix)
     aspect = None if match[3] is None else float(match[3].replace(",", "."))  # some languages' mark of decimals
     return checked_layout(int(match[1]), int(match[2]), aspect, where=str(path))
 
