@@ -39,16 +39,16 @@ class PixelSet:
         ``(n,)`` uint32, each pixel once, at least two; ``channel`` is 0 where the colours of a pixel share their rays.
     number:
         ``(height, width, channels)`` int32: which of them each value of the picture shows; -1 past the panel.
-    blocks:
-        ``(rows, columns)`` int32: the picture of the lenses, one value a lens (and panel row), as numbers of pixels; -1
-        where no pixel is seen. None where lenses are about as fine as the picture's pixels.
+    places:
+        ``(rows, columns)`` int32: the picture for denoisers as numbers of pixels; -1 where none is seen. Lenses that
+        are blocks have one value each (and panel row); else it is ``number``, sub-pixels side by side.
     """
 
     column: Indices
     row: Indices
     channel: Indices
     number: NDArray[np.int32]
-    blocks: NDArray[np.int32] | None = None
+    places: NDArray[np.int32]
 
     #: Whether values of the picture are sums over several pixels, of which ``number`` is the brightest.
     is_mixed: ClassVar[bool] = False
@@ -60,33 +60,19 @@ class PixelSet:
 
     def arrange(self, values: Floats) -> Floats:
         """The picture ``(height, width, 3)`` of the pixels' values ``(n, 3)``; 0 where none is seen."""
-        with_black = np.concatenate([values, np.zeros((1, 3), np.float32)])
+        with_black = _with_black(values)
         return with_black[self.number[..., 0]] if self.channels == 1 else with_black[self.number, np.arange(3)]
 
-    def arrange_lenses(self, values: Floats) -> Floats:
-        """The same picture; where lenses are blocks that of the lenses ``(rows, columns, 3)``, as denoisers see it."""
-        if self.blocks is None:
-            return self.arrange(values)
-        return np.concatenate([values, np.zeros((1, 3), np.float32)])[self.blocks]
-
-    def arrange_colors(self, values: Floats) -> Floats:
-        """The picture ``(height, channels * width, 3)`` with all colours of the sub-pixels, those of a place beside
-        each other.
+    def arrange_for_denoiser(self, values: Floats) -> Floats:
+        """The picture ``(rows, columns, 3)`` for denoisers, of ``places``: with all colours of each sub-pixel, as noise
+        that differs from colour to colour looks like texture.
         """
-        with_black = np.concatenate([values, np.zeros((1, 3), np.float32)])
-        return with_black[self.number].reshape(self.number.shape[0], -1, 3)
+        return _with_black(values)[self.places]
 
-    def own_colors(self, picture: Floats) -> Floats:
-        """The picture ``(height, width, 3)`` of what :meth:`arrange_colors` gave: each sub-pixel keeps its own."""
-        return np.diagonal(picture.reshape(*self.number.shape, 3), axis1=2, axis2=3)
-
-    def arrange_from_lenses(self, picture: Floats) -> Floats:
-        """The picture ``(height, width, 3)`` of what :meth:`arrange_lenses` gave."""
-        if self.blocks is None:
-            return picture
-        values = np.zeros((len(self.column), 3), np.float32)
-        covered = self.blocks >= 0
-        values[self.blocks[covered]] = picture[covered]
+    def arrange_denoised(self, picture: Floats) -> Floats:
+        """The picture ``(height, width, 3)`` from a denoised one of :meth:`arrange_for_denoiser`."""
+        values, is_seen = np.zeros((len(self.column), 3), np.float32), self.places >= 0
+        values[self.places[is_seen]] = picture[is_seen]
         return self.arrange(values)
 
 
@@ -194,10 +180,16 @@ def window_pixels(display: Display, window: PixelWindow | None, *, subpixels: bo
     return _pixel_set(np.resize(keys, max(keys.size, 2)), number, panel.width, None)
 
 
+def _with_black(values: Floats) -> Floats:
+    """``(n + 1, 3)``: the last entry, of number -1, is black."""
+    return np.concatenate([values, np.zeros((1, 3), np.float32)])
+
+
 def _pixel_set(
     keys: NDArray[np.int64], number: NDArray[np.int32], width: int, blocks: NDArray[np.int32] | None
 ) -> PixelSet:
     channels = number.shape[2]
     pixel = keys // channels
     column, row, channel = ((part).astype(np.uint32) for part in (pixel % width, pixel // width, keys % channels))
-    return PixelSet(column, row, channel, number, blocks)
+    places = number.reshape(len(number), -1) if blocks is None else blocks
+    return PixelSet(column, row, channel, number, places)

@@ -7,7 +7,7 @@ the height of one pixel about the place that the eye sees, in a coarse picture, 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -38,42 +38,52 @@ class MixedPixels(PixelSet):
         The mixture of lens ``k`` has the entries from ``starts[k]`` to ``starts[k + 1]``: ``(m, channels)`` numbers of
         pixels, and ``(m, 3)`` weights of colours.
     lenses:
-        ``(height, width)`` int32: the lens (and row along a cylinder) of each place of the picture.
-    grid:
-        ``(rows, columns)`` int32 lenses as they lie, -1 where there is none; None for lenses that are no blocks.
+        ``(height, width)`` int32: the lens (and row along a cylinder) of each place of the picture. ``places`` holds
+        lenses, too: as they lie where they are blocks, else the same.
     """
 
     starts: NDArray[np.int64]
     members: NDArray[np.int32]
     weights: Floats
     lenses: NDArray[np.int32]
-    grid: NDArray[np.int32] | None
 
     is_mixed: ClassVar[bool] = True
 
     def arrange(self, values: Floats) -> Floats:
         """The picture ``(height, width, 3)`` of the pixels' values ``(n, 3)``."""
-        return self._mixtures(values)[self.lenses]
+        return self._mix(values, self.members, self.weights)[self.lenses]
 
-    def arrange_lenses(self, values: Floats) -> Floats:
-        """The picture of the lenses, where they are blocks."""
-        if self.grid is None:
-            return self.arrange(values)
-        return np.concatenate([self._mixtures(values), np.zeros((1, 3), np.float32)])[self.grid]
+    def arrange_for_denoiser(self, values: Floats) -> Floats:
+        """The picture ``(rows, columns, 3)`` for denoisers, of ``places``, with all colours for each colour of
+        sub-pixels. It holds means: the sums of the weights differ from lens to lens, which looks like texture.
+        """
+        kinds, sums = [(self.members, self.weights)], self._sums[:, None]
+        if self.channels == 3:
+            kinds = [(self.members[:, [k]], np.repeat(self.weights[:, [k]], 3, axis=1)) for k in range(3)]
+            sums = self._sums[:, :, None]
+        mixtures = np.stack([self._mix(values, *kind) for kind in kinds], axis=1)
+        means = mixtures / np.maximum(sums, np.finfo(np.float32).tiny)
+        picture = np.concatenate([means, np.zeros_like(means[:1])])[self.places]
+        return picture.reshape(len(picture), -1, 3)
 
-    def arrange_from_lenses(self, picture: Floats) -> Floats:
-        """The picture ``(height, width, 3)`` of what :meth:`arrange_lenses` gave."""
-        if self.grid is None:
-            return picture
-        mixtures = np.zeros((len(self.starts) - 1, 3), np.float32)
-        mixtures[self.grid[self.grid >= 0]] = picture[self.grid >= 0]
-        return mixtures[self.lenses]
+    def arrange_denoised(self, picture: Floats) -> Floats:
+        """The picture ``(height, width, 3)`` from a denoised one of :meth:`arrange_for_denoiser`."""
+        values, is_lens = picture.reshape(*self.places.shape, -1, 3), self.places >= 0
+        means = np.zeros((len(self.starts) - 1, *values.shape[2:]), np.float32)
+        means[self.places[is_lens]] = values[is_lens]
+        own = np.diagonal(means, axis1=1, axis2=2) if self.channels == 3 else means[:, 0]
+        return (own * self._sums)[self.lenses]
 
-    def _mixtures(self, values: Floats) -> Floats:
+    @cached_property
+    def _sums(self) -> Floats:
+        """Sums of the weights of each mixture ``(n, 3)``."""
+        return self._mix(np.ones((len(self.column), 3), np.float32), self.members, self.weights)
+
+    def _mix(self, values: Floats, members: NDArray[np.int32], weights: Floats) -> Floats:
         from lippmann.studio_app.real_lens_kernel import mix
 
         out = np.empty((len(self.starts) - 1, 3), np.float32)
-        Bands(usable_cores()).pixels(mix, len(out), self.starts, self.members, self.weights, values, out)
+        Bands(usable_cores()).pixels(mix, len(out), self.starts, members, weights, values, out)
         return out
 
 
@@ -100,11 +110,11 @@ class RealEyeMap(EyeMap):
         self._x, self._y = x.ravel()[first], y.ravel()[first]
         center = lattice.center(i.ravel()[first], j.ravel()[first], self._x, self._y, NUMPY)
         self._center_x, self._center_y = center
-        self._grid = None
+        self._places = self._lenses
         if not lattice.slant and lattice.pitch * width / display.size_mm[0] >= _BLOCK_WIDTH:
             grid = np.full(shape, -1, np.int32)
             grid.ravel()[keys] = np.arange(len(keys))
-            self._grid = grid
+            self._places = grid
 
     def pixels_for_eye(self, eye: Vector) -> PixelSet:
         """The pixels whose light an eye at ``eye`` (mm in the display's frame, z > 0) gets, with their weights."""
@@ -157,7 +167,7 @@ class RealEyeMap(EyeMap):
         column, row, channel_of = parts
         brightest_of = brightest[self._lenses]
         mixture = {"starts": starts, "members": members, "weights": weights}
-        return MixedPixels(column, row, channel_of, brightest_of, lenses=self._lenses, grid=self._grid, **mixture)
+        return MixedPixels(column, row, channel_of, brightest_of, self._places, lenses=self._lenses, **mixture)
 
 
 @lru_cache(2)

@@ -99,6 +99,16 @@ def test_every_pixel_is_traced_once_and_what_lies_past_the_panel_not_at_all():
     assert seen.number.shape == (125, 200, 1)
 
 
+@pytest.mark.parametrize(("display", "subpixels"), [(FINE, True), (BLOCKS, False)], ids=["fine", "blocks"])
+def test_denoisers_get_all_colors_of_each_value_and_pictures_come_back(display, subpixels):
+    visible = EyeMap(display, (150, 100), subpixels=subpixels).pixels_for_eye(EYES[0])
+    values = np.random.default_rng(4).random((len(visible.column), 3), dtype=np.float32)
+    picture = visible.arrange_for_denoiser(values)
+    assert picture.shape[1] == (3 * 150 if subpixels else display.lens_grid.columns)
+    assert (picture == values[visible.places]).all(axis=2)[visible.places >= 0].all()
+    assert np.array_equal(visible.arrange_denoised(picture), visible.arrange(values))
+
+
 def test_a_photograph_fills_picture_and_preview_with_its_own_colours(tmp_path):
     """Orange, far brighter than tone mapping would leave it: one ray a pixel, no network, no edge in any view."""
     color = np.array([250, 120, 10], np.uint8)

@@ -75,17 +75,15 @@ def render_eye_preview(
     options: dict[str, object] = {}
     if denoises:
         effort, guides = effort_of(request.denoise, samples), guided_denoiser(job).guides()
-        # Noise that differs from colour to colour would be taken for texture.
-        arrange = visible.arrange_lenses if visible.channels == 1 else visible.arrange_colors
-        noisy, albedo, normal = (arrange(values[0]) for values in (frame.pixels, guides.albedo, guides.normal))
+        buffers = frame.pixels, guides.albedo, guides.normal
+        noisy, albedo, normal = (visible.arrange_for_denoiser(values[0]) for values in buffers)
         surfaces = SurfacePart.of(normal)
 
         def take_noise_out(light: Floats, *_: object) -> Floats:
             return denoise_surfaces(light, albedo, normal, surfaces, effort=effort)
 
         clean = session.watch.stage("denoise", lambda: clean_light(noisy, None, take_noise_out, samples))
-        eye_view = visible.arrange_from_lenses(clean) if visible.channels == 1 else visible.own_colors(clean)
-        picture = eye_view * (visible.number >= 0)
+        picture = visible.arrange_denoised(clean)
         options = {"denoise": "oidn", "denoise_effort": effort}
     frame.pixels = picture
     provenance = session.provenance(

@@ -19,7 +19,8 @@ from lippmann.device.frozen_kernel import Frozen, aligned
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
 from lippmann.device.types import Array, Float, Float64, Ray3f, UInt32
 from lippmann.display import Display
-from lippmann.display.visible_pixels import PixelSet
+from lippmann.display.panel import PixelWindow
+from lippmann.display.visible_pixels import PixelSet, window_pixels
 from lippmann.rendering.film.wavefront import finite_or_black
 from lippmann.rendering.transport.first_surface import Surfaces
 from lippmann.rendering.transport.path import PathIntegrator
@@ -89,11 +90,6 @@ class Lanes:
         return np.asarray(values.reshape(self._shape)[:, 0, 0])
 
 
-def _two_lanes() -> Lanes:
-    pair = np.zeros(2, np.uint32)
-    return Lanes(PixelSet(pair, pair, pair, np.zeros((1, 1, 1), np.int32)), slice(0, 2))
-
-
 class PlacedDisplay:
     """A display's place in the world, as inputs of kernels."""
 
@@ -122,12 +118,13 @@ class _PixelTracer:
         Whether samples are spread over the pixel, not all at its centre.
     """
 
-    def __init__(self, display: Display, reads: object, *, subpixels: bool, box_filter: bool) -> None:
+    def __init__(self, display: Display, reads: object, subpixels: bool, box_filter: bool) -> None:
         self._source, self._box_filter = DisplayRays(display, np.eye(4), subpixels), box_filter
         self.kernel = Frozen(self._sample_pixels, reads, changes=True)
         # In scenes of several emitters the first launches change the layout of arrays on the device.
+        lanes = Lanes(window_pixels(display, PixelWindow(0, 0, 1, 1), subpixels=False), slice(None))
         for _ in range(_WARMING_LAUNCHES):
-            self._launch(_two_lanes(), PlacedDisplay(np.eye(4)), seed=0)
+            self._launch(lanes, PlacedDisplay(np.eye(4)), seed=0)
 
     def _launch(self, lanes: Lanes, placed: PlacedDisplay, *, seed: int) -> list[Floats]:
         """Values of :meth:`_sample` for each lane."""
@@ -160,10 +157,10 @@ class _PixelTracer:
 class LiveTracer(_PixelTracer):
     """Traces radiance and depth of pixels by an ``integrator``."""
 
-    def __init__(self, display: Display, integrator: LiveIntegrator, *, subpixels: bool, box_filter: bool) -> None:
+    def __init__(self, display: Display, integrator: LiveIntegrator, subpixels: bool, box_filter: bool) -> None:
         # In a list, so that the recorded kernel can read another integrator's arrays.
         self._integrator = [integrator]
-        super().__init__(display, self._integrator, subpixels=subpixels, box_filter=box_filter)
+        super().__init__(display, self._integrator, subpixels, box_filter)
 
     def trace_by(self, integrator: LiveIntegrator) -> None:
         """Replace the integrator by another one of the same scene and depth."""
@@ -193,9 +190,9 @@ class LiveTracer(_PixelTracer):
 class FeatureTracer(_PixelTracer):
     """Traces feature buffers of a denoiser: albedo and normal of what pixels see of the ``surfaces``."""
 
-    def __init__(self, display: Display, surfaces: Surfaces, *, subpixels: bool, box_filter: bool) -> None:
+    def __init__(self, display: Display, surfaces: Surfaces, subpixels: bool, box_filter: bool) -> None:
         self._surfaces = surfaces
-        super().__init__(display, surfaces, subpixels=subpixels, box_filter=box_filter)
+        super().__init__(display, surfaces, subpixels, box_filter)
 
     def trace(self, lanes: Lanes, placed: PlacedDisplay, *, seed: int) -> tuple[Floats, Floats]:
         """Sums of albedo and normal ``(n, 3)`` over the samples of ``lanes``; normals in the display's frame."""

@@ -113,9 +113,9 @@ class Progressive:
                 self._trace_features(seconds)
             assert self._features is not None
             self._denoised_at = self.samples
-            albedo, normal = (self._pixels.arrange_lenses(values) for values in self._features)
+            albedo, normal = (self._pixels.arrange_for_denoiser(values) for values in self._features)
             halves = (sums / np.float32(self._taken) for sums in self._sums)
-            first, second = (self._pixels.arrange_lenses(half) for half in halves)
+            first, second = (self._pixels.arrange_for_denoiser(half) for half in halves)
             threads = self._kernels.session.engine.threads
             self._task = _denoised((first, second), (albedo, normal), self.samples, threads)
         picture = next(self._task)
@@ -123,7 +123,7 @@ class Progressive:
         if picture is None:
             return None
         self._task = None
-        whole = self._pixels.arrange_from_lenses(picture)
+        whole = self._pixels.arrange_denoised(picture)
         return self._frame(develop_picture(whole, self._pixels, self._view.request), seconds, is_denoised=True)
 
     def _frame(self, pixels: NDArray[np.uint8], seconds: dict[str, float], *, is_denoised: bool) -> LiveFrame:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import drjit as dr
 import mitsuba as mi
@@ -30,16 +31,9 @@ if TYPE_CHECKING:
 #: Kernels that are cached: pages of a studio may show a scene on several displays.
 _MOST_KERNELS = 8
 
-
-@dataclass(frozen=True)
-class _Kind:
-    """The key of a tracer's kernel."""
-
-    display: Display
-    integrator: str
-    depth: int
-    subpixels: bool
-    box_filter: bool
+#: The display of a tracer and all that its kernel depends on.
+_Key: TypeAlias = tuple[object, ...]
+Kernel = TypeVar("Kernel", LiveTracer, FeatureTracer)
 
 
 class SceneKernels:
@@ -56,8 +50,8 @@ class SceneKernels:
         self.built: BuiltScene = session.built  # type: ignore[assignment]  # live pictures are physically based
         self._updates = EmitterUpdates(session.scene, self.built)
         self._integrators: dict[tuple[str, int], LiveIntegrator] = {}
-        self._tracers: dict[_Kind, LiveTracer] = {}
-        self._features: dict[_Kind, FeatureTracer] = {}
+        self._tracers: dict[_Key, LiveTracer] = {}
+        self._features: dict[_Key, FeatureTracer] = {}
         self._exposure: float | None = None
         self._bounds_in = bounds_by_hull(session.scene)
         #: The view whose light and exposure the scene has now.
@@ -82,24 +76,18 @@ class SceneKernels:
 
     def tracer(self, display: Display, request: RenderRequest) -> LiveTracer:
         """The tracer of a resolved request."""
-        kind = _kind(display, request)
-        if kind not in self._tracers:
-            _drop_oldest(self._tracers)
-            self._tracers[kind] = LiveTracer(
-                display, self._integrator(request), subpixels=kind.subpixels, box_filter=kind.box_filter
-            )
-        self._tracers[kind].trace_by(self._integrator(request))
-        return self._tracers[kind]
+        integrator, sampling = self._integrator(request), _sampling_of(request)
+        key = display, *sampling, *_traced_by(request)
+        tracer = _cached(self._tracers, key, lambda: LiveTracer(display, integrator, *sampling))
+        tracer.trace_by(integrator)
+        return tracer
 
     def feature_tracer(self, display: Display, request: RenderRequest) -> FeatureTracer:
         """The tracer of feature buffers of a resolved request."""
-        kind = replace(_kind(display, request), integrator="", depth=0)
-        if kind not in self._features:
-            _drop_oldest(self._features)
-            self._features[kind] = FeatureTracer(
-                display, make_surfaces(self.built), subpixels=kind.subpixels, box_filter=kind.box_filter
-            )
-        return self._features[kind]
+        sampling = _sampling_of(request)
+        return _cached(
+            self._features, (display, *sampling), lambda: FeatureTracer(display, make_surfaces(self.built), *sampling)
+        )
 
     def expose(self, display: Display, request: RenderRequest, placement: Placement, *, measure: bool) -> float:
         """Set the exposure of a resolved request, and return it in stops.
@@ -141,10 +129,14 @@ def _traced_by(request: RenderRequest) -> tuple[str, int]:
     return request.integrator, request.surfaces
 
 
-def _kind(display: Display, request: RenderRequest) -> _Kind:
-    return _Kind(display, request.integrator, request.surfaces, bool(request.subpixels), request.box_filter)
+def _sampling_of(request: RenderRequest) -> tuple[bool, bool]:
+    """Whether sub-pixels have rays of their own, and whether samples are spread over the pixel."""
+    return bool(request.subpixels), request.box_filter
 
 
-def _drop_oldest(kernels: dict[_Kind, Any]) -> None:
-    while len(kernels) >= _MOST_KERNELS:
-        del kernels[next(iter(kernels))]
+def _cached(kernels: dict[_Key, Kernel], key: _Key, make: Callable[[], Kernel]) -> Kernel:
+    if key not in kernels:
+        while len(kernels) >= _MOST_KERNELS:
+            del kernels[next(iter(kernels))]
+        kernels[key] = make()
+    return kernels[key]
