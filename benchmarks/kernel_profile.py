@@ -118,7 +118,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
 
     def traced(integrator: path.PathIntegrator, most: int = usual, in_rows: bool = False, is_dark: bool = False) -> Any:
         def call(seed: int) -> Any:
-            path_techniques.TUNING = tuning._replace(photons_of_cell=most)
+            path_techniques.TUNING = replace(tuning, photons_of_cell=most)
             with mock.patch.object(wavefront, "in_strips", return_value=0) if in_rows else nullcontext():
                 pixels, stream = samples_of_tile(source, plan, tile, run, seed, True)
             with (

@@ -98,7 +98,7 @@ def test_pixels_are_the_same_in_parts_and_some_stand_for_all(monkeypatch):
 
     light = lambda x: np.where(x > 0, 1.0, 0.0)  # noqa: E731
     every = blur_of(light, 0.1, samples=8)
-    monkeypatch.setattr(caustic_blur, "TUNING", caustic_blur.TUNING._replace(probe_side=round(SIZE / np.sqrt(2))))
+    monkeypatch.setattr(caustic_blur, "TUNING", replace(caustic_blur.TUNING, probe_side=round(SIZE / np.sqrt(2))))
     whole = blur_of(light, 0.1, samples=8)
     measured = (whole != 0).any(axis=2)
     assert 0.3 < measured[:, 14:18].mean() < 0.7  # a probe has half as many rays

@@ -246,7 +246,7 @@ def test_light_is_that_of_a_render(renderers):
 
 def test_pictures_in_turns_are_those_by_themselves(teapot, monkeypatch):
     """Of other lights, exposures and displays: what one picture sets between two steps of another is put right."""
-    monkeypatch.setattr(live_renderer, "TRANSPORT", live_renderer.TRANSPORT._replace(lanes=1000))
+    monkeypatch.setattr(live_renderer, "TRANSPORT", replace(live_renderer.TRANSPORT, lanes=1000))
     renderer = LiveRenderer(teapot, DISPLAYS["square"])
     request = RenderRequest(placement=PLACED, exposure=0.0)
     view = LiveView(None, request=request)

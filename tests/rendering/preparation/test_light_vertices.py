@@ -112,14 +112,14 @@ def test_scenes_of_very_many_emitters_are_left_to_paths(monkeypatch):
 
     scene = room(small()) | {"point": {"type": "point", "position": [-0.8, 0.8, -0.7], "intensity": 1e-3}}
     assert given(*stage(scene))
-    monkeypatch.setattr(prepare, "TUNING", prepare.TUNING._replace(most_weighed_emitters=1))
+    monkeypatch.setattr(prepare, "TUNING", replace(prepare.TUNING, most_weighed_emitters=1))
     assert not given(*stage(scene))
 
 
 def test_passes_serve_their_samples_and_pictures_do_not_depend_on_the_memory(monkeypatch):
     import lippmann.rendering.preparation.prepare as module
 
-    monkeypatch.setattr(module, "TUNING", module.TUNING._replace(pass_samples=4))
+    monkeypatch.setattr(module, "TUNING", replace(module.TUNING, pass_samples=4))
     integrator, source = stage(room(small()))
     integrator = given(integrator, source, seed=3)
     served, passes = [], integrator.light.vertex_passes

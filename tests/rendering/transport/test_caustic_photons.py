@@ -371,7 +371,7 @@ def test_kernels_of_any_size_shoot_the_same_photons(monkeypatch):
 
     scene = {"room": room(), "ball": {"type": "sphere", "bsdf": {"type": "dielectric"}}, "emitter": lamp([3, 2, 4])}
     whole = landed(scene, count=5000)
-    monkeypatch.setattr(photon_shooter, "TUNING", photon_shooter.TUNING._replace(lanes=700))
+    monkeypatch.setattr(photon_shooter, "TUNING", replace(photon_shooter.TUNING, lanes=700))
     in_parts = landed(scene, count=5000)
     assert len(whole) == len(in_parts) > 1500
     # Of each kernel, photons come in the order of the surfaces that they have met.

@@ -293,7 +293,7 @@ def test_no_emitter_one_or_very_many_keep_the_weights_of_the_scene(monkeypatch):
         integrator, source = stage(room(order))
         assert estimated_weights(integrator, source) == pytest.approx([1.0] * len(order))
         assert isinstance(pilot_sampler(integrator, source), SceneLightSampler)
-    monkeypatch.setattr(prepare, "TUNING", prepare.TUNING._replace(most_weighed_emitters=2))
+    monkeypatch.setattr(prepare, "TUNING", replace(prepare.TUNING, most_weighed_emitters=2))
     integrator, source = stage(room())
     assert estimated_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -252,7 +254,7 @@ def test_first_samples_take_several_emitter_samples_each(monkeypatch):
 
     several, mean = noise()
     rays = trace(four_emitters(), camera(4, 50), 16, 1, 1).rays
-    monkeypatch.setattr(path_weights, "TUNING", path_weights.TUNING._replace(emitter_samples=1))
+    monkeypatch.setattr(path_weights, "TUNING", replace(path_weights.TUNING, emitter_samples=1))
     one, same_mean = noise()
     fewer = trace(four_emitters(), camera(4, 50), 16, 1, 1).rays
     assert (rays.shadow, fewer.shadow) == (4 * 256, 256)

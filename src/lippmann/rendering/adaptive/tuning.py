@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 
-class AdaptiveTuning(NamedTuple):
+@dataclass(frozen=True)
+class AdaptiveTuning:
     """Constants of the stopping rule.
 
     Attributes

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 
-class DenoiseTuning(NamedTuple):
+@dataclass(frozen=True)
+class DenoiseTuning:
     """Constants of the network's use, and of what goes past it.
 
     Attributes

@@ -5,10 +5,11 @@ All were set on ``estimate_coverage.py``, whose scenes are made to mislead estim
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 
-class EstimateTuning(NamedTuple):
+@dataclass(frozen=True)
+class EstimateTuning:
     """Constants of the jackknife, of intervals, and of the prior of a denoiser's bias.
 
     Attributes

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 
-class PreparationTuning(NamedTuple):
+@dataclass(frozen=True)
+class PreparationTuning:
     """Constants of specular chains, exposure, emitter weights, photon passes and light vertices.
 
     Attributes

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 
-class RequestTuning(NamedTuple):
+@dataclass(frozen=True)
+class RequestTuning:
     """Constants of the number of samples.
 
     Attributes

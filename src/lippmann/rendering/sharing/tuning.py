@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 
-class SharingTuning(NamedTuple):
+@dataclass(frozen=True)
+class SharingTuning:
     """Constants of the filters across lenses, and across the views of a quilt.
 
     Weights across lenses are ``(1 - sum / faded)^8`` for a sum of squared differences, which is nearly

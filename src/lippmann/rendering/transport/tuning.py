@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 
-class TransportTuning(NamedTuple):
+@dataclass(frozen=True)
+class TransportTuning:
     """Constants of paths, of chains of seen light, of photons' look-ups and of light vertices.
 
     Attributes
