@@ -100,7 +100,6 @@ def test_mpo_as_pillow_reads_it(tmp_path):
         ("a.jps", jps(0, kind=0), "a.jps: holds no views side by side"),
         ("a.jps", jps(0, layout=4), "holds no views side by side"),
         ("a.mpo", jps(0), "a.mpo: holds one picture"),
-        ("a.mov", b"", r"a.mov: is a film; films are not read, nor the two views of a spatial one \(MV-HEVC\)"),
     ],
 )
 def test_files_that_hold_no_pair(tmp_path, name, data, message):

@@ -20,7 +20,7 @@ from lippmann.codecs.pillow_formats import codes_of, open_picture
 from lippmann.codecs.types import Pixels
 from lippmann.errors import PictureError
 
-#: Endings of the files that hold pairs, and of films, which are named where they are met.
+#: Endings of the files that hold pairs, and of films.
 PAIRS = (".jps", ".mpo")
 #: Endings of HEIF pictures, whose pairs :mod:`lippmann.scene.readers.heif` reads.
 HEIF = (".heic", ".heif", ".hif")
@@ -66,7 +66,7 @@ def encode_mpo(left: Pixels, right: Pixels) -> bytes:
 
 
 def read_pair(path: Path) -> tuple[Photograph, Photograph] | None:
-    """The left and the right view of a file of a pair; None for other files.
+    """The left and the right view of a file of a pair, of a spatial film those of its first frame; None for others.
 
     Raises
     ------
@@ -83,12 +83,9 @@ def read_pair(path: Path) -> tuple[Photograph, Photograph] | None:
     if suffix == ".mpo":
         return _read_mpo(path)
     if suffix in _FILMS:
-        raise PictureError(
-            "is a film",
-            where=str(path),
-            rule="films are not read, nor the two views of a spatial one (MV-HEVC)",
-            fix="write its views as pictures first: ffmpeg 7.1 names them -map 0:v:view:0 and -map 0:v:view:1",
-        )
+        from lippmann.codecs.spatial_film import read_first_pair
+
+        return read_first_pair(path)
     return None
 
 
