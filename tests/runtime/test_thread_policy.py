@@ -1,13 +1,15 @@
-"""Threads keep the scheduling policy that they had."""
+"""Threads keep the scheduling policy that they had, or stand behind all others."""
 
 import os
+import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
 import pytest
 
 from lippmann.runtime import thread_policy
-from lippmann.runtime.thread_policy import kept_policy
+from lippmann.runtime.thread_policy import kept_policy, run_behind
 
 REAL_TIME = getattr(os, "SCHED_FIFO", None)
 
@@ -62,3 +64,19 @@ def test_systems_without_such_policies_are_left_alone(monkeypatch):
     monkeypatch.setattr(thread_policy, "_THREADS", thread_policy._THREADS / "none")
     with kept_policy():
         pass
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="niceness is of whole processes")
+def test_a_thread_and_those_that_it_starts_run_behind_the_others():
+    def niceness():
+        return os.getpriority(os.PRIO_PROCESS, 0)
+
+    def of_thread():
+        with ThreadPoolExecutor(1) as pool:
+            return pool.submit(niceness).result()
+
+    before = niceness()
+    with ThreadPoolExecutor(1, initializer=run_behind) as pool:
+        assert pool.submit(niceness).result() == min(before + 10, 19)
+        assert pool.submit(of_thread).result() == min(before + 10, 19)
+    assert niceness() == before == of_thread()

@@ -14,7 +14,7 @@ from lippmann.errors import OutputError, UsageError
 from lippmann.quilts.quilt import QuiltLayout
 from lippmann.quilts.quilt_metadata import metadata_of_text
 from lippmann.viewing import mp4_film, video_file
-from lippmann.viewing.video_file import check_animation_path, write_animation
+from lippmann.viewing.video_file import check_animation_path, write_animation, write_codes
 
 
 def frames(count=5, height=24, width=32):
@@ -56,6 +56,23 @@ def test_mp4_is_close(tmp_path, capfd, codec, name, tag):
         # Halved colour resolution blurs the edges of the column; the rest is near.
         assert np.median(np.abs(difference)) <= 3
         assert np.abs(difference.mean(axis=(0, 1))).max() < 4
+
+
+@pytest.mark.parametrize("codec", ["h264", "hevc", "vp9", "av1"])
+def test_depth_beside_colour_comes_back_within_its_code(tmp_path, codec):
+    """Ramps and steps of grey; a step's own pixels may differ by a few codes more."""
+    rows, columns = np.mgrid[:96, :128]
+    depth = np.where((rows - 48) ** 2 + (columns - 64) ** 2 < 900, 230, 20 + columns)
+    codes = np.repeat(depth[..., None], 3, axis=2).astype(np.uint8)
+    shares = []
+    for has_depth in (True, False):
+        write_codes(iter([codes] * 3), tmp_path / "a.mp4", codec=codec, has_depth=has_depth)
+        with av.open(str(tmp_path / "a.mp4")) as film:
+            difference = [
+                np.abs(frame.to_ndarray(format="rgb24").astype(int) - codes) for frame in film.decode(video=0)
+            ]
+        shares.append(np.mean(np.array(difference) <= 1))
+    assert shares[0] > max(0.99, shares[1])
 
 
 @pytest.mark.parametrize("codec", ["h264", "hevc", "av1"])

@@ -15,7 +15,7 @@ from lippmann.runtime.plugins import Door, Extension, Target
 LayoutOption = Literal["distance", "grid", "progress"]
 #: Keywords that some writers of films take: the ``codec`` asked for, the ``quilt`` that the frames are, and ``place``,
 #: the file's path to come.
-FilmOption = Literal["codec", "quilt", "place"]
+FilmOption = Literal["codec", "quilt", "place", "has_depth"]
 
 
 class Export(Extension):
@@ -73,7 +73,7 @@ class Film(Export):
         ``write(frames, path, frames_per_second)``, or ``"module:function"``: ``frames`` yields arrays ``(H, W, 3)`` of
         bytes. The file becomes that of the film once it is whole; its ending is not that of the film.
     options:
-        Which of ``codec``, ``quilt`` and ``place`` ``write`` takes as keywords.
+        Which of ``codec``, ``quilt``, ``place`` and ``has_depth`` ``write`` takes as keywords.
 
     Examples
     --------
@@ -119,7 +119,7 @@ EXPORTS = Door(
             "view_folder", "view_folder", bits=_FLOATS, write_options=("progress",), read_options=("grid", "progress")
         ),
         "apng": Film((".png", ".apng"), "lippmann.codecs.apng:write_apng"),
-        "mp4": Film((".mp4",), "lippmann.viewing.mp4_film:write_mp4", ("codec", "quilt", "place")),
+        "mp4": Film((".mp4",), "lippmann.viewing.mp4_film:write_mp4", ("codec", "quilt", "place", "has_depth")),
     },
 )
 

@@ -1,13 +1,26 @@
-"""The scheduling policy of this process's threads, kept while a library starts threads of its own."""
+"""The scheduling of this process's threads: kept while a library starts threads of its own, or behind all others."""
 
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 _THREADS = Path("/proc/self/task")
+#: Steps of niceness: a tenth of the processor time of a thread that competes.
+_BEHIND = 10
+
+
+def run_behind() -> None:
+    """Let the calling thread, and those that it starts, have the processor time that other threads leave (Linux).
+
+    A parallel stage of a renderer ends with its last thread: an encoder that takes a core by turns from one of them
+    costs the stage more than the encoder's own time. Elsewhere nothing is done: niceness is of whole processes there.
+    """
+    if sys.platform == "linux":
+        os.nice(_BEHIND)
 
 
 @contextmanager

@@ -62,12 +62,15 @@ class Filming(NamedTuple):
         The layout of a film of quilts.
     note:
         What the film does not show as it is in the files, in one line.
+    has_depth:
+        Whether depth lies beside colour.
     """
 
     codes: Callable[[SavedFrame], Pixels]
     codec: Codec | None
     quilt: QuiltLayout | None = None
     note: str | None = None
+    has_depth: bool = False
 
 
 def film_of_pictures(
@@ -129,7 +132,9 @@ def film_of_pictures(
         back, front = (min(edge, 0.9 * z) for edge in place.depth_range)
         chosen = codec_of_film(video, (size[0] * (1 if form.half else 2), size[1]), codec)
         return Filming(
-            lambda frame: rgbd_codes(INTEGRAL.read(frame.path), form, eye, between=(z - front, z - back)), chosen
+            lambda frame: rgbd_codes(INTEGRAL.read(frame.path), form, eye, between=(z - front, z - back)),
+            chosen,
+            has_depth=True,
         )
     projection = projection_of(video, eye)
 

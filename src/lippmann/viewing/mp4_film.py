@@ -62,13 +62,16 @@ _LEAN_AV1 = {"svtav1-params": "lp=1:lookahead=0:hierarchical-levels=2"}
 #: Constant rate factors near the one that is considered visually lossless (18 in H.264); lower is better. Apple's
 #: players take HEVC as ``hvc1`` alone.
 _ENCODERS: dict[Codec, _Encoder] = {
-    "h264": _Encoder("libx264", {"crf": "16", **_LEAN}, "avc1", 4096),
+    "h264": _Encoder("libx264", {"crf": "16", "preset": "veryfast", **_LEAN}, "avc1", 4096),
     "hevc": _Encoder("libx265", {"crf": "18", "x265-params": _LEAN_HEVC}, "hvc1", 8192),
     "vp9": _Encoder("libvpx-vp9", {"crf": "20", "b": "0", "cpu-used": "4", **_LEAN_VP9}, "vp09", 8192),
     "av1": _Encoder("libsvtav1", {"crf": "20", "preset": "8", **_LEAN_AV1}, "av01", 8192),
     "h264-rgb": _Encoder("libx264rgb", {"qp": "0", "preset": "veryfast", **_LEAN}, "avc1", 16384, "rgb24"),
     "vp9-rgb": _Encoder("libvpx-vp9", {"lossless": "1", "cpu-used": "5", **_LEAN_VP9}, "vp09", 16384, "gbrp"),
 }
+
+#: Of films with depth beside colour: nearly without loss, as each step of depth moves a surface.
+_DEPTH = {"crf": "1"}
 
 #: sRGB and BT.709 in the numbering of ITU-T H.273; RGB as it is has the matrix 0 and the full range.
 _BT709, _SRGB_TRANSFER, _LIMITED = 1, 13, 1
@@ -149,6 +152,7 @@ def write_mp4(
     place: Path,
     codec: Codec | None,
     quilt: QuiltLayout | None,
+    has_depth: bool = False,
 ) -> None:
     """Write 8-bit frames as MP4; the file will be called ``place``."""
     from fractions import Fraction
@@ -172,7 +176,8 @@ def write_mp4(
                     codec = codec_for(size, codec)
                     check_film(place, size, codec)
                     encoder = _ENCODERS[codec]
-                    stream = container.add_stream(encoder.name, rate=rate, options=encoder.options)
+                    options = encoder.options | _DEPTH if has_depth and not encoder.is_exact else encoder.options
+                    stream = container.add_stream(encoder.name, rate=rate, options=options)
                     frame = _frame(codes, encoder, quilt)
                     _open(stream.codec_context, encoder, (frame.width, frame.height))
                 else:

@@ -22,6 +22,7 @@ from lippmann.image.stored_values import FloatArray
 from lippmann.quilts.quilt import QuiltLayout
 from lippmann.runtime.atomic_write import replacing
 from lippmann.runtime.plugins import Plugin, function_of
+from lippmann.runtime.thread_policy import run_behind
 from lippmann.viewing.mp4_film import Codec, check_film, codec_for
 
 #: Seconds after which a thread that waits for the film's writer looks whether it has failed.
@@ -114,14 +115,16 @@ def write_codes(
     frames_per_second: float = 24.0,
     codec: Codec | None = None,
     quilt: QuiltLayout | None = None,
+    has_depth: bool = False,
 ) -> None:
     """Write frames ``(H, W, 3)`` of 8-bit codes as an animation; parameters and errors as of :func:`write_animation`.
 
-    The next frame is made while one is coded and written; no more are held.
+    The next frame is made while one is coded and written; no more are held. With ``has_depth`` a lossy codec loses
+    next to nothing, about two codes at most.
     """
     check_animation_path(path, codec)
     film = _film_of(path)
-    values = {"codec": codec, "quilt": quilt, "place": path}
+    values = {"codec": codec, "quilt": quilt, "place": path, "has_depth": has_depth}
     chosen = {name: values[name] for name in film.value.options}
     write = function_of(film.value.write)
     with replacing(path) as temporary, film.guarded(OutputError, str(path)):
@@ -140,7 +143,7 @@ def _beside(write: Callable[[Iterator[Pixels]], None], frames: Iterable[Pixels])
         if stopped.is_set():
             raise _StoppedError
 
-    with ThreadPoolExecutor(1, "film") as pool:
+    with ThreadPoolExecutor(1, "film", run_behind) as pool:
         writing = pool.submit(write, taken())
 
         def hand_over(frame: Pixels | None) -> None:

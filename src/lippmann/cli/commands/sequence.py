@@ -148,6 +148,7 @@ def render_frames(
                 frames_per_second=spec.fps or FRAMES_PER_SECOND,
                 codec=filming.codec,
                 quilt=filming.quilt,
+                has_depth=filming.has_depth,
             )
     for alike in notes.values():
         where = next(iter(alike))
