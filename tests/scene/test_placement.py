@@ -11,6 +11,7 @@ from lippmann.display import Display, LensArray, Panel, list_displays, load_disp
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.placement import PlacementOptions
 from lippmann.scene.fit_placement import FILL, POP_OUT
+from lippmann.scene.matrices import rotation
 from lippmann.scene.placement import options_of_sequence, place, placement_of
 from lippmann.scene.values.description import Camera
 
@@ -90,6 +91,10 @@ def options(**fields):
 
 #: The line on a scene with cameras that is fitted, since nobody named one.
 SEEN = 'fitted, seen along -z: as a camera of the file sees it by camera="{}"'
+#: The same where the scene's middle lies before a camera, whose direction the fit takes.
+FACING = (
+    'fitted, seen the way that a camera of the file looks: camera="{}" shows its picture, place="fit" a view along -z'
+)
 
 
 class TestFit:
@@ -415,11 +420,30 @@ class TestCamera:
         assert in_display(home, [(0, 0, 0)]) == pytest.approx(np.zeros((1, 3)), abs=1e-9)
         assert home.warnings == ()
         fitted = place(self.BOUNDS, display(), cameras=cameras)
-        assert (fitted.mode, fitted.warnings) == ("fit", (SEEN.format("other"),))
+        assert (fitted.mode, fitted.warnings) == ("fit", (FACING.format("other"),))
         asked = place(self.BOUNDS, display(), cameras=cameras, options=options(place="fit"), home_camera="eye")
         assert (asked.mode, asked.warnings) == ("fit", ())
         other = place(self.BOUNDS, display(), cameras=cameras, options=options(camera="other"), home_camera="eye")
         assert in_display(other, [(0, 0, 9)]) == pytest.approx(np.zeros((1, 3)), abs=1e-9)
+
+    @pytest.mark.parametrize("turn", [(0, 0, 0), (30, 20, 10)])
+    @pytest.mark.parametrize("degrees", [(40, -25, 5), (170, 0, 0), (0, -90, 0), (30, 90, 20)])
+    def test_a_fit_takes_the_direction_of_a_camera(self, degrees, turn):
+        pose = rotation(degrees).T
+        pose[:3, 3] = 10.0 * pose[:3, 2] + (1.0, 2.0, 3.0)
+        bounds = box(3, 2, 1, center=(1, 2, 3))
+        away = self.camera(name="away", world_from_camera=pose @ np.diag([-1.0, 1, -1, 1]))
+        flat = self.camera(name="flat", world_from_camera=np.diag([1.0, 0, 1, 1]))
+        cameras = [flat, away, self.camera(world_from_camera=pose)]
+        placed = place(bounds, display(), cameras=cameras, options=options(turn=turn, depth_scale=1.0))
+        towards = placed.display_from_world[:3, :3] / np.cbrt(np.linalg.det(placed.display_from_world[:3, :3]))
+        assert towards == pytest.approx((rotation(turn) @ rotation(degrees))[:3, :3], abs=1e-7)
+        assert placed.warnings[0] == FACING.format("eye")
+        asked = place(bounds, display(), cameras=cameras, options=options(place="fit", turn=turn))
+        plain = place(bounds, display(), options=options(turn=turn))
+        assert asked.world_from_display == pytest.approx(plain.world_from_display)
+        unseen = place(bounds, display(), cameras=cameras[:2])
+        assert unseen.warnings[0] == SEEN.format("flat")
 
     def test_unknown_cameras(self):
         with pytest.raises(SceneError, match=r"unknown camera 'eya', did you mean 'eye'\?; known are eye"):

@@ -101,4 +101,5 @@ def warn_of_emptiness(share: float) -> tuple[str, ...]:
     if share >= LEAST_SHARE:
         return ()
     content = "nothing" if share == 0 else f"{share:.1%} of it shows anything"
-    return (f"the picture is nearly empty ({content}): place the scene by camera, turn, scale or shift",)
+    fix = 'place the scene by camera, turn, scale or shift, or light it by environment="studio"'
+    return (f"the picture is nearly empty ({content}): {fix}",)

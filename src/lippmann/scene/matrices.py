@@ -13,6 +13,9 @@ from lippmann.scene.values.description import Matrix
 Bounds = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
+#: Sine of the angle to the vertical below which a direction is vertical.
+_UPRIGHT = 1e-9
+
 
 def transform_points(matrix: Matrix, points: Bounds) -> Bounds:
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], np.float64)
@@ -60,3 +63,15 @@ def rotation(turn: Vector) -> Matrix:
     matrix = np.eye(4)
     matrix[:3, :3] = roll @ pitch @ yaw
     return matrix
+
+
+def turn_of(matrix: Matrix) -> tuple[float, float, float]:
+    """Yaw, pitch and roll in degrees of a rotation ``(3, 3)``, as :func:`rotation` takes them."""
+    across = float(np.hypot(matrix[2, 0], matrix[2, 2]))
+    pitch = np.arctan2(matrix[2, 1], across)
+    if across < _UPRIGHT:  # seen from above or below, yaw and roll are one
+        yaw, roll = np.arctan2(matrix[0, 2], matrix[0, 0]), 0.0
+    else:
+        yaw, roll = np.arctan2(-matrix[2, 0], matrix[2, 2]), np.arctan2(-matrix[0, 1], matrix[1, 1])
+    yaw, pitch, roll = np.degrees([yaw, pitch, roll]).tolist()
+    return yaw, pitch, roll

@@ -16,7 +16,7 @@ from lippmann.display import Display
 from lippmann.display.stereo import COMFORTABLE, EYE_DISTANCE, depth_of_disparity, disparity
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.placement import Mode, PlacementOptions
-from lippmann.scene.camera_placement import DepthProbe, frame_whole, place_by_camera
+from lippmann.scene.camera_placement import DepthProbe, frame_whole, place_by_camera, remove_scale
 from lippmann.scene.matrices import (
     Bounds,
     depth_scaling,
@@ -26,6 +26,7 @@ from lippmann.scene.matrices import (
     scaling,
     transform_points,
     translation,
+    turn_of,
 )
 from lippmann.scene.scene import box, box_corners, find_camera, thin_axis
 from lippmann.scene.values.description import Camera, Matrix
@@ -156,9 +157,7 @@ def place(
     warnings: list[str] = []
     exposure = 0.0
     if mode == "fit":
-        if cameras and options == PlacementOptions():
-            warnings.append(f'fitted, seen along -z: as a camera of the file sees it by camera="{cameras[0].name}"')
-        options = face_viewer(bounds, options, warnings)
+        options = face_viewer(bounds, options, warnings, cameras)
         points = box_corners(bounds) if extreme_points is None else extreme_points()
         display_from_world = _fit(
             bounds, display, options, warnings, points=points, bounds_in=bounds_in, covers=fills_panel
@@ -213,8 +212,26 @@ def stand(
     return Placement(world_from_display, (back, front), (far, near), mode, warnings)
 
 
-def face_viewer(bounds: Bounds, options: PlacementOptions, warnings: list[str]) -> PlacementOptions:
-    """The options, with a turn for a flat scene that would be seen edge-on, unless a turn was asked for."""
+def face_viewer(
+    bounds: Bounds, options: PlacementOptions, warnings: list[str], cameras: Sequence[Camera] = ()
+) -> PlacementOptions:
+    """The options of a fit, with the turn by which the scene is seen as its file means it, unless they say ``place``.
+
+    That is the direction of its first camera that has the scene's middle within 45 degrees of its axis, across and
+    down; a turn that was asked for comes after it. Without one, a flat scene that would be seen edge-on is turned.
+    """
+    for camera in cameras if options.place is None else ():
+        try:
+            frame = inverse(remove_scale(camera))
+        except SceneError:  # its transform cannot be inverted: it is of no use to a fit, nor in its way
+            continue
+        x, y, z = transform_points(frame, bounds.mean(axis=0)[None])[0]
+        if max(abs(x), abs(y)) <= -z:
+            fitted = f'fitted, seen the way that a camera of the file looks: camera="{camera.name}" shows its picture'
+            warnings.append(f'{fitted}, place="fit" a view along -z')
+            return replace(options, turn=turn_of((rotation(options.turn) @ frame)[:3, :3]))
+    if cameras and options == PlacementOptions():
+        warnings.append(f'fitted, seen along -z: as a camera of the file sees it by camera="{cameras[0].name}"')
     thin = thin_axis(bounds)
     if thin is None or any(options.turn):
         return options

@@ -181,6 +181,11 @@ class Scene:
             return self.home_camera
         return self.cameras[0].name if self.cameras else None
 
+    @property
+    def facing_cameras(self) -> Sequence[Camera]:
+        """Cameras whose direction of view a fit may take where nothing else is said: none beside a home camera."""
+        return self.cameras if self.display_camera is None else ()
+
     @cached_property
     def has_lights(self) -> bool:
         """Whether the scene has light of its own, or an environment was asked for; see :func:`has_lights`."""

@@ -55,7 +55,7 @@ def turning_axis(scene: Scene, options: PlacementOptions) -> Vector:
     elif options.place == "display":
         display_from_world = rotation(options.turn)[:3, :3]
     else:
-        display_from_world = rotation(face_viewer(scene.bounds, options, []).turn)[:3, :3]
+        display_from_world = rotation(face_viewer(scene.bounds, options, [], scene.facing_cameras).turn)[:3, :3]
     up = display_from_world[1]
     upright = int(np.argmax(np.abs(up) + np.array([0.0, _TIE, 0.0])))
     axis = [0.0, 0.0, 0.0]

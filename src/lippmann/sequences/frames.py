@@ -132,7 +132,7 @@ def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> S
         options = replace(options, camera=cameras[0].name)
         camera = motion.camera(0, options.camera)
     if camera is None:
-        placement = place(motion.bounds(), display, options=options)
+        placement = place(motion.bounds(), display, cameras=motion.scene(0).facing_cameras, options=options)
         return Stand(motion, display, placement.mode, placement.world_from_display, may_cut=placement.may_cut)
     if options.place not in (None, "camera"):
         raise UsageError(

@@ -120,7 +120,7 @@ class Turntable(Motion):
                 probe=partial(_depth_of, swept),
             )
             return replace(placement, warnings=(*notes, *placement.warnings))
-        options = face_viewer(scene.bounds, replace(options, place="fit"), notes)
+        options = replace(face_viewer(scene.bounds, options, notes, scene.facing_cameras), place="fit")
         yaw, pitch, roll = options.turn
         # About the same axis, the yaw is but another beginning of the turn; fitted after it, the box is the least.
         turn = turn_about(_UP, self._center, yaw if abs(self._axis[1]) == 1.0 else 0.0)
