@@ -251,7 +251,7 @@ class _ProbeResult:
 
 
 class _Probe:
-    """Short runs of a picture's pixels."""
+    """Traces a sample of a picture's pixels, in runs of neighbours, for the time that its samples take."""
 
     def __init__(self, source: DisplayRays | WindowRays, seed: int) -> None:
         from lippmann.rendering.transport.ray_source import ChosenRays

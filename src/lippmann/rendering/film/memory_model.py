@@ -35,8 +35,8 @@ ERROR_MAPS = COLORS
 FOR_DENOISER = PICTURE + COLORS + PICTURE
 #: One emission of photons, which lands about once, with what sorting takes, in bytes.
 PHOTON = 128
-#: What reuse of points takes: points without colours, plain rows, maps and lists of pixels. The paper's order takes
-#: the most: 6 for points, 4 for lenses, 8 for places beside centres, 12 for the sorted list.
+#: Bytes a pixel that reprojection takes beside the colours. The paper's order takes the most: 6 for points, 4 for
+#: lenses, 8 for their places beside pixels' centres, 12 for the sorted list.
 POINT_IMAGE = 32
 #: Depth, normal, albedo, shape and position, and the copies that a file writer makes of them; or albedo, normal, height
 #: and coverage for the denoiser, and what a tile adds to them.

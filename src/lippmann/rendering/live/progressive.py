@@ -40,7 +40,7 @@ class Progressive:
         self._kernels, self._pixels = view.kernels, view.pixels
         self._count = len(view.pixels.column)
         self._sums = np.zeros((STREAMS, self._count, 3), np.float32)
-        #: Samples per pixel of each stream; of the round in progress, the pixels that are done and its samples.
+        #: Samples per pixel that each stream has; number of pixels done in the current round, and samples that it adds.
         self._taken, self._begun, self._coming = 0, 0, 0
         self._features: tuple[Floats, Floats] | None = None
         self._denoised_at = 0

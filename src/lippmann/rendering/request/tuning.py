@@ -12,14 +12,14 @@ class RequestTuning:
     Attributes
     ----------
     usual:
-        Samples per pixel of a picture whose light is not pooled, and most of one whose light is pooled: more have to be
-        asked for (``docs/research/equal-time.md``). From so many on the high effort of the network is worth its time:
-        that of 12 rays per pixel for 0.7 dB on the average (``docs/background/denoising.md``). With fewer, all samples
-        may miss rare light such as mirrored emitters.
+        Default samples per pixel of a picture whose light is not pooled, and the largest default of one whose light is
+        (``docs/research/equal-time.md``). From this number on the network runs at high effort, which costs the time of
+        12 rays per pixel and gains 0.7 dB on average (``docs/background/denoising.md``). With fewer samples all may
+        miss rare light such as mirrored emitters.
     fewest:
-        Least samples per pixel of a pooled picture: with fewer the worst micro-images are noisy, and outliers cannot be
-        told apart. One less per sub-pixel with rays of its own, two less where there are more of these than ``values``
-        times ``usual`` (``docs/research/adaptive-sampling.md``).
+        Smallest default of samples per pixel of a pooled picture: with fewer the worst micro-images are noisy, and
+        outliers cannot be recognized. Sub-pixels with rays of their own have one sample less each, or two less if they
+        number over ``values * usual`` (``docs/research/adaptive-sampling.md``).
     values:
         Samples of a pooled picture, of all its pixels together: half a second of two cores (``defaults.py``).
     reserve, most_in_reserve:

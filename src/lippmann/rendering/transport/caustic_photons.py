@@ -25,10 +25,10 @@ from lippmann.rendering.transport.photon_shooter import PhotonShooter
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.tuning import TUNING
 
-#: Emissions of each half over the two-thirds power of the samples. An emission may take as long as two paths
-#: (``benchmarks/photon_share.py``).
+#: Photons emitted for each half-buffer, divided by the samples to the power of 2/3. An emission may take as long as two
+#: paths (``benchmarks/photon_share.py``).
 OF_POWER = 6
-#: Photons within the radius of a look-up, as a rule, over the root of the emissions.
+#: Usual number of photons within the radius of a look-up, divided by the square root of the photons emitted.
 NEIGHBOURS_OF_ROOT = 0.12
 
 

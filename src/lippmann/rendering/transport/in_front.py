@@ -76,7 +76,7 @@ class _InFront:
 
 
 class SplatIntegrator(_InFront):
-    """Light of splats, composited in their own colours, mostly sRGB codes, as their trainers do."""
+    """Radiance of splats, composited in the colour space of their file, mostly sRGB codes: they were trained in it."""
 
     def __init__(self, behind: Integrator, built: BuiltScene, splats: SplatTable, threads: int) -> None:
         super().__init__(behind, built)
