@@ -246,7 +246,7 @@ def four_emitters():
 
 @pytest.mark.slow
 def test_first_samples_take_several_emitter_samples_each(monkeypatch):
-    from lippmann.rendering.transport import path_weights
+    from lippmann.rendering.transport import light_sampling
 
     def noise():
         runs = np.stack([trace(four_emitters(), camera(4, 50), 16, 1, 1, seed).pixels for seed in range(8)])
@@ -254,7 +254,7 @@ def test_first_samples_take_several_emitter_samples_each(monkeypatch):
 
     several, mean = noise()
     rays = trace(four_emitters(), camera(4, 50), 16, 1, 1).rays
-    monkeypatch.setattr(path_weights, "TUNING", replace(path_weights.TUNING, emitter_samples=1))
+    monkeypatch.setattr(light_sampling, "TUNING", replace(light_sampling.TUNING, emitter_samples=1))
     one, same_mean = noise()
     fewer = trace(four_emitters(), camera(4, 50), 16, 1, 1).rays
     assert (rays.shadow, fewer.shadow) == (4 * 256, 256)

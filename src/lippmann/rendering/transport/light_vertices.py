@@ -39,8 +39,7 @@ from lippmann.device.types import (
     Vector3f,
 )
 from lippmann.rendering.transport.emitter_rays import EmitterRays, LitPoints
-from lippmann.rendering.transport.light_sampling import LightSampler
-from lippmann.rendering.transport.path_weights import mis_weight
+from lippmann.rendering.transport.light_sampling import LightSampler, mis_weight
 from lippmann.rendering.transport.photon_map import are_inside
 from lippmann.rendering.transport.sharp_events import lambertian_share
 from lippmann.rendering.transport.tuning import TUNING

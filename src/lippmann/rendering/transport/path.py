@@ -32,7 +32,16 @@ from lippmann.device.types import (
     UInt32,
 )
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
-from lippmann.rendering.transport.light_sampling import MAX_CROSSINGS, SceneLightSampler, ShadowRays, WithoutSize
+from lippmann.rendering.transport.light_sampling import (
+    MAX_CROSSINGS,
+    Clamp,
+    SceneLightSampler,
+    ShadowRays,
+    WithoutSize,
+    first_emitter_samples,
+    mis_weight,
+    roulette_survival,
+)
 from lippmann.rendering.transport.light_vertices import Arrival
 from lippmann.rendering.transport.path_techniques import (
     Absorption,
@@ -43,12 +52,6 @@ from lippmann.rendering.transport.path_techniques import (
     WithoutSpecularLight,
 )
 from lippmann.rendering.transport.path_vertex import DIMENSIONS, LastVertex, Scattering, Vertex
-from lippmann.rendering.transport.path_weights import (
-    Clamp,
-    first_emitter_samples,
-    mis_weight,
-    roulette_survival,
-)
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.tuning import TUNING
 

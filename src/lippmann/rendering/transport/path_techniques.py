@@ -24,9 +24,9 @@ from lippmann.device.types import (
     SurfaceInteraction3f,
     UInt32,
 )
+from lippmann.rendering.transport.light_sampling import Clamp
 from lippmann.rendering.transport.light_vertices import Arrival, JointLight, LightVertices, reach_of
 from lippmann.rendering.transport.path_vertex import Scattering, Vertex
-from lippmann.rendering.transport.path_weights import Clamp
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.sharp_events import MOST_EVENTS, facing_normal, lambertian_share

@@ -30,9 +30,14 @@ from lippmann.device.types import (
     UInt32,
 )
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
-from lippmann.rendering.transport.light_sampling import MAX_CROSSINGS, LightSampler, SceneLightSampler
+from lippmann.rendering.transport.light_sampling import (
+    MAX_CROSSINGS,
+    LightSampler,
+    SceneLightSampler,
+    mis_weight,
+    roulette_survival,
+)
 from lippmann.rendering.transport.path_vertex import DIMENSIONS
-from lippmann.rendering.transport.path_weights import mis_weight, roulette_survival
 from lippmann.rendering.transport.scene_features import Color
 from lippmann.rendering.transport.tuning import TUNING
 
