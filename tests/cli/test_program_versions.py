@@ -40,10 +40,10 @@ def test_without_the_denoiser_there_is_no_version(monkeypatch):
 
 
 def test_a_denoiser_whose_library_does_not_load_has_no_version(monkeypatch):
-    def fails(kind):
+    def fails():
         raise OSError("cannot load library 'libOpenImageDenoise.so'")
 
-    monkeypatch.setattr("pyoidn.Device", fails)
+    monkeypatch.setattr("lippmann.runtime.open_image_denoise.load", fails)
     assert denoiser_version() is None
 
 

@@ -18,9 +18,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from lippmann.errors import EngineError
-
-#: Libraries that start threads of their own.
-_THREADED = ("drjit", "pyoidn")
+from lippmann.runtime import open_image_denoise
 
 _lock = threading.RLock()
 _next = threading.Lock()  # held by the one thread that waits for its turn
@@ -65,7 +63,7 @@ def _after_fork() -> None:
     global _lock, _next, _lost
     in_use = not _lock.acquire(blocking=False)
     _lock, _next = threading.RLock(), threading.Lock()
-    if not _lost and any(name in sys.modules for name in _THREADED):
+    if not _lost and ("drjit" in sys.modules or open_image_denoise.is_loaded()):
         _lost = True
         if in_use:
             _leave_exit_functions_out()

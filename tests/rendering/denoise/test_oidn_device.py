@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import pyoidn
 import pytest
 
 from lippmann.rendering.denoise import oidn
 from lippmann.rendering.denoise.oidn import denoise
+from lippmann.runtime import open_image_denoise
 
 
 def pictures():
@@ -21,8 +21,8 @@ def gpu(monkeypatch):
 
     def be(kind):
         monkeypatch.setattr(oidn.engine, "runs_on_gpu", lambda: True)
-        monkeypatch.setattr(pyoidn.Device, "is_cuda_available", staticmethod(lambda number=0: True))
-        monkeypatch.setattr(pyoidn, "OIDN_DEVICE_TYPE_CUDA", kind)
+        monkeypatch.setattr(open_image_denoise, "is_cuda_available", lambda: True)
+        monkeypatch.setattr(open_image_denoise, "DEVICE_TYPE_CUDA", kind)
         monkeypatch.setattr(oidn, "_devices", {})
 
     return be
@@ -34,7 +34,7 @@ def test_buffers_hold_what_arrays_hold(gpu, effort, turned):
     color, albedo, normal = pictures()
     options = {"clean_guides": True, "effort": effort, "turned": turned, "threads": 1}
     by_arrays = denoise(color, albedo, normal, **options)
-    gpu(pyoidn.OIDN_DEVICE_TYPE_CPU)
+    gpu(open_image_denoise.DEVICE_TYPE_CPU)
     by_buffers = denoise(color, albedo, normal, **options)
     assert list(oidn._devices) == [None]
     assert np.array_equal(by_buffers, by_arrays)
@@ -43,7 +43,7 @@ def test_buffers_hold_what_arrays_hold(gpu, effort, turned):
 def test_what_the_gpu_cannot_do_is_left_to_the_cpu(gpu):
     color, _, _ = pictures()
     expected = denoise(color, threads=1)
-    gpu(pyoidn.OIDN_DEVICE_TYPE_HIP)  # such devices are in no package
+    gpu(open_image_denoise.DEVICE_TYPE_HIP)  # such devices are in no package
     assert np.array_equal(denoise(color, threads=1), expected)
     assert list(oidn._devices) == [1]
 
@@ -51,19 +51,19 @@ def test_what_the_gpu_cannot_do_is_left_to_the_cpu(gpu):
 def test_a_gpu_that_runs_out_of_memory_is_left_too(gpu, monkeypatch):
     color, _, _ = pictures()
     expected = denoise(color, threads=1)
-    gpu(pyoidn.OIDN_DEVICE_TYPE_CPU)
-    released, real = [], pyoidn.Buffer
+    gpu(open_image_denoise.DEVICE_TYPE_CPU)
+    released, real = [], open_image_denoise.Buffer
 
     class Full(real):
         def __init__(self, device, size):
             super().__init__(device, size if not released else 1 << 60)
             released.append(0)
 
-        def release(self):
+        def close(self):
             released.pop()
-            super().release()
+            super().close()
 
-    monkeypatch.setattr(pyoidn, "Buffer", Full)
+    monkeypatch.setattr(open_image_denoise, "Buffer", Full)
     assert np.array_equal(denoise(color, threads=1), expected)
     assert not released
     assert set(oidn._devices) == {None, 1}

@@ -6,10 +6,9 @@ of the scene. It runs on the GPU if the engine does; else on the CPU, with threa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from types import ModuleType
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Mapping
+from contextlib import ExitStack, closing
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,19 +16,13 @@ from numpy.typing import NDArray
 from lippmann.errors import EngineError, UsageError
 from lippmann.rendering.film.memory_model import NETWORK_MOST
 from lippmann.runtime import engine, machine
+from lippmann.runtime import open_image_denoise as library
 from lippmann.runtime.engine_lock import exclusive
 
-if TYPE_CHECKING:
-    from pyoidn import Device as OidnDevice
-    from pyoidn import Filter as OidnFilter
-
 FloatArray = NDArray[np.float32]
-SetUp = Callable[["OidnFilter"], None]
+#: Between the two lies "balanced": with clean guides 0.5 dB better than "fast" for twice its time, without them the
+#: same as "high".
 Effort = Literal["high", "fast"]
-
-#: The network's names of the qualities. In between lies "balanced": with clean guides 0.5 dB better than "fast" for
-#: twice its time, without them the same as "high".
-_QUALITY = {"high": "OIDN_QUALITY_HIGH", "fast": "OIDN_QUALITY_FAST"}
 
 #: The network halves pictures four times: the pixels of such squares are seen together.
 NETWORK_STEP = 16
@@ -83,23 +76,21 @@ def denoise(
             if images[name].shape != images["color"].shape:
                 rule = f"that of the picture is {images['color'].shape}"
                 raise UsageError(f"the {name} has the shape {images[name].shape}", parameter="denoise", rule=rule)
-    options = {"hdr": True, "cleanAux": clean_guides and albedo is not None}
-    pyoidn = load_denoiser()
-
-    def set_up(work: OidnFilter) -> None:
-        for name, value in options.items():
-            work.set_bool(name, value)
+    options = {
+        "hdr": True,
+        "cleanAux": clean_guides and albedo is not None,
         # White is 1, in every part of a picture and however bright it is.
-        work.set_float("inputScale", 1.0)
-        work.set_int("maxMemoryMB", NETWORK_MOST >> 20)
-        work.set_quality(getattr(pyoidn, _QUALITY[effort]))
-
+        "inputScale": 1.0,
+        "maxMemoryMB": NETWORK_MOST >> 20,
+        "quality": library.QUALITIES[effort],
+    }
+    load_denoiser()
     height, width = images["color"].shape[:2]
     if turned:
         images = {name: _turned(images.pop(name)) for name in list(images)}  # frees each unturned image
     # One device serves one filter at a time, and its threads do not survive a fork.
     with exclusive():
-        result = _filtered(pyoidn, images, set_up, threads or machine.usable_cores())
+        result = _filtered(images, options, threads or machine.usable_cores())
     if not turned:
         return result
     return np.ascontiguousarray(result[-height:, -width:][::-1, ::-1])
@@ -126,22 +117,24 @@ def _picture(values: NDArray[np.generic], name: str) -> FloatArray:
     return array
 
 
-def load_denoiser() -> ModuleType:
+def load_denoiser() -> None:
     """Load the library, so that a missing one is reported before anything is rendered.
 
     Raises
     ------
     UsageError
         It is not installed.
+    EngineError
+        It does not load.
     """
-    try:
-        import pyoidn
-    except ImportError:
+    if not machine.has_denoiser():
         raise UsageError(
             "Open Image Denoise is not installed", parameter="denoise", fix='install it: pip install "pyoidn>=2.5"'
-        ) from None
-    module: ModuleType = pyoidn
-    return module
+        )
+    try:
+        library.load()
+    except OSError as error:
+        raise _failure(str(error)) from error
 
 
 def denoiser_version() -> str | None:
@@ -149,12 +142,12 @@ def denoiser_version() -> str | None:
     from importlib.metadata import version
 
     try:
-        pyoidn = load_denoiser()
-        with pyoidn.Device(pyoidn.OIDN_DEVICE_TYPE_CPU) as device:
-            # The library's own numbers: packages of one version may hold different ones.
-            numbers = [device.get_int(f"version{part}") for part in ("Major", "Minor", "Patch")]
-    except (UsageError, OSError):  # not installed, or a library that does not load: reported where it is used
+        load_denoiser()
+    except (UsageError, EngineError):  # not installed, or a library that does not load: reported where it is used
         return None
+    with closing(library.Device(library.DEVICE_TYPE_CPU)) as device:
+        # The library's own numbers: packages of one version may hold different ones.
+        numbers = [device.number(f"version{part}") for part in ("Major", "Minor", "Patch")]
     return f"{'.'.join(map(str, numbers))} (pyoidn {version('pyoidn')})"
 
 
@@ -162,10 +155,10 @@ def denoiser_version() -> str | None:
 
 #: Devices by their number of CPU threads, None for the GPU's. Each is made once: that takes longer than to denoise a
 #: small picture.
-_devices: dict[int | None, OidnDevice] = {}
+_devices: dict[int | None, library.Device] = {}
 
 
-def _filtered(pyoidn: ModuleType, images: dict[str, FloatArray], set_up: SetUp, threads: int) -> FloatArray:
+def _filtered(images: dict[str, FloatArray], options: Mapping[str, float], threads: int) -> FloatArray:
     """Output of a filter for ``images``, packed ``(H, W, 3)``, by the filter's input names.
 
     Falls back to the CPU where the GPU fails, for example for lack of memory.
@@ -175,91 +168,63 @@ def _filtered(pyoidn: ModuleType, images: dict[str, FloatArray], set_up: SetUp, 
     EngineError
         Open Image Denoise fails on the CPU.
     """
-    if engine.runs_on_gpu() and pyoidn.Device.is_cuda_available(0):
+    if engine.runs_on_gpu() and library.is_cuda_available():
         try:
-            return _on_gpu(pyoidn, images, set_up)
+            return _on_gpu(images, options)
         except EngineError:
             pass
-    return _on_cpu(pyoidn, images, set_up, threads)
+    return _on_cpu(images, options, threads)
 
 
-def _on_cpu(pyoidn: ModuleType, images: dict[str, FloatArray], set_up: SetUp, threads: int) -> FloatArray:
+def _on_cpu(images: dict[str, FloatArray], options: Mapping[str, float], threads: int) -> FloatArray:
     output = np.empty_like(next(iter(images.values())))
-    device = _cpu(pyoidn, threads)
-    with _filter(pyoidn, device) as work:
+    # Dr.Jit's threads share the cores: pinned ones would wait for each other.
+    device = _device(threads, library.DEVICE_TYPE_CPU, numThreads=threads, setAffinity=False)
+    with closing(library.Filter(device)) as work:
         for name, image in (*images.items(), ("output", output)):
-            work.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
-        _run(device, work, set_up)
+            work.set_image(name, image)
+        _run(device, work, options)
     return output
 
 
-def _on_gpu(pyoidn: ModuleType, images: dict[str, FloatArray], set_up: SetUp) -> FloatArray:
+def _on_gpu(images: dict[str, FloatArray], options: Mapping[str, float]) -> FloatArray:
     """As :func:`_filtered`, on copies in the memory of the GPU."""
     output = np.empty_like(next(iter(images.values())))
-    height, width = output.shape[:2]
-    device = _gpu(pyoidn)
-    buffers = []
-    try:
-        with _filter(pyoidn, device) as work:
-            for name, image in (*images.items(), ("output", output)):
-                buffer = pyoidn.Buffer(device, image.nbytes)
-                buffers.append(buffer)
-                _check(device)
-                if image is not output:
-                    buffer.write(0, image.nbytes, _bytes(image))
-                work.set_image(name, buffer, pyoidn.OIDN_FORMAT_FLOAT3, width, height)
-            _run(device, work, set_up)
-            buffers[-1].read(0, output.nbytes, _bytes(output))
+    device = _device(None, library.DEVICE_TYPE_CUDA)
+    with ExitStack() as stack:
+        work = stack.enter_context(closing(library.Filter(device)))
+        for name, image in (*images.items(), ("output", output)):
+            buffer = stack.enter_context(closing(library.Buffer(device, image.nbytes)))
             _check(device)
-    finally:
-        for buffer in buffers:
-            buffer.release()
+            if image is not output:
+                buffer.write(image)
+            work.set_image(name, image, buffer)
+        _run(device, work, options)
+        buffer.read(output)
+        _check(device)
     return output
 
 
-def _bytes(image: FloatArray) -> NDArray[np.uint8]:
-    return image.reshape(-1).view(np.uint8)
-
-
-@contextmanager
-def _filter(pyoidn: ModuleType, device: OidnDevice) -> Iterator[OidnFilter]:
-    work = pyoidn.Filter(device, pyoidn.OIDN_FILTER_TYPE_RT)
-    try:
-        yield work
-    finally:
-        work.release()
-
-
-def _run(device: OidnDevice, work: OidnFilter, set_up: SetUp) -> None:
-    set_up(work)
-    work.commit()
-    work.execute()
+def _run(device: library.Device, work: library.Filter, options: Mapping[str, float]) -> None:
+    for name, value in options.items():
+        work.set_option(name, value)
+    work.run()
     _check(device)
 
 
-def _cpu(pyoidn: ModuleType, threads: int) -> OidnDevice:
+def _device(threads: int | None, kind: int, **options: int) -> library.Device:
     if threads not in _devices:
-        device = pyoidn.Device(pyoidn.OIDN_DEVICE_TYPE_CPU)
-        device.set_int("numThreads", threads)
-        # Dr.Jit's threads share the cores: pinned ones would wait for each other.
-        device.set_bool("setAffinity", False)
-        _devices[threads] = _ready(device)
+        device = library.Device(kind, **options)
+        _check(device)
+        _devices[threads] = device
     return _devices[threads]
 
 
-def _gpu(pyoidn: ModuleType) -> OidnDevice:
-    if None not in _devices:
-        _devices[None] = _ready(pyoidn.Device(pyoidn.OIDN_DEVICE_TYPE_CUDA))
-    return _devices[None]
-
-
-def _ready(device: OidnDevice) -> OidnDevice:
-    device.commit()
-    _check(device)
-    return device
-
-
-def _check(device: OidnDevice) -> None:
-    message = device.get_error()
+def _check(device: library.Device) -> None:
+    message = device.error()
     if message:
-        raise EngineError(f"Open Image Denoise fails: {message}", parameter="denoise", fix='render with denoise="none"')
+        raise _failure(message)
+
+
+def _failure(message: str) -> EngineError:
+    return EngineError(f"Open Image Denoise fails: {message}", parameter="denoise", fix='render with denoise="none"')
