@@ -79,7 +79,7 @@ def picture(number: int) -> NDArray[np.uint8]:
 
 def encode(codec: Any) -> dict[str, Any]:
     """Memory of a film by its number of frames: the largest until then, and what the waiting encoder holds."""
-    from lippmann.runtime.heap import return_freed_memory
+    from lippmann.runtime.machine import return_freed_memory
     from lippmann.viewing.video_file import write_codes
 
     picture(0)

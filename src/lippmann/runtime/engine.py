@@ -130,6 +130,7 @@ def _point_to_llvm(device: DeviceChoice) -> llvm.Library | None:
 
 def _load() -> tuple[Any, Any]:
     try:
+        machine.keep_freed_memory()
         # Dr.Jit loads LLVM in the background, during the import of Mitsuba.
         import drjit
 

@@ -20,7 +20,7 @@ from lippmann.options.placement import Mode, PlacementOptions
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Build
-from lippmann.runtime.heap import return_freed_memory
+from lippmann.runtime.machine import return_freed_memory
 from lippmann.scene.placement import Placement, options_of_sequence, place, stand
 from lippmann.scene.values.description import Camera, Matrix
 from lippmann.sequences.cuts import Moment

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import LippmannError
 from lippmann.printable import one_line
-from lippmann.runtime.heap import return_freed_memory
+from lippmann.runtime.machine import return_freed_memory
 
 if TYPE_CHECKING:
     from lippmann.display import Display
