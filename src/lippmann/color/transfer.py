@@ -78,9 +78,11 @@ def coding_chord(low: NDArray[np.floating], high: NDArray[np.floating], coding: 
         # A channel moves its own value by 1 at most: what a bright colour's white adds to dark ones is not theirs.
         along = np.clip((mapped - mapped_low) / np.maximum(high - low, np.float32(_LEAST_STEP)), 0, 1)
         return np.asarray(along * coding_chord(mapped_low, mapped, "srgb"), np.float32)
-    step = high - low
-    chord = (encode(high, coding) - encode(low, coding)) / np.where(step > _LEAST_STEP, step, 1)
-    return np.where(step > _LEAST_STEP, chord, coding_slope(high, coding)).astype(np.float32)
+    step = np.asarray(high - low)
+    same = step <= _LEAST_STEP
+    chord = np.asarray((encode(high, coding) - encode(low, coding)) / np.where(same, 1, step), np.float32)
+    chord[same] = coding_slope(high[same], coding)
+    return chord
 
 
 def quantize(linear: FloatArray, bits: int, transfer: Transfer) -> NDArray[np.uint8] | NDArray[np.uint16]:

@@ -56,8 +56,10 @@ def error_of_batches(sums: Floats, taken: Sequence[int], coding: Coding) -> tupl
     step = 1 << 18  # pixels worked on at a time
     for first in range(0, pixels, step):
         part = slice(first, min(first + step, pixels))
-        # Not from a picture turned over, whose size the kernel would hold.
-        values = [dr.gather(mi.Color3f, upload(batch[part]), dr.arange(mi.UInt32, part.stop - first)) for batch in sums]
+        # All at once, and not from a picture turned over, whose size the kernel would hold.
+        table, size = upload(sums[:, part]), part.stop - first
+        index = dr.arange(mi.UInt32, size)
+        values = [dr.gather(mi.Color3f, table, index + dr.opaque(mi.UInt32, k * size)) for k in range(len(sums))]
         of_part = _Batches(values, counts, coding)
         jackknife, alone = of_part.jackknife()
         result = jackknife + of_part.evenness()
