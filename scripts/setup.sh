@@ -143,6 +143,10 @@ install_browser() {
 }
 
 stamp=.venv/.set-up
+if [ -L .venv ] && ! environment_works; then # to make it anew would empty the other one
+  say "setup: .venv is a link to an environment of another folder; remove the link: rm .venv"
+  exit 1
+fi
 python=$(find_python)
 find_missing
 [ ${#missing[@]} -eq 0 ] || install_packages "${missing[@]}"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -53,6 +55,20 @@ def make_commands(target: str) -> list[str]:
     body = re.search(rf"^{target}:.*\n((?:\t.*\n)+)", MAKEFILE, re.M)
     assert body, target
     return [line.strip().replace(".venv/bin/", "") for line in body[1].splitlines()]
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+def test_an_environment_of_another_folder_is_not_emptied(tmp_path):
+    kept = tmp_path / "other" / "kept"
+    kept.parent.mkdir()
+    kept.write_text("")
+    (tmp_path / "clone").mkdir()
+    shutil.copytree(ROOT / "scripts", tmp_path / "clone" / "scripts")
+    (tmp_path / "clone" / ".venv").symlink_to(kept.parent)
+    command = ["bash", str(tmp_path / "clone" / "scripts" / "setup.sh")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, kept.exists()) == (1, True)
+    assert "remove the link: rm .venv" in done.stdout + done.stderr
 
 
 def test_the_recipe_has_the_dependencies_of_the_package():

@@ -97,7 +97,7 @@ def test_damaged_and_foreign_files(tmp_path, pixels):
     with pytest.raises(SceneError, match=r"sky\.exr: cannot be decoded"):
         read_environment(path)
     path.write_bytes(b"\x89PNG")
-    with pytest.raises(SceneError, match=r"is no environment picture; OpenEXR"):
+    with pytest.raises(SceneError, match=r"is no picture in linear light; OpenEXR"):
         read_environment(path)
     with pytest.raises(SceneError, match="no such file"):
         read_environment(tmp_path / "none.exr")

@@ -74,7 +74,7 @@ def test_attributes_of_vertices(read, tmp_path):
 
 
 def test_colours_of_any_type(read):
-    for kind, top in (("float", 1), ("ushort", 65535), ("int", 255)):
+    for kind, top in (("float", 1), ("ushort", 65535), ("ushort", 255), ("int", 255)):
         extra = "".join(f"property {kind} {name}\n" for name in ("red", "green", "blue"))
         rows = "\n".join(f"{x} {y} {z} {top} 0 0" for x, y, z in VERTICES)
         (mesh,) = read((header("ascii", extra, faces=1) + rows + "\n3 0 1 2\n").encode()).meshes
@@ -220,6 +220,17 @@ def test_a_cloud_of_points_is_drawn_as_balls(read, colored):
     assert scene.notes[0] == "points are drawn as balls of a radius of 1.00% of the scene's diagonal"
     assert scene.materials[0].unlit == colored
     assert (mesh.colors is not None) == colored
+
+
+def test_points_without_coordinates_are_left_out(read):
+    colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+    rows = "".join(f"{'nan' if x == 0 else x} {y} {z} {100 * x} 255 0\n" for x, y, z in VERTICES)
+    scene = read((header("ascii", vertex=colors, faces=0) + rows).encode())
+    assert "2 points without finite coordinates are left out" in scene.notes
+    (mesh,) = scene.meshes
+    balls = np.split(np.c_[mesh.positions[:, 0], mesh.colors[:, 0]], 3)
+    red = [float(decode_srgb(np.array(100 * x / 255))) for x in (1, 2)]
+    assert sorted({round(float(ball[:, 1].mean()), 4) for ball in balls}) == [round(value, 4) for value in red]
 
 
 def test_of_too_many_points_some_are_drawn(read, monkeypatch):

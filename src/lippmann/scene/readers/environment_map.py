@@ -52,7 +52,7 @@ def read_linear(
         return _read_exr(path, where, check_size)
     if data.startswith(radiance.MAGICS):
         return _read_hdr(data, where, check_size), ()
-    raise SceneError("is no environment picture", where=where, rule="OpenEXR (.exr) and Radiance (.hdr) are read")
+    raise SceneError("is no picture in linear light", where=where, rule="OpenEXR (.exr) and Radiance (.hdr) are read")
 
 
 def _read_exr(

@@ -36,6 +36,7 @@ class MaterialMapper:
     def __init__(self, named: NamedFiles) -> None:
         self._named = named
         self._images: dict[Path, Image] = {}
+        self._paths: dict[str, Path] = {}
         self.notes: list[str] = []
 
     def default(self, name: str) -> Material:
@@ -219,7 +220,10 @@ class MaterialMapper:
         return _clip(color, 1.0 if clip else np.inf)
 
     def _path(self, reference: MapReference) -> Path:
-        return self._named.find_on_line(reference.file, where=reference.where, what="texture")
+        name = reference.file
+        if name not in self._paths:
+            self._paths[name] = self._named.find_on_line(name, where=reference.where, what="texture")
+        return self._paths[name]
 
     def _texture(self, reference: MapReference, *, srgb: bool) -> Texture:
         path = self._path(reference)

@@ -112,17 +112,24 @@ def _cloud(vertex: Columns, element: Element, name: str, notes: list[str], where
     positions = np.stack([np.asarray(vertex[axis]) for axis in "xyz"], axis=-1)
     if not len(positions):
         raise SceneError("holds no vertices", where=where)
+    finite, colors = _is_finite(positions), _colors(vertex, element)
+    if finite.any() and not finite.all():  # places of depth cameras' pictures that nothing was measured at
+        notes.append(f"{np.count_nonzero(~finite)} points without finite coordinates are left out")
+        positions, colors = positions[finite], None if colors is None else colors[finite]
     _check_finite(positions, where)
     positions = near_origin(positions, notes)
-    colors = _colors(vertex, element)
     points = np.arange(len(positions), dtype=np.uint32)[:, None]
     thin = Mesh(name, positions.astype(np.float32), points, 0, None, (), colors)
     return describe_cloud(thin, _material(name, None, thin), notes)
 
 
-def _check_finite(positions: Numbers, where: str) -> None:
+def _is_finite(positions: Numbers) -> NDArray[np.bool_]:
     with np.errstate(over="ignore", invalid="ignore"):  # a number too large for a float is an infinite one
-        finite = np.isfinite(positions.astype(np.float32)).all(axis=1)
+        return np.asarray(np.isfinite(positions.astype(np.float32)).all(axis=1))
+
+
+def _check_finite(positions: Numbers, where: str) -> None:
+    finite = _is_finite(positions)
     if not finite.all():
         bad = int(np.argmin(finite))
         raise SceneError(
@@ -226,12 +233,17 @@ def _corner_uvs(face: Columns, outline: Lists, keep: NDArray[np.bool_]) -> Numbe
 
 
 def _colors(columns: Columns, element: Element) -> NDArray[np.float32] | None:
-    """Linear RGB; RGBA where something is transparent. An alpha of 0 throughout says nothing."""
+    """Linear RGB; RGBA where something is transparent. An alpha of 0 throughout says nothing.
+
+    Whole numbers of more bits that are bytes all the same, as programs for laser scans write them, are read as bytes.
+    """
     names = _color_names(element)
     if not names:
         return None
     brightest = {each.name: each.brightest for each in element.properties}
-    values = np.stack([np.asarray(columns[name]) / brightest[name] for name in names], axis=-1)
+    codes = np.stack([np.asarray(columns[name]) for name in names], axis=-1)
+    full = [brightest[name] for name in names]
+    values = codes / (255.0 if min(full) > 255.0 and codes.max(initial=0) <= 255 else full)
     values = np.clip(np.nan_to_num(values) / full_brightness(values), 0.0, 1.0)
     alpha = values[:, 3:]
     if not (alpha.any() and (alpha < 1.0).any()):

@@ -147,7 +147,7 @@ def test_a_world_that_is_missing_or_no_picture(give, blend):
     with pytest.raises(SceneError, match=r"^model\.blend: no such file"):
         read_blend(blend)
     give(triangle(), f"(out / 'world.exr').write_bytes(b'x' * 100)\n{world}")
-    with pytest.raises(SceneError, match=r"^model\.blend: is no environment picture"):
+    with pytest.raises(SceneError, match=r"^model\.blend: is no picture in linear light"):
         read_blend(blend)
 
 
