@@ -1,15 +1,15 @@
-"""Colour beside depth and depth maps: codes by hand, files read by Pillow, tifffile and OpenEXR, and read back."""
+"""Colour beside depth and depth maps: codes by hand, files read by other readers and read back."""
 
 from __future__ import annotations
 
 import av
+import imagecodecs
 import numpy as np
 import OpenEXR
 import pytest
 import tifffile
 from PIL import Image
 
-from lippmann.codecs.png import read_png
 from lippmann.codecs.rgbd_names import RgbdForm
 from lippmann.display import load_display
 from lippmann.errors import OutputError, SceneError, UsageError
@@ -70,7 +70,7 @@ def test_pictures_are_read_back_within_a_code(tmp_path, monkeypatch, slope, bits
         with Image.open(path) as picture:
             read = np.asarray(picture)
     else:
-        read = tifffile.imread(path) if kind == ".tif" else read_png(path)
+        read = tifffile.imread(path) if kind == ".tif" else imagecodecs.png_decode(path.read_bytes())
     np.testing.assert_array_equal(read, codes)
     assert read.shape == (64, 64 if form.half else 128, 3)
     color, depth = np.split(read, 2, axis=1)
@@ -95,18 +95,17 @@ def test_pictures_are_read_back_within_a_code(tmp_path, monkeypatch, slope, bits
 
 
 @pytest.mark.parametrize("form", [RgbdForm(), RgbdForm(True, "far")])
-@pytest.mark.parametrize(("codec", "share"), [("h264", 0.94), ("hevc", 0.9), ("h264-rgb", 1.0)])
-def test_a_film_keeps_depth_within_a_code(tmp_path, slope, form, codec, share):
+@pytest.mark.parametrize(("codec", "share", "most"), [("h264", 0.995, 4), ("hevc", 0.995, 2), ("h264-rgb", 1.0, 0)])
+def test_a_film_keeps_depth_within_a_code(tmp_path, slope, form, codec, share, most):
     """Lossy codecs miss it along outlines alone, and the colours beside it do not bleed into it."""
     codes = rgbd_codes(slope, form, EYE)
-    write_codes([codes] * 2, tmp_path / "film.mp4", codec=codec)
+    write_codes([codes] * 2, tmp_path / "film.mp4", codec=codec, has_depth=True)
     with av.open(str(tmp_path / "film.mp4")) as film:
         *_, last = (frame.to_ndarray(format="rgb24") for frame in film.decode(video=0))
     height, width = codes.shape[:2]
     error = np.abs(last[:height, width // 2 : width].astype(int) - codes[:, width // 2 :])
     assert (error <= 1).mean() >= share
-    assert error.max() <= (12 if share < 1 else 0)
-    assert error[:, 0].max() <= 6
+    assert error.max() <= most
 
 
 @pytest.mark.parametrize("kind", [".exr", ".tif", ".pfm", ".png"])
@@ -118,6 +117,9 @@ def test_depth_maps_are_read_back(tmp_path, slope, kind):
         np.testing.assert_array_equal(OpenEXR.File(str(path)).channels()["Z"].pixels, distance)
     elif kind == ".tif":
         np.testing.assert_array_equal(tifffile.imread(path), distance)
+    elif kind == ".pfm":
+        with Image.open(path) as picture:
+            np.testing.assert_array_equal(np.asarray(picture), distance)
     elif kind == ".png":
         with Image.open(path) as picture:
             codes = np.asarray(picture).astype(int)
