@@ -203,6 +203,12 @@ def test_errors_name_the_option(lippmann, frames, tmp_path, options, message):
     assert not (tmp_path / "print.tif").exists()
 
 
+def test_the_display_may_be_called_a_print(lippmann, frames, tmp_path):
+    for number, options in enumerate(((), ("--display", "print"))):
+        lippmann("interlace", *frames, *SHEET, "--size", "30x20mm", *options, "-o", tmp_path / f"{number}.png")
+    assert (tmp_path / "0.png").read_bytes() == (tmp_path / "1.png").read_bytes()
+
+
 def test_other_formats_are_refused(lippmann, frames, tmp_path):
     outcome = lippmann("interlace", *frames, *SHEET, "--size", "30x20mm", "-o", tmp_path / "print.exr")
     assert (outcome.code, "a print is a .png or .tif file" in outcome.err) == (2, True)

@@ -266,6 +266,9 @@ def _first_missing(numbers: Iterable[int], first: int) -> int | None:
 
 
 def _check_ending(path: Path) -> None:
+    if path.suffix.lower() in (".mp4", ".mov", ".webm"):
+        fix = "take a quilt out of it: ffmpeg -i in.mp4 -frames:v 1 out_qs8x6a0.75.png"
+        raise PictureError("is a film", where=str(path), rule="pictures are read", fix=fix)
     if path.suffix.lower() not in READ:
         raise PictureError.unknown("ending", path.suffix, READ, where=str(path))
 

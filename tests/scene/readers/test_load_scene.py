@@ -85,6 +85,7 @@ def test_up_of_what_says_it_itself_is_refused():
         ("kettle.pbrt", r"its meshes, mostly \.ply files"),
         ("cage.mol2", r"obabel in\.mol2 -O out\.pdb"),
         ("ring.3dm", "Rhino"),
+        ("turn.mp4", "ffmpeg"),
     ],
 )
 def test_files_of_other_programs_are_told_how_to_become_gltf(save, name, said):

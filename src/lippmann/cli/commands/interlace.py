@@ -13,7 +13,7 @@ from lippmann.cli.shared import options
 from lippmann.cli.shared.command_options import with_options, without
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.outputs import output_of
-from lippmann.cli.shared.scene_source import print_of, sheet_of
+from lippmann.cli.shared.scene_source import PRINT, print_of, sheet_of
 from lippmann.errors import UsageError
 from lippmann.options.prints import FinishOptions, PrintOptions
 
@@ -137,7 +137,7 @@ def interlace(
 
 def _display(name: str | None, printed: PrintOptions, *, turned: bool) -> Display:
     """The display, or the print; lying on its side if ``turned``."""
-    if name is None:
+    if name in (None, PRINT):
         sheet = print_of(printed)
         return (replace(sheet, size=sheet.size[::-1]) if turned else sheet).display()
     for option, value in {**vars(printed), "lenses": "across" if turned else None}.items():

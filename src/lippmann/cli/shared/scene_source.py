@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from lippmann.display.formats.print_sheet import Print
     from lippmann.scene.scene import Scene
 
-
-_PRINT = "print"
+#: The word for a display that the options of a print describe.
+PRINT = "print"
 
 
 @dataclass(frozen=True)
@@ -71,10 +71,10 @@ def display_of(name: str, printed: PrintOptions) -> Display:
     """
     from lippmann.display import load_display
 
-    if name == _PRINT:
+    if name == PRINT:
         return print_of(printed).display()
     for key in _given(printed):
-        rule = f"it applies to --display {_PRINT} only"
+        rule = f"it applies to --display {PRINT} only"
         raise UsageError(f"does not apply to the display {name}", where=f"--{_option(key)}", rule=rule)
     return load_display(name)
 
@@ -89,7 +89,7 @@ def planned_display(name: str, printed: PrintOptions) -> tuple[Display, tuple[in
     PictureError
         If the size has not the shape of a pair.
     """
-    if printed.size is None or name == _PRINT:
+    if printed.size is None or name == PRINT:
         return display_of(name, printed), None
     display = display_of(name, replace(printed, size=None))
     if display.stereo is None:
@@ -120,7 +120,7 @@ def sheet_of(display: Display, finishing: FinishOptions, *, in_frames: bool = Fa
     if not asked:
         return display, None
     if display.sheet is None:
-        rule = f"it applies to prints only: --display {_PRINT}"
+        rule = f"it applies to prints only: --display {PRINT}"
         raise UsageError(f"does not apply to the display {display.name}", where=asked[0], rule=rule)
     if in_frames:
         raise UsageError("does not apply to frames of a moving scene", where=asked[0], fix="leave it out")
