@@ -353,10 +353,21 @@ def test_without_any_depth_there_is_no_scene(tmp_path):
         load_scene(tmp_path / "photo.png")
 
 
-@pytest.mark.parametrize("name", ["photo_depth.png", "photo-Depth.npy", "photo depth map.PNG", "photo_disparity.png"])
-def test_a_map_that_is_named_like_the_photograph_belongs_to_it(tmp_path, name):
+@pytest.mark.parametrize(
+    ("photo", "name"),
+    [
+        ("photo", "photo_depth.png"),
+        ("photo", "photo-Depth.npy"),
+        ("photo", "photo depth map.PNG"),
+        ("photo", "photo_disparity.png"),
+        ("0001_rgb", "0001_depth.png"),
+        ("mango-image", "mango-depth.png"),
+        ("Color", "Depth.png"),
+    ],
+)
+def test_a_map_that_is_named_like_the_photograph_belongs_to_it(tmp_path, photo, name):
     ramp = np.tile(np.arange(20, dtype=np.uint8) * 9, (20, 1))
-    path, beside = tmp_path / "photo.png", tmp_path / name
+    path, beside = tmp_path / f"{photo}.png", tmp_path / name
     path.write_bytes(encoded(np.zeros((20, 20, 3), np.uint8)))
     (tmp_path / "photograph_depth.png").write_bytes(b"of another one")
     if beside.suffix == ".npy":

@@ -28,6 +28,8 @@ from lippmann.scene.values.description import Image, Instance, Material, Mesh, S
 _DEPTH = re.compile(
     r"[-_. ]?(depth|depthmap|depth[-_ ]map|disparity)(\.(png|jpe?g|webp|tiff?|exr|pfm|npy))", re.IGNORECASE
 )
+#: The end of a photograph's name that says that it is the one of both with the colours.
+_COLOR = re.compile(r"(?:^|[-_. ])(?:image|img|photo|rgb|colou?r)$", re.IGNORECASE)
 #: How deep the height field is, over the shorter side of the picture; displays scale it to what they resolve.
 DEPTH = 0.5
 #: Points of the height field; of larger depth maps one pixel in so many is taken.
@@ -119,13 +121,19 @@ def _color_and_depth(image: Image, form: RgbdForm) -> tuple[Image, DepthMap]:
 
 
 def depth_beside(photograph: Path) -> Path | None:
-    """The depth map beside a photograph, named like it: ``photo_depth.png`` beside ``photo.jpg``; None without."""
-    stem = photograph.stem
+    """The depth map beside a photograph, named like it; None without.
+
+    That is ``photo_depth.png`` beside ``photo.jpg``, or ``a-depth.png`` beside ``a-image.jpg``.
+    """
     try:
-        names = sorted(name for name in os.listdir(photograph.parent) if name.startswith(stem))
+        names = sorted(os.listdir(photograph.parent))
     except OSError:
         return None
-    return next((photograph.with_name(name) for name in names if _DEPTH.fullmatch(name[len(stem) :])), None)
+    for stem in dict.fromkeys((photograph.stem, _COLOR.sub("", photograph.stem))):
+        for name in names:
+            if name.startswith(stem) and _DEPTH.fullmatch(name, len(stem)):
+                return photograph.with_name(name)
+    return None
 
 
 def _alike(first: tuple[int, int], second: tuple[int, int]) -> bool:
