@@ -167,6 +167,7 @@ def forecast(
     session = open_session(scene, request, (width, height), progress=progress)
     placement = session.place(display)
 
+    from lippmann.rendering.job import Job
     from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 
     whole = DisplayRays(display, placement.world_from_display, bool(request.subpixels))
@@ -183,7 +184,8 @@ def forecast(
         "trace": probed.compile + frames * samples * probed.seconds_per_sample,
     }
     if request.denoises:
-        seconds["denoise"] = frames * panels * _denoise_seconds(session, source, placement)
+        job = Job(session, integrator, source, placement.display_from_world)
+        seconds["denoise"] = frames * panels * job.denoiser.probe(request.samples)
     seconds["total"] = sum(seconds.values())
     per_pixel = 0.0 if display.stereo else display.panel.pixel_pitch / display.gap / display.lens_array.pitch
     share_beyond = probe.share_beyond(session, placement) * source.width * source.height / (width * height)
@@ -322,25 +324,6 @@ def _count_at(samples: int, counts: list[tuple[int, int]]) -> float:
     place = next((place for place, (taken, _) in enumerate(counts) if samples <= taken), len(counts) - 1)
     (low, below), (high, above) = counts[place - 1 : place + 1]
     return below + (samples - low) * (above - below) / (high - low)
-
-
-def _denoise_seconds(session: Session, source: DisplayRays | WindowRays, placement: Placement) -> float:
-    from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
-    from lippmann.rendering.transport.ray_source import SubpixelRays
-
-    request = session.request
-    traced = SubpixelRays(source) if request.keeps_colors(source.display) else source
-    denoiser = GuidedDenoiser(
-        session.built,
-        traced,
-        placement.display_from_world,
-        seed=request.seed,
-        box_filter=request.box_filter,
-        memory=session.memory,
-        threads=session.engine.threads,
-        kind=request.denoise,
-    )
-    return denoiser.probe(request.samples)
 
 
 def _working_bytes(source: DisplayRays | WindowRays, session: Session) -> int:

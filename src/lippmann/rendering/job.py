@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,6 +62,22 @@ class Job:
             return source
         return SubpixelRays(source)
 
+    @cached_property
+    def denoiser(self) -> GuidedDenoiser:
+        """The denoiser of the picture, which traces its guides once."""
+        return GuidedDenoiser(
+            self.session.built,
+            self.traced,
+            self.display_from_world,
+            seed=self.request.seed,
+            box_filter=self.request.box_filter,
+            memory=self.session.memory,
+            threads=self.session.engine.threads,
+            kind=self.request.denoise,
+            shares=self.request.shares_light,
+            progress=self.progress,
+        )
+
 
 @dataclass(frozen=True)
 class Traced:
@@ -103,19 +120,3 @@ def one_stream(job: Job, *notes: str) -> Traced:
         progress=job.progress,
     )
     return Traced(frame, request.samples, notes=notes)
-
-
-def guided_denoiser(job: Job) -> GuidedDenoiser:
-    """The denoiser of a job's picture."""
-    return GuidedDenoiser(
-        job.session.built,
-        job.traced,
-        job.display_from_world,
-        seed=job.request.seed,
-        box_filter=job.request.box_filter,
-        memory=job.session.memory,
-        threads=job.session.engine.threads,
-        kind=job.request.denoise,
-        shares=job.request.shares_light,
-        progress=job.progress,
-    )

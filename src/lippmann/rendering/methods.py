@@ -21,7 +21,7 @@ from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts, PixelErrors
 from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
 from lippmann.rendering.film.wavefront import Frame
-from lippmann.rendering.job import Job, Traced, guided_denoiser, one_stream
+from lippmann.rendering.job import Job, Traced, one_stream
 from lippmann.rendering.light_statements import is_among_mirrors
 from lippmann.rendering.reprojection.point_image import STATUS_LAYER, TRACED
 from lippmann.rendering.request.preconditions import why_no_estimate
@@ -37,7 +37,8 @@ SAMPLES_LAYER = "samples"
 
 def trace(job: Job) -> Traced:
     """Render by the method of ``job.request``; the number of samples per pixel is among the maps."""
-    traced = RECIPES[job.request.method](job)
+    recipe, through = RECIPES[job.request.method], job.request.trace_through
+    traced = recipe(job) if through is None else through(job, recipe)
     traced.frame.maps.setdefault(SAMPLES_LAYER, _samples_of_pixels(traced))
     return traced
 
@@ -56,12 +57,12 @@ def trace_samples(job: Job) -> Traced:
 
 def trace_unjudged(job: Job, *notes: str) -> Traced:
     """A fixed number of samples without an error estimate; denoised if requested."""
-    return _denoised_whole(job, one_stream(job, *notes))
+    return denoise_whole(job, one_stream(job, *notes))
 
 
 def trace_reused(job: Job) -> Traced:
     """Reprojection of traced points between micro-images; denoised if requested."""
-    return _denoised_whole(job, _reused(job))
+    return denoise_whole(job, _reused(job))
 
 
 #: The function of each method. ``pooled`` differs from ``full`` in that the denoiser shares light between micro-images.
@@ -101,7 +102,7 @@ def _fixed_samples(job: Job) -> Traced:
 def _in_rounds(job: Job) -> Traced:
     """As many samples as the goal needs, denoised if requested."""
     batches = _batches(job)
-    denoiser = None if job.request.denoise == "none" else guided_denoiser(job)
+    denoiser = None if job.request.denoise == "none" else job.denoiser
     picture = batches if denoiser is None else _denoised(job, batches, denoiser)
     goal = _timed_goal(job)
     assessment = 0.0 if denoiser is None or goal.max_time is None else denoiser.probe(REQUEST.fewest)
@@ -168,9 +169,8 @@ def _denoised_part(job: Job) -> Traced:
     """A denoised tile with a fixed number of samples; its picture is assembled and assessed elsewhere."""
     batches = _batches(job)
     batches.add(job.request.samples, job.progress)
-    denoiser = guided_denoiser(job)
-    picture = _denoised(job, batches, denoiser)
-    return _traced(job, batches, picture, denoiser, errors=picture.squared_error(), estimate=None)
+    picture = _denoised(job, batches, job.denoiser)
+    return _traced(job, batches, picture, job.denoiser, errors=picture.squared_error(), estimate=None)
 
 
 def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Denoised:
@@ -218,12 +218,11 @@ def _reused(job: Job) -> Traced:
     return Traced(frame, request.samples, notes=(f"no estimate of the error: {request.method} has more than noise",))
 
 
-def _denoised_whole(job: Job, traced: Traced) -> Traced:
+def denoise_whole(job: Job, traced: Traced) -> Traced:
     """A traced picture without half-buffers, denoised if requested."""
     if job.request.denoise == "none":
         return traced
-    frame, source = traced.frame, job.traced
-    denoiser = guided_denoiser(job)
+    frame, source, denoiser = traced.frame, job.traced, job.denoiser
     noisy = frame.pixels
     if frame.coverage is not None and (further := denoiser.coverage()) is not None:
         noisy = exchange_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)

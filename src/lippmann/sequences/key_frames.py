@@ -21,6 +21,7 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.sequences.cuts import Moment, is_cut
 from lippmann.sequences.flicker import Figures
 from lippmann.sequences.kept_light import KeptLight
+from lippmann.sequences.key_light import KeyLight
 
 #: A key frame and the frames that follow it, together.
 FRAMES_OF_KEY = 4
@@ -52,6 +53,7 @@ class KeyFrames:
         self._render = render
         self._last: tuple[Moment, Provenance] | None = None
         self._light = KeptLight()
+        self._shared = KeyLight()
 
     def request_of(self, request: RenderRequest, frame: int, key: Provenance | None) -> RenderRequest:
         """The request of a ``frame``, which follows a ``key`` frame or, None, has halves of its own."""
@@ -59,9 +61,12 @@ class KeyFrames:
             assert key.spp is not None
             told = f"the estimate of the error follows from frame {key_of(frame)}'s, with three quarters of its samples"
             samples = math.ceil(_SHARE * key.spp)
-            return replace(request, spp=samples, judged_by=told, keep_light=self._light.of_next)
+            own = replace(request, spp=samples, judged_by=told)
+            return replace(own, keep_light=self._light.of_next, trace_through=self._shared.trace_next)
         is_key = key_of(frame) == frame and _is_open(request)
-        return replace(request, keep_light=self._light.of_key) if is_key else request
+        if not is_key:
+            return request
+        return replace(request, keep_light=self._light.of_key, trace_through=self._shared.trace_key)
 
     def add(self, moment: Moment, made: Provenance) -> None:
         """Remember how a frame was made, if it is a key frame."""

@@ -63,7 +63,7 @@ def render_eye_preview(
     # Mitsuba may be loaded now that the engine has chosen its libraries.
     from lippmann.rendering.denoise.dual_buffer import clean_light
     from lippmann.rendering.denoise.guided_denoiser import SurfacePart, denoise_surfaces, effort_of
-    from lippmann.rendering.job import Job, guided_denoiser, one_stream
+    from lippmann.rendering.job import Job, one_stream
     from lippmann.rendering.transport.ray_source import DisplayRays, SinglePixelRays
 
     whole = DisplayRays(display, placement.world_from_display, bool(resolved.subpixels))
@@ -74,7 +74,7 @@ def render_eye_preview(
     picture = visible.arrange(frame.pixels[0])
     options: dict[str, object] = {}
     if denoises:
-        effort, guides = effort_of(request.denoise, samples), guided_denoiser(job).guides()
+        effort, guides = effort_of(request.denoise, samples), job.denoiser.guides()
         buffers = frame.pixels, guides.albedo, guides.normal
         noisy, albedo, normal = (visible.arrange_for_denoiser(values[0]) for values in buffers)
         surfaces = SurfacePart.of(normal)

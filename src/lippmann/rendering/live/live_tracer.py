@@ -200,5 +200,5 @@ class FeatureTracer(_PixelTracer):
         return sums[:, :3], sums[:, 3:] @ placed.rotation.T
 
     def _sample(self, ray: Ray3f, stream: SampleStream, height_row: list[Float]) -> tuple[Float, ...]:
-        albedo, normal, _, _ = self._surfaces.features(ray)
+        albedo, normal, *_ = self._surfaces.features(ray)
         return *albedo, *normal

@@ -148,6 +148,9 @@ class RenderRequest(MachineOptions, QualityOptions):
     keep_light:
         Called with a function that prepares the picture's light and with what this depends on: the scene, its built
         form and the camera's own exposure. Returns that light, or one of an earlier picture. None: prepared anew.
+    trace_through:
+        Called with the :class:`~lippmann.rendering.job.Job` and the function that traces it; returns what is traced.
+        None: that function alone.
     plan:
         The plan that decided the values, with its reasons; None before :mod:`~lippmann.rendering.request.plan`.
     began:
@@ -168,6 +171,7 @@ class RenderRequest(MachineOptions, QualityOptions):
     fixed_noise: bool = False
     judged_by: str = ""
     keep_light: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
+    trace_through: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
     plan: RenderPlan | None = field(default=None, compare=False, repr=False)
     began: float | None = field(default=None, compare=False)
 

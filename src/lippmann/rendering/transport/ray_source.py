@@ -159,11 +159,13 @@ class ChosenRays(OnePicture):
         self.height, self.width = columns.shape
         self.channels = source.channels
         self._source = source
+        # Opaque to the compiler, so that any number of pixels shares a kernel.
+        self._width = dr.opaque(mi.UInt32, self.width)
         self._columns, self._rows = (mi.UInt32(np.asarray(values.ravel(), np.uint32)) for values in (columns, rows))
 
     def in_picture(self, column: UInt32, row: UInt32) -> tuple[UInt32, UInt32]:
         """Column and row of pixels in the whole picture."""
-        place = row * self.width + column
+        place = row * self._width + column
         return dr.gather(mi.UInt32, self._columns, place), dr.gather(mi.UInt32, self._rows, place)
 
     def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
@@ -183,7 +185,7 @@ class SinglePixelRays(ChosenRays):
 
     def __init__(
         self,
-        source: DisplayRays,
+        source: RaySource,
         columns: NDArray[np.integer],
         rows: NDArray[np.integer],
         channels: NDArray[np.integer],
@@ -197,8 +199,7 @@ class SinglePixelRays(ChosenRays):
 
     def number(self, column: UInt32, row: UInt32) -> UInt32:
         """Index of the (sub-)pixels in the whole picture."""
-        x, y = self.in_picture(column, row)
-        number = (y * self._source.width + x) * self._source.channels
+        number = self._source.number(*self.in_picture(column, row)) * self._source.channels
         return number + dr.gather(mi.UInt32, self._own, column)
 
 
