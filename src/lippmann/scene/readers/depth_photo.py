@@ -29,7 +29,7 @@ _DEPTH = re.compile(
     r"[-_. ]?(depth|depthmap|depth[-_ ]map|disparity)(\.(png|jpe?g|webp|tiff?|exr|pfm|npy))", re.IGNORECASE
 )
 #: The end of a photograph's name that says that it is the one of both with the colours.
-_COLOR = re.compile(r"(?:^|[-_. ])(?:image|img|photo|rgb|colou?r)$", re.IGNORECASE)
+_COLOR = re.compile(r"(?:^|[-_. ])(?:image|img|rgb|colou?r)$", re.IGNORECASE)
 #: How deep the height field is, over the shorter side of the picture; displays scale it to what they resolve.
 DEPTH = 0.5
 #: Points of the height field; of larger depth maps one pixel in so many is taken.
