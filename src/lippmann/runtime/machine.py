@@ -133,6 +133,7 @@ def _optix_path() -> str:
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 
 
+@functools.cache  # once: no other thread may ask for memory meanwhile
 def keep_freed_memory() -> None:
     """Keep what is freed for what is allocated next, up to 128 MiB, where the C library lets it be told (glibc).
 

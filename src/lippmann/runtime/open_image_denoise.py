@@ -10,11 +10,15 @@ import ctypes
 import functools
 import importlib.util
 import sys
+from contextlib import ExitStack, closing, contextmanager
+from contextvars import ContextVar
 from ctypes import POINTER, c_bool, c_char_p, c_float, c_int, c_size_t, c_void_p
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -165,3 +169,31 @@ class Filter:
     def close(self) -> None:
         """Free the filter."""
         self._library.oidnReleaseFilter(self._handle)
+
+
+#: The filters that :func:`kept_memory` closes; None outside of it.
+_kept: ContextVar[ExitStack | None] = ContextVar("filters", default=None)
+
+
+@contextmanager
+def kept_memory() -> Iterator[None]:
+    """Keep the memory in which filters work from one run to the next, within the block.
+
+    The filters of a device share it, and free it with the last of them. Two runs on a picture of 512 x 512 pixels
+    would have the system clear 70 MB twice.
+    """
+    with ExitStack() as filters:
+        before = _kept.set(filters)
+        try:
+            yield
+        finally:
+            _kept.reset(before)
+
+
+@contextmanager
+def open_filter(device: Device) -> Iterator[Filter]:
+    """A filter on a device, closed after the block or, within :func:`kept_memory`, with that."""
+    with ExitStack() as stack:
+        work = Filter(device)
+        (_kept.get() or stack).enter_context(closing(work))
+        yield work

@@ -427,7 +427,9 @@ def _channels_of(image: Image, channels: tuple[int, ...]) -> NDArray[np.generic]
     """``(h, w, len(channels))`` uint8 or float32; grey serves as red, green and blue."""
     pixels = image.pixels if image.pixels.dtype == np.uint8 else image.pixels.astype(np.float32, copy=False)
     grey = pixels.shape[2] < 3
-    return pixels[..., [0 if grey and channel < 3 else channel for channel in channels]]
+    chosen = [0 if grey and channel < 3 else channel for channel in channels]
+    # Packed, as Mitsuba wants them: pixels[..., chosen] would be a transposed array, which has to be copied again.
+    return pixels if chosen == [*range(pixels.shape[2])] else np.take(pixels, chosen, axis=2)
 
 
 def _pack_texels(image: Image) -> NDArray[np.uint32]:

@@ -41,6 +41,7 @@ from lippmann.rendering.estimate.psnr import PixelErrors
 from lippmann.rendering.estimate.tuning import TUNING as ESTIMATE
 from lippmann.rendering.film.wavefront import Coverage
 from lippmann.rendering.request.tuning import TUNING as REQUEST
+from lippmann.runtime.open_image_denoise import kept_memory
 from lippmann.runtime.row_threads import Bands
 
 if TYPE_CHECKING:
@@ -132,12 +133,13 @@ class Denoised:
         if self._halves is None or self._samples_of_halves != self._renderer.samples:
             self._samples_of_halves = self._renderer.samples
             traced, specular = self._noisy_halves(), self._renderer.specular_halves() or (None, None)
-            first, second = (
-                self._renderer.displayed(
-                    clean_light(traced[k], specular[k], self._denoise, self._renderer.samples, turned=k == 1)
+            with kept_memory():
+                first, second = (
+                    self._renderer.displayed(
+                        clean_light(traced[k], specular[k], self._denoise, self._renderer.samples, turned=k == 1)
+                    )
+                    for k in (0, 1)
                 )
-                for k in (0, 1)
-            )
             noisy = self._renderer.displayed(traced[0]), self._renderer.displayed(traced[1])
             own = weigh_samples(noisy, (first, second), self._coding, threads=self._threads)
             self._halves = noisy, (first + own * (noisy[0] - first), second + own * (noisy[1] - second))

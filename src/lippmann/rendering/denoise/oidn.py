@@ -180,7 +180,7 @@ def _on_cpu(images: dict[str, FloatArray], options: Mapping[str, float], threads
     output = np.empty_like(next(iter(images.values())))
     # Dr.Jit's threads share the cores: pinned ones would wait for each other.
     device = _device(threads, library.DEVICE_TYPE_CPU, numThreads=threads, setAffinity=False)
-    with closing(library.Filter(device)) as work:
+    with library.open_filter(device) as work:
         for name, image in (*images.items(), ("output", output)):
             work.set_image(name, image)
         _run(device, work, options)
@@ -192,7 +192,7 @@ def _on_gpu(images: dict[str, FloatArray], options: Mapping[str, float]) -> Floa
     output = np.empty_like(next(iter(images.values())))
     device = _device(None, library.DEVICE_TYPE_CUDA)
     with ExitStack() as stack:
-        work = stack.enter_context(closing(library.Filter(device)))
+        work = stack.enter_context(library.open_filter(device))
         for name, image in (*images.items(), ("output", output)):
             buffer = stack.enter_context(closing(library.Buffer(device, image.nbytes)))
             _check(device)
