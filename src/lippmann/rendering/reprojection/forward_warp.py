@@ -213,9 +213,9 @@ def draw(
 
 @inlined
 def first_place(number: int) -> int:
-    """Column of the first probe in a row, the ``number``-th that has some, in eighths of a micro-image.
+    """Column of the first of two probes in the ``number``-th row that has probes: 0 to 3 eighths of a micro-image.
 
-    The second lies half a micro-image on. Four rows of probes visit all eight places, so that no upright line escapes.
+    The second probe lies half a micro-image to its right. Four rows of probes visit all eighths: no line escapes.
     """
     return 2 * (number & 1) + (number >> 1 & 1)
 

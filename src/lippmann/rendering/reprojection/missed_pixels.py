@@ -88,7 +88,7 @@ def average_neighbors(points: PointImage, field: LensField, numbers: Pixels, rul
 def _average(
     first: int, last: int, points: PointImage, numbers: IntArray, left: IntArray, right: IntArray, rules: Rules
 ) -> None:
-    """``left`` and ``right``: the corresponding pixels of each of ``numbers``; -1 for none."""
+    """Average the corresponding pixels ``left`` and ``right`` (-1: none) into each of the pixels ``numbers``."""
     width = points.status.shape[1]
     for i in range(first, last):
         one, other = left[i], right[i]

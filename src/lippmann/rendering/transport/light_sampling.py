@@ -148,9 +148,9 @@ def registry_numbers(emitters: EmitterPtr) -> NDArray[np.uint32]:
 
 
 def by_registry(emitters: EmitterPtr, values: NDArray[np.floating]) -> NDArray[np.float32]:
-    """A table of numbers of emitters by :func:`registry_numbers`.
+    """Table of one value an emitter, indexed by :func:`registry_numbers`: a ray that hits an emitter has that index.
 
-    A scattered ray knows the emitter that it hit by that index.
+    Entries of other indices are 0.
     """
     numbers = registry_numbers(emitters)
     table = np.zeros(int(numbers.max()) + 1, np.float32)

@@ -287,7 +287,7 @@ def _area_in_cell(place: Vector3f, normal: Vector3f, side: Float) -> Float:
 
     It is the derivative, by the plane's distance, of the cell's volume below the plane: a sum over its corners.
     """
-    # Steeper planes have hardly another area, and would be lost in rounding.
+    # A normal's components are kept away from 0: the area hardly changes, and divisions by them lose no precision.
     n = dr.maximum(dr.abs(normal), _LEAST_SLOPE)
     at = dr.select(normal < 0, side - place, place)
     height = dr.dot(n, at)
