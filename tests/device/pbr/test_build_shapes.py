@@ -1,5 +1,7 @@
 """Meshes stand where they are placed, face the right way, and cost no more shapes and memory than they must."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -169,6 +171,33 @@ def test_vertex_colours_multiply(build, look, parts):
     x, y = np.array([0.5, -0.2]), np.array([0.3, 0.7])
     expected = np.column_stack([(x + 1) / 2 * 0.5, (y + 1) / 2 * 0.8, [0, 0]])
     np.testing.assert_allclose(look.attribute(built, "base_color", x, y), expected, atol=1e-5)
+
+
+def test_slivers_have_a_colour(build, look, parts):
+    """Of the bed of a printer, 300 mm long: single precision cannot tell its corners from points of one line."""
+    corners = [(-147.71555, 150.04622, 0), (147.71555, 150.04622, 0), (147.71361, 150.0481, 0)]
+    mesh = replace(
+        parts.square(colors=np.full((3, 4), 0.35, np.float32)),
+        positions=np.array(corners, np.float32),
+        faces=np.array([(0, 1, 2)], np.uint32),
+        uvs=(),
+    )
+    built = build(parts.describe([mesh], [Material(base_color=(1, 1, 1), alpha_mode="blend")]))
+    x, y = [147.0, 147.5], [150.0475, 150.0475]
+    assert np.array(look.hit(built, x, y).is_valid()).all()
+    assert np.isfinite(look.attribute(built, "base_color", x, y)).all()
+    np.testing.assert_allclose(look.opacity(built, x, y), 1.0)
+
+
+def test_surfaces_whose_normals_lie_across_the_ray_are_lit(build, look, parts):
+    """As leaves whose normals all point up, seen by level rays."""
+    import mitsuba as mi
+
+    upward = np.tile(np.float32([0, 1, 0]), (4, 1))
+    built = build(parts.describe([parts.square(normals=upward)], [PLAIN]))
+    si = look.hit(built, [0.3], [0.4])
+    lit = np.array(si.bsdf().eval(mi.BSDFContext(), si, si.to_local(mi.Vector3f(0, 1, 0)))).T
+    np.testing.assert_allclose(lit, 0.5 / np.pi, rtol=0.02)
 
 
 def test_coloured_and_plain_meshes_of_one_material(build, look, parts):

@@ -26,6 +26,8 @@ from lippmann.device.types import Bool, Color3f, Float, Vector3f
 COAT_F0 = 0.04
 #: GGX width from which on what a lobe shows is much the same for all samples.
 MUCH_THE_SAME_ALPHA = 0.1
+#: Least cosine between a shading normal and the direction from which it is seen.
+_GRAZING = 1e-4
 
 
 def surface_point(model: SurfaceModel, place: Place) -> Point:
@@ -62,7 +64,8 @@ def _lobe(
     flip: Float,
     anisotropy: Anisotropy | None = None,
 ) -> Lobe:
-    wi = mi.Vector3f(place.si.wi.x, place.si.wi.y, dr.abs(place.si.wi.z))
+    # Normals that all point up, as leaves have them, lie at a right angle to level rays: they would see black.
+    wi = mi.Vector3f(place.si.wi.x, place.si.wi.y, dr.maximum(dr.abs(place.si.wi.z), _GRAZING))
     alpha = mi.Point2f(dr.clip(dr.square(roughness.eval(place)), microfacet.MIN_ALPHA, 1))
     if normal_map is None and anisotropy is None:
         return Lobe(None, wi, alpha)

@@ -59,13 +59,19 @@ class Place:
 
     @property
     def color(self) -> Color3f:
-        """Vertex colour."""
-        return self.si.shape.eval_attribute_3(COLOR_ATTRIBUTE, self.si, self.active)
+        """Vertex colour; grey on slivers, within which Mitsuba's single precision finds no place (3.9: NaN)."""
+        import drjit as dr
+
+        color = self.si.shape.eval_attribute_3(COLOR_ATTRIBUTE, self.si, self.active)
+        return dr.select(dr.isfinite(color), color, 0.5)
 
     @property
     def alpha(self) -> Float:
-        """Vertex alpha."""
-        return self.si.shape.eval_attribute_1(ALPHA_ATTRIBUTE, self.si, self.active)
+        """Vertex alpha; 1 on slivers."""
+        import drjit as dr
+
+        alpha = self.si.shape.eval_attribute_1(ALPHA_ATTRIBUTE, self.si, self.active)
+        return dr.select(dr.isfinite(alpha), alpha, 1)
 
     @property
     def tangent(self) -> Vector3f:
