@@ -44,8 +44,8 @@ def render_part(scene, exposure, beside, samples, seed=0):
 def gain(display, there, rows, before, after, truth):
     """Decibels by which eyes see ``after`` nearer to the truth, in windows of so many rows."""
     judge = type("Windows", (SlantedRows,), {"window": rows})(display, display.panel.subpixel_offsets, JUDGED)
-    lights, (goal,) = judge.eyes(there)([np.ascontiguousarray(each) for each in (before, after)], [truth], 0)
-    worse, better = (np.mean((light - goal) ** 2) for light in lights)
+    pictures, goal = [np.ascontiguousarray(each) for each in (before, after)], judge.light_meant(truth, 0)
+    worse, better = (np.nanmean((light - goal) ** 2) for light in judge.eyes(there)(pictures, 0))
     return 10.0 * float(np.log10(worse / better))
 
 

@@ -32,11 +32,24 @@ def test_parts_lie_beside_the_middles_of_subpixels(name, channel):
         np.testing.assert_allclose(x[part::2], own + beside * display.panel.pixel_pitch, atol=1e-12)
 
 
-def test_halves_are_what_lies_in_the_upper_and_the_lower_half_of_a_pixel():
+def test_halves_are_diagonals_of_a_pixel():
     pixels = np.arange(2 * 4 * 3, dtype=np.float32).reshape(2, 4, 3)
     for half, (left, right) in enumerate(halves_of(pixels)):
         np.testing.assert_array_equal(left, pixels[None, half, 0::2])
-        np.testing.assert_array_equal(right, pixels[None, half, 1::2])
+        np.testing.assert_array_equal(right, pixels[None, 1 - half, 1::2])
+
+
+def test_detail_finer_than_a_pixel_is_not_taken_for_noise():
+    display, rng = load_display(PRINT), np.random.default_rng(1)
+    height, width = display.panel.height, display.panel.width
+    edges = np.repeat(rng.random((height, 9)), 2 * width // 9 + 1, axis=1)[:, : 2 * width]
+    waves = np.sin(2 * np.pi * (np.arange(2 * width) / 48 + rng.random((2 * height, 1))))
+    light = 0.2 + 0.6 * np.repeat(edges, 2, axis=0) + 0.1 * waves
+    halves = halves_of(np.repeat(light[..., None], 3, axis=2).astype(np.float32))
+    correction = LensCorrection(display)
+    step, free = correction.step([(0, halves)]), correction.step([(0, [np.mean(halves, axis=0)])])
+    assert step.share == pytest.approx(free.share, abs=0.1)
+    assert step.gains["exact"] == pytest.approx(free.gains["exact"], abs=0.3)
 
 
 @pytest.mark.slow

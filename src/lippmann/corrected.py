@@ -90,10 +90,11 @@ def finer_display(display: Display) -> Display:
 
 
 def halves_of(pixels: FloatArray) -> list[list[FloatArray]]:
-    """The parts of each pixel, from left to right, of the upper and of the lower half of it.
+    """Two independent halves of the samples of each pixel, as its parts from left to right.
 
-    ``pixels`` is the picture on a :func:`finer_display`. The halves have samples of their own.
+    ``pixels`` is the picture on a :func:`finer_display`. A half is the upper part at the left and the lower one at the
+    right, the other half what remains: so its pixels, means of their parts, have the detail of both rows.
     """
     height, width = (side // PARTS for side in pixels.shape[:2])
     cells = pixels.reshape(height, PARTS, width, PARTS, 3)
-    return [[cells[:, half, :, part] for part in range(PARTS)] for half in range(PARTS)]
+    return [[cells[:, (half + part) % PARTS, :, part] for part in range(PARTS)] for half in range(PARTS)]

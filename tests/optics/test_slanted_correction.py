@@ -141,7 +141,7 @@ def test_rows_with_others_about_them_are_those_of_the_whole_picture(solved):
 def test_it_tells_what_it_gains(solved):
     _, correction, parts, _, _ = solved
     step = correction.step([(5, [[part[5:60] for part in parts]])])
-    assert step.share > 0.9
+    assert step.share > 0.8
     assert step.gains["exact"] > 0.8
 
 

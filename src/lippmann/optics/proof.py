@@ -155,11 +155,11 @@ class Proof:
 
     def _zone_in_words(self) -> str:
         near, far = self.zone.nearest, self.zone.farthest
-        reach = f"from {near:.4g} mm on" if math.isinf(far) else f"from {near:.4g} to {far:.4g} mm"
+        reach = f"from {near:.0f} mm on" if math.isinf(far) else f"from {near:.0f} to {far:.0f} mm"
         if math.isinf(self.viewing_distance):
             return f"the whole picture {reach}"
         width = self.zone.width_at(self.viewing_distance)
-        return f"{width:.4g} mm wide at {self.viewing_distance:.4g} mm; the whole picture {reach}"
+        return f"{width:.0f} mm wide at {self.viewing_distance:.0f} mm; the whole picture {reach}"
 
     def _moire_in_words(self) -> str:
         if not self.moire:
