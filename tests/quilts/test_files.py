@@ -105,6 +105,8 @@ def test_other_formats_are_named(tmp_path):
     Image.new("RGB", (512, 256)).save(tmp_path / "x_qs4x2a2.jp2")
     with pytest.raises(PictureError, match=r"unknown ending '\.jp2'"):
         read_quilt(tmp_path / "x_qs4x2a2.jp2")
+    with pytest.raises(PictureError, match="views: not found"):
+        read_quilt(tmp_path / "views")
     with pytest.raises(PictureError, match="is a film; pictures are read; take a quilt out of it"):
         read_quilt(tmp_path / "x_qs4x2a2.mp4")
 

@@ -269,6 +269,8 @@ def _check_ending(path: Path) -> None:
     if path.suffix.lower() in (".mp4", ".mov", ".webm"):
         fix = "take a quilt out of it: ffmpeg -i in.mp4 -frames:v 1 out_qs8x6a0.75.png"
         raise PictureError("is a film", where=str(path), rule="pictures are read", fix=fix)
+    if not path.suffix and not path.exists():
+        raise PictureError("not found", where=str(path))
     if path.suffix.lower() not in READ:
         raise PictureError.unknown("ending", path.suffix, READ, where=str(path))
 

@@ -57,7 +57,11 @@ def read_bytes(path: Path, most: int = -1) -> bytes:
     where = path.name
     try:
         if path.is_dir():
-            raise SceneError("is a folder, not a scene file", where=str(path), fix="name the file inside it")
+            raise SceneError(
+                "is a folder, not a scene file",
+                where=str(path),
+                fix="name the file inside it; views are for 'lippmann weave'",
+            )
         check_kind(path, SceneError)
         check_input(path.stat().st_size if most < 0 else most, "the file", where=where)
         with path.open("rb") as file:
