@@ -1,14 +1,14 @@
 """What a film takes beside its frames: memory as it grows longer, and processor time of a render with and without it.
 
-Time on two cores: about six minutes for the encoders, ten for twelve rendered frames, five for their peaks.
+Time on two cores: about six minutes for the encoders, two for eight rendered frames, five for the peaks of twelve.
 
 python benchmarks/film_encoding.py [--codecs NAME...] [--rendered FRAMES] [--peak FRAMES]
 
 Each codec writes a film of ``COUNTS[-1]`` pictures of a Portrait's quilt, made without rendering, in a process of its
 own. Its resident memory is sampled, without what it was before the first picture: the largest of the first so many
 pictures, and what is left while the encoder waits, as it does while a frame is rendered.
-``--rendered``: whole commands for a Portrait: a still of the teapot as it is by default and as a draft, and so many
-frames of its turntable as drafts, files alone and with their film in H.264.
+``--rendered``: so many frames of a turntable, quilts of a quarter of the pixels, of one sample a pixel: the command for
+files alone and the one for files and their film in H.264 run at the same time, twice, so that both meet the same load.
 ``--peak``: the largest memory of the whole command for so many frames and their film in H.264, and of a still of the
 same options: by default, and with one sample a pixel.
 Writes ``benchmarks/results/film_encoding.json``, where rows of other codecs stay.
@@ -24,6 +24,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -120,16 +121,17 @@ def peak(count: int) -> dict[str, Any]:
 
 
 def rendered(count: int) -> dict[str, Any]:
-    """Processor seconds and peak of frames in files, of the same with their film, and of a still."""
-    checkout, figures = Checkout(HERE), {}
-    words, draft = ["quilt", "render", "teapot", "-d", "portrait", "-q"], ["--effort", "draft"]
+    """Seconds and peaks of frames in files, and of the same with their film, which run at the same time; two turns."""
+    checkout = Checkout(HERE)
+    words = ["quilt", "render", "teapot", "-d", "portrait", "-q", "--size", f"{SIDE // 2}x{SIDE // 2}", "--spp", "1"]
     turn = ["--turntable", "48", "--frames", f"0:{count}"]
-    with tempfile.TemporaryDirectory() as folder:
-        figures["still"] = checkout.run(_PROGRAM, [*words, "-o", f"{folder}/still.png"])
-        figures["draft"] = checkout.run(_PROGRAM, [*words, *draft, "-o", f"{folder}/draft.png"])
-        figures["files"] = checkout.run(_PROGRAM, [*words, *draft, *turn, "-o", f"{folder}/files"])
-        figures["film"] = checkout.run(_PROGRAM, [*words, *draft, *turn, "-o", f"{folder}/film.mp4"])
-    return {"frames": count, **figures}
+    turns = []
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(2) as pool:
+        for number in range(2):
+            outputs = {"files": f"{folder}/{number}", "film": f"{folder}/{number}.mp4"}
+            runs = {name: pool.submit(checkout.run, _PROGRAM, [*words, *turn, "-o", outputs[name]]) for name in outputs}
+            turns.append({name: run.result() for name, run in runs.items()})
+    return {"frames": count, "turns": turns}
 
 
 def describe(result: dict[str, Any]) -> str:
@@ -146,26 +148,29 @@ before; and what the encoder holds while it waits for the next frame.
 {chr(10).join(lines)}
 """
     if measured := result.get("rendered"):
-        still, draft, files, film = (measured[name] for name in ("still", "draft", "files", "film"))
-        shares = ", ".join(
-            f"{1 + row['waiting'][str(COUNTS[-1])] / still['peak']:.2f} with `{codec}`"
-            for codec, row in result["codecs"].items()
+        cpu, wall = (
+            np.mean([turn["film"][kind] / turn["files"][kind] for turn in measured["turns"]])
+            for kind in ("cpu", "wall")
         )
         text += f"""
-{measured["frames"]} drafts of a turntable take {files["cpu"]:.0f} s of processor time as files alone and
-{film["cpu"]:.0f} s with their film in H.264 ({film["cpu"] / files["cpu"]:.3f} times as much), one run of each on a busy
-machine. A draft takes {draft["peak"] / 1e6:.0f} MB, the film of drafts {film["peak"] / 1e6:.0f} MB. A still as it is by
-default takes {still["peak"] / 1e6:.0f} MB; with what encoders hold while they wait that is, by addition,
-{shares}.
+{measured["frames"]} frames of one sample a pixel, quilts of {SIDE // 2}x{SIDE // 2} pixels, take {cpu:.3f} times as
+much processor time with their film in H.264 as without it, and {wall:.3f} times as long: both commands at the same
+time, means of two turns.
 """
     if measured := result.get("peak"):
         default, light = measured["default"], measured["one sample"]
+        shares = ", ".join(
+            f"{1 + row['waiting'][str(COUNTS[-1])] / default['still']:.2f} with `{codec}`"
+            for codec, row in result["codecs"].items()
+        )
         text += f"""
 Measured: the command for {measured["frames"]} frames as they are by default, with their film in H.264, takes
 {default["film"] / 1e6:.0f} MB at most, a still {default["still"] / 1e6:.0f} MB:
 {default["film"] / default["still"]:.2f} times as much. Of one sample
 a pixel, denoised, they take {light["film"] / 1e6:.0f} and {light["still"] / 1e6:.0f} MB:
 {light["film"] / light["still"]:.2f} times as much.
+With what encoders hold while they wait, a still as it is by default takes, by addition,
+{shares}.
 """
     return text
 
