@@ -11,11 +11,13 @@ import lippmann
 from lippmann.corrected import finer_display, halves_of
 from lippmann.display import load_display
 from lippmann.errors import DisplayError, UsageError
-from lippmann.optics.correction import LensCorrection, parts_beside
+from lippmann.optics.correction import CorrectionStep, LensCorrection, parts_beside
 from lippmann.rendering import session
 from lippmann.scene.placement import Placement
 
 PRINT = "print:lpi=60,ppi=720,size=4x2mm,thickness=26mil,radius=0.2877mm"
+
+GAINS = dict.fromkeys(("exact", "radius", "thickness", "index"), 0.0)
 
 
 @pytest.mark.parametrize("name", [PRINT, "looking-glass-portrait"])
@@ -55,12 +57,13 @@ def test_detail_finer_than_a_pixel_is_not_taken_for_noise():
 @pytest.mark.slow
 def test_one_ray_through_the_middle_of_a_lens_is_not_enough(engine):
     image = lippmann.render("gears", PRINT, correct="lens")
-    assert image.provenance.spp == 16
+    assert image.provenance.spp == 64
     assert lippmann.render("gears", PRINT, correct="lens", pixel_filter="point").provenance.spp == 4
 
 
 @pytest.mark.slow
-def test_four_samples_are_not_called_one(engine):
+def test_four_samples_are_not_called_one(engine, monkeypatch):
+    monkeypatch.setattr(LensCorrection, "step", lambda *parts: CorrectionStep(0.5, GAINS))
     image = lippmann.render("teapot", PRINT, correct="lens", spp=4, denoise="none")
     assert image.provenance.spp == 4
     remarks = [note for note in image.provenance.notes if "no estimate" in note]
@@ -69,11 +72,23 @@ def test_four_samples_are_not_called_one(engine):
 
 
 @pytest.mark.slow
+def test_a_correction_that_gains_nothing_leaves_the_plain_picture(engine, monkeypatch):
+    monkeypatch.setattr(LensCorrection, "step", lambda *parts: CorrectionStep(0.0, GAINS))
+    options = {"spp": 4, "integrator": "direct", "method": "full", "denoise": "none"}
+    plain = lippmann.render("teapot", PRINT, **options)
+    image = lippmann.render("teapot", PRINT, correct="lens", **options)
+    np.testing.assert_array_equal(image.pixels, plain.pixels)
+    assert image.provenance.options["correction_share"] == 0.0
+    assert "not corrected for its lens" in image.provenance.notes[-1]
+    assert image.provenance.estimate is not None
+
+
+@pytest.mark.slow
 def test_an_eye_sees_the_corrected_picture_nearer_to_what_rays_meet(engine, monkeypatch):
     built, build = [], session._build
     monkeypatch.setattr(session, "_build", lambda *parts: built.append(parts) or build(*parts))
     options = {"integrator": "direct", "method": "full", "denoise": "none", "threads": 1}
-    image = lippmann.render("teapot", PRINT, correct="lens", spp=16, **options)
+    image = lippmann.render("teapot", PRINT, correct="lens", spp=64, **options)
     assert len(built) == 1
     plain = lippmann.render("teapot", PRINT, spp=1, **options)
     assert image.pixels.shape == plain.pixels.shape

@@ -24,15 +24,12 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.scene import Scene
 
-#: Samples of a finer pixel where a scene asks for one ray through its middle.
-_SAMPLES = 4
-
 
 @exclusive()
 def render_corrected(
     scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback = silent
 ) -> IntegralImage:
-    """Render ``scene`` in one piece, corrected for the lenses of ``display``.
+    """Render ``scene`` in one piece, corrected for the lenses of ``display``; as it is where that would gain nothing.
 
     Raises
     ------
@@ -52,14 +49,18 @@ def render_corrected(
         subpixels=bool(resolved.subpixels),
         spp=None if request.spp is None else -(-request.spp // PARTS**2),
     )
-    if request.spp is None and request.pixel_filter == "auto" and resolved.pixel_filter == "point":
-        # One ray through the middle of a lens tells nothing of the rest of it.
-        asked = replace(asked, pixel_filter="box", spp=_SAMPLES)
     # The display stands where its own depth budget has it.
     finer = render_picture(scene, finer_display(display), asked, progress, stands_as=display)
     halves = halves_of(finer.pixels)
     judged = judged_rows(display.panel.height)
     step = correction.step([(rows.start, [[part[rows] for part in half] for half in halves]) for rows in judged])
+    if step.share == 0.0:
+        # Light of the pixels themselves is cleaner than a mean of parts that were denoised each by itself.
+        plain = render_picture(scene, display, request, progress)
+        options, note = step.describe(0.0)
+        made = plain.provenance
+        made = replace(made, options={**made.options, **options}, notes=(*made.notes, note))
+        return IntegralImage(plain.pixels, display, plain.world_from_display, made)
     pixels = correction.rows(np.mean(halves, axis=0), share=step.share)
     options, note = step.describe(float(np.mean((pixels <= 0.0) | (pixels >= 1.0))))
     # A sample of each finer pixel is several of a pixel: why those have no estimate is not why this one has none.

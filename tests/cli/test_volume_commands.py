@@ -27,7 +27,7 @@ def test_the_shortest_command_shows_the_bone(lippmann, engine, scan, tmp_path):
     out = tmp_path / "a.png"
     done = lippmann("render", scan, "-o", out, "--json")
     assert done.code == 0, done.err
-    assert (done.json["method"], done.json["spp"]) == ("full", 1)
+    assert (done.json["method"], done.json["spp"]) == ("full", 4)
     assert "shown by the transfer function 'ct-bone'" in done.err
     lit = pixels(out).max(axis=2) > 60
     assert np.ptp(np.flatnonzero(lit.any(axis=1))) > 0.75 * 512  # a fitted scene leaves air for parallax

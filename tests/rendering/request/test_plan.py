@@ -90,6 +90,24 @@ def test_a_photograph_has_one_ray_a_pixel_and_keeps_its_colours():
     assert found.spp_reserve is None
 
 
+def test_what_has_no_noise_is_shown_by_rays_all_over_a_lens():
+    sheet = load_display("print:lpi=60,ppi=720,size=20x15mm,thickness=26mil")
+    photograph = unlit(fills_panel=True)
+    found = resolve(RenderRequest(), photograph, sheet)
+    assert (found.method, found.spp, found.pixel_filter) == ("full", 4, "box")
+    for values in ({"spp": 1}, {"effort": "draft"}):
+        found = resolve(RenderRequest(**values), photograph, sheet)
+        assert (found.spp, found.pixel_filter) == (1, "point")
+    found = resolve(RenderRequest(pixel_filter="point"), photograph, sheet)
+    assert (found.spp, found.pixel_filter) == (1, "point")
+    # A quilt's views are those of cameras.
+    assert resolve(RenderRequest(), photograph, sheet, "quilt", size=(565, 425)).spp == 1
+    found = resolve(RenderRequest(integrator="classic"), SCENE, sheet)
+    assert (found.spp, found.pixel_filter) == (4, "box")
+    pinhole = load_display("seed-lenticular")
+    assert resolve(RenderRequest(integrator="classic"), SCENE, pinhole).spp == 1
+
+
 def test_unlit_models_keep_their_colours_and_have_smooth_outlines():
     found = resolve(RenderRequest(tone_map="auto"), unlit(), load_display("seed-lenticular"))
     assert (found.method, found.denoise, found.pixel_filter, found.tone_map) == ("full", "none", "box", "none")

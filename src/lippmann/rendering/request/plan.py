@@ -50,10 +50,12 @@ def make_plan(
     if scene.lies_off_surfaces:
         check_off_surfaces(request, scene)
     integrator = _integrator(request, scene)
-    facts = _Facts(request, scene, integrator.value, form)
+    seen = None if form == "quilt" else display
+    is_seen_whole = seen is not None and seen.lens is not None and request.pixel_filter != "point"
+    facts = _Facts(request, scene, integrator.value, form, is_seen_whole)
     method = _method(facts)
     denoise = _denoise(facts, method)
-    subpixels = _subpixels(facts, method.value, None if form == "quilt" else display)
+    subpixels = _subpixels(facts, method.value, seen)
     if size is None and display is not None:
         size = display.panel.width, display.panel.height
     values = None if size is None else size[0] * size[1] * (3 if subpixels.value else 1)
@@ -144,6 +146,7 @@ class _Facts:
     scene: Scene
     integrator: Integrator
     form: Form
+    is_seen_whole: bool  # each pixel's lens, by rays all over it
 
     @property
     def is_draft(self) -> bool:
@@ -177,11 +180,16 @@ class _Facts:
         return self.shows_own_colors and self.scene.fills_panel and is_plain
 
     @property
+    def is_exact(self) -> bool:
+        """Whether nothing in the scene has noise."""
+        return self.is_photograph or self.scene.is_off_surfaces_alone
+
+    @property
     def is_one_ray(self) -> bool:
-        """Whether a single ray through each pixel's centre is enough, as nothing in the scene has noise."""
+        """Whether a single ray through each pixel's centre is enough: not for a whole lens, nor for a fine volume."""
         request = self.request
-        is_exact = self.is_photograph or self.scene.is_off_surfaces_alone
-        return is_exact and (request.spp in (None, 1) or self.is_draft) and not request.is_open_ended
+        is_usual = request.spp is None and not self.is_seen_whole and (self.is_photograph or self.scene.has_splats)
+        return self.is_exact and (is_usual or request.spp == 1 or self.is_draft) and not request.is_open_ended
 
 
 def _first(*rules: tuple[bool, T, str]) -> Choice[T]:
@@ -269,19 +277,19 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
     classic = facts.scene.classic if facts.integrator == "classic" else None
     of_file = 1 + (classic.camera.antialiasing if classic is not None and facts.form == "preview" else 0)
     is_large = (values or 0) > TUNING.values * TUNING.usual
-    fewest = TUNING.fewest - subpixels * (1 + is_large)
+    is_budgeted = method == "pooled" or facts.is_exact or classic is not None
+    fewest = TUNING.fewest - subpixels * (1 + is_large) if method == "pooled" or facts.is_seen_whole else 1
     of_budget = 1 << max(round(math.log2(TUNING.values / (values or TUNING.values))), 0)
-    pooled = f"about a million for the picture, but {fewest} to {TUNING.usual} of each pixel"
-    is_final = request.effort == "final"
+    budgeted = f"about a million for the picture, but {fewest} to {TUNING.usual} of each pixel"
     usual = _first(
         (request.spp is not None, request.spp, ASKED),
         (request.is_open_ended, None, "as many as the goal takes"),
         (facts.is_one_ray, 1, "one ray through each pixel's middle shows it"),
         (facts.is_final(method), TUNING.final_most, "a final picture, at most"),
-        (is_final, TUNING.final_samples, "a final picture, where no quality can be worked for"),
-        (classic is not None, of_file, "as the scene's file says"),
-        (method != "pooled" or values is None, TUNING.usual, "the usual number where light is not pooled"),
-        (True, min(max(of_budget, fewest), TUNING.usual), pooled),
+        (request.effort == "final", TUNING.final_samples, "a final picture, where no quality can be worked for"),
+        (classic is not None and not facts.is_seen_whole, of_file, "as the scene's file says"),
+        (values is None or not is_budgeted, TUNING.usual, "the usual number where light is not pooled"),
+        (True, min(max(of_budget, fewest), TUNING.usual), budgeted),
     )
     is_same = usual.value == 1 and not facts.is_denoised_draft
     of_draft = "a draft" + is_same * f" takes as many samples as the default: {usual.reason}"
