@@ -13,8 +13,8 @@ from lippmann.runtime.plugins import Door, Extension, Target
 #: Keywords that some functions of layouts take: ``distance`` of the stand-in cameras in mm, ``grid``, the views across
 #: and down or None, and ``progress``, to be called after every view.
 LayoutOption = Literal["distance", "grid", "progress"]
-#: Keywords that some writers of films take: the ``codec`` asked for, the ``quilt`` that the frames are, and ``place``,
-#: the file's path to come.
+#: Keywords that some writers of films take: the ``codec`` asked for, the ``quilt`` that the frames are, ``place``,
+#: the file's path to come, and ``has_depth``, whether depth lies beside colour.
 FilmOption = Literal["codec", "quilt", "place", "has_depth"]
 
 

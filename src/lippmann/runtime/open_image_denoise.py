@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 #: Kinds of devices, a format of images, and the qualities of the network.
-DEVICE_TYPE_CPU, DEVICE_TYPE_CUDA, DEVICE_TYPE_HIP = 1, 3, 4
-FORMAT_FLOAT3 = 3
+DEVICE_TYPE_CPU, DEVICE_TYPE_CUDA = 1, 3
+_FORMAT_FLOAT3 = 3
 QUALITIES = {"fast": 4, "high": 6}
 
 #: Result and arguments of each function.
@@ -150,7 +150,7 @@ class Filter:
     def set_image(self, name: str, image: NDArray[np.float32], buffer: Buffer | None = None) -> None:
         """Let the filter read or write a C-contiguous ``(H, W, 3)`` image where it lies, or its copy in a buffer."""
         height, width = image.shape[:2]
-        packed = FORMAT_FLOAT3, width, height, 0, 0, 0
+        packed = _FORMAT_FLOAT3, width, height, 0, 0, 0
         if buffer is None:
             self._library.oidnSetSharedFilterImage(self._handle, name.encode(), image.ctypes.data, *packed)
         else:

@@ -118,6 +118,11 @@ class _View:
         return (0, 0) if window is None else (window.left, window.top)
 
     @cached_property
+    def mm_per_unit(self) -> float:
+        """Millimetres per unit of the scene."""
+        return float(1 / np.linalg.norm(inverse(self.job.display_from_world)[:3, 0]))
+
+    @cached_property
     def rays(self) -> tuple[Reals, Reals]:
         """Origins and directions ``(H, W, 3)`` of the pixels' centres, in display space (mm)."""
         height, width = self.albedo.shape[:2]
@@ -177,8 +182,9 @@ def _gather_block(
     light, total = np.zeros((len(points), 3)), np.zeros((len(points), 1))
     least, most = np.full_like(light, np.inf), np.full_like(light, -np.inf)
     is_known = np.ones(len(points), dtype=bool)
+    in_display = transform_points(key.job.display_from_world, points)
     for lens in _lenses_about(key.display, x, y):
-        weight, irradiance, distance = _under_lens(key, colors, lens, points, normals)
+        weight, irradiance, distance = _under_lens(key, colors, lens, points, in_display, normals)
         value = (irradiance * albedo).astype(np.float32)
         code = encode(value, key.job.request.coding)
         least, most = np.minimum(least, code), np.maximum(most, code)
@@ -190,13 +196,12 @@ def _gather_block(
 
 
 def _under_lens(
-    key: _View, colors: Floats, lens: tuple[Reals, Reals], points: Reals, normals: Floats
+    key: _View, colors: Floats, lens: tuple[Reals, Reals], points: Reals, in_display: Reals, normals: Floats
 ) -> tuple[Reals, Reals, Reals]:
     """Under a lens of the key frame: the weight ``(n,)`` of the pixels about each point, 0 to 1, their irradiance
-    ``(n, 3)``, and their distance from the point (mm)."""
-    display, to_key = key.display, key.job.display_from_world
-    x, y, z = transform_points(to_key, points).T
-    mm = 1 / np.linalg.norm(inverse(to_key)[:3, 0])  # per unit of the scene
+    ``(n, 3)``, and their distance from the point (mm). Points are given in the world and in the key's display."""
+    display = key.display
+    x, y, z = in_display.T
     off_plane = _OFF_PLANE[0] * np.abs(z) + _OFF_PLANE[1] * display.gap
     u, v = _places_under(display, (x, y, z), *lens)
     u, v = u - 0.5 - key.corner[0], v - 0.5 - key.corner[1]
@@ -208,7 +213,7 @@ def _under_lens(
         column, row = (left + right).astype(np.intp), (top + down).astype(np.intp)
         is_there = (column >= 0) & (column < width) & (row >= 0) & (row < height)
         there = np.where(is_there, row, 0), np.where(is_there, column, 0)
-        apart = (key.points[there] - points) * mm
+        apart = (key.points[there] - points) * key.mm_per_unit
         distance = np.sqrt(np.einsum("ij,ij->i", apart, apart))
         is_same = is_there & key.is_diffuse[there] & (distance < _FAR * display.lens_array.pitch)
         is_same &= np.einsum("ij,ij->i", key.normals[there], normals) > _SAME_NORMAL
@@ -241,9 +246,9 @@ def _places_under(display: Display, point: tuple[Reals, Reals, Reals], i: Reals,
     middle = display.pixel_coordinates(center[0] * scale, center[1] * scale)
     half_width, half_height = (side / 2 - 0.5 for side in micro_image_extent(display))
     u = np.clip(u, middle[0] - half_width, middle[0] + half_width)
-    return u, v if display.lens_array.layout == "lenticular" else np.clip(
-        v, middle[1] - half_height, middle[1] + half_height
-    )
+    if display.lens_array.layout != "lenticular":
+        v = np.clip(v, middle[1] - half_height, middle[1] + half_height)
+    return u, v
 
 
 def _trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
