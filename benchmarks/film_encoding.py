@@ -1,16 +1,18 @@
-"""What a film takes beside its frames: memory as it grows longer, and processor time of a render with and without it.
+"""What a film takes beside its frames: memory of encoders by its length, and whole commands with and without it.
 
-Time on two cores: about six minutes for the encoders, two for eight rendered frames, five for the peaks of twelve.
+Time on two cores: about six minutes for the encoders, and as long as five times its frames for ``--rendered`` (48
+frames: 50 minutes).
 
-python benchmarks/film_encoding.py [--codecs NAME...] [--rendered FRAMES] [--peak FRAMES]
+python benchmarks/film_encoding.py [--codecs [NAME...]] [--rendered FRAMES] [--turns N]
 
 Each codec writes a film of ``COUNTS[-1]`` pictures of a Portrait's quilt, made without rendering, in a process of its
 own. Its resident memory is sampled, without what it was before the first picture: the largest of the first so many
 pictures, and what is left while the encoder waits, as it does while a frame is rendered.
-``--rendered``: so many frames of a turntable, quilts of a quarter of the pixels, of one sample a pixel: the command for
-files alone and the one for files and their film in H.264 run at the same time, twice, so that both meet the same load.
-``--peak``: the largest memory of the whole command for so many frames and their film in H.264, and of a still of the
-same options: by default, and with one sample a pixel.
+``--rendered``: so many frames of a turntable as quilts of a Portrait, as they are by default: the command for files
+alone, the one for files and their film in H.264, and one for a still, one after the other, ``--turns`` times. Every
+other turn runs backwards, so that a machine that grows slower favours none. Encoders are threads of the command: its
+processor time and memory hold theirs.
+``--codecs --rendered 48`` measures no encoder alone.
 Writes ``benchmarks/results/film_encoding.json``, where rows of other codecs stay.
 """
 
@@ -18,13 +20,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import statistics
 import subprocess
 import sys
 import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +35,7 @@ import psutil
 from numpy.typing import NDArray
 
 from defaults import HERE, Checkout
-from harness import save, saved
+from harness import median_ratio, save, saved
 
 COUNTS = (8, 16, 32, 48)
 CODECS = ("h264", "hevc", "vp9", "av1")
@@ -107,31 +109,19 @@ def _wait_until_idle() -> None:
         time.sleep(0.5)
 
 
-def peak(count: int) -> dict[str, Any]:
-    """Peaks of whole commands in bytes: a still, and a film of so many frames, by default and of one sample a pixel."""
+def rendered(count: int, turns: int) -> dict[str, Any]:
+    """Seconds of the clock and of processors, and peaks in bytes, of whole commands in turn; one list each, by turn."""
     checkout, words = Checkout(HERE), ["quilt", "render", "teapot", "-d", "portrait", "-q"]
-    turn = ["--turntable", "48", "--frames", f"0:{count}"]
-    found: dict[str, Any] = {"frames": count}
-    with tempfile.TemporaryDirectory() as folder:
-        for name, options in (("default", []), ("one sample", ["--spp", "1"])):
-            still = checkout.run(_PROGRAM, [*words, *options, "-o", f"{folder}/still.png"])["peak"]
-            film = checkout.run(_PROGRAM, [*words, *options, *turn, "-o", f"{folder}/{name}.mp4"])["peak"]
-            found[name] = {"still": still, "film": film}
-    return found
-
-
-def rendered(count: int) -> dict[str, Any]:
-    """Seconds and peaks of frames in files, and of the same with their film, which run at the same time; two turns."""
-    checkout = Checkout(HERE)
-    words = ["quilt", "render", "teapot", "-d", "portrait", "-q", "--size", f"{SIDE // 2}x{SIDE // 2}", "--spp", "1"]
-    turn = ["--turntable", "48", "--frames", f"0:{count}"]
-    turns = []
-    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(2) as pool:
-        for number in range(2):
-            outputs = {"files": f"{folder}/{number}", "film": f"{folder}/{number}.mp4"}
-            runs = {name: pool.submit(checkout.run, _PROGRAM, [*words, *turn, "-o", outputs[name]]) for name in outputs}
-            turns.append({name: run.result() for name, run in runs.items()})
-    return {"frames": count, "turns": turns}
+    moving = [*words, "--turntable", "48", "--frames", f"0:{count}"]
+    measured: dict[str, list[dict[str, float]]] = {"still": [], "frames": [], "film": []}
+    for turn in range(turns):
+        for name in list(measured)[:: -1 if turn % 2 else 1]:
+            with tempfile.TemporaryDirectory() as folder:
+                output = {"still": "still.png", "frames": "frames", "film": "film.mp4"}[name]
+                command = [*(words if name == "still" else moving), "-o", f"{folder}/{output}"]
+                measured[name].append(checkout.run(_PROGRAM, command))
+            print(name, json.dumps(measured[name][-1]), flush=True)
+    return {"count": count, **measured}
 
 
 def describe(result: dict[str, Any]) -> str:
@@ -148,28 +138,32 @@ before; and what the encoder holds while it waits for the next frame.
 {chr(10).join(lines)}
 """
     if measured := result.get("rendered"):
-        cpu, wall = (
-            np.mean([turn["film"][kind] / turn["files"][kind] for turn in measured["turns"]])
-            for kind in ("cpu", "wall")
+        rows = {name: measured[name] for name in ("still", "frames", "film")}
+        wall, cpu, peak = (
+            {name: [one[kind] for one in row] for name, row in rows.items()} for kind in ("wall", "cpu", "peak")
         )
-        text += f"""
-{measured["frames"]} frames of one sample a pixel, quilts of {SIDE // 2}x{SIDE // 2} pixels, take {cpu:.3f} times as
-much processor time with their film in H.264 as without it, and {wall:.3f} times as long: both commands at the same
-time, means of two turns.
-"""
-    if measured := result.get("peak"):
-        default, light = measured["default"], measured["one sample"]
+        most = {name: statistics.median(values) for name, values in peak.items()}
+        table = "\n".join(
+            f"| {title} | {statistics.median(wall[name]):.0f} s | {statistics.median(cpu[name]):.0f} s "
+            f"| {most[name] / 1e6:.0f} MB |"
+            for name, title in (("still", "a still"), ("frames", "frames alone"), ("film", "frames and film"))
+        )
         shares = ", ".join(
-            f"{1 + row['waiting'][str(COUNTS[-1])] / default['still']:.2f} with `{codec}`"
+            f"{1 + row['waiting'][str(COUNTS[-1])] / most['still']:.2f} with `{codec}`"
             for codec, row in result["codecs"].items()
         )
         text += f"""
-Measured: the command for {measured["frames"]} frames as they are by default, with their film in H.264, takes
-{default["film"] / 1e6:.0f} MB at most, a still {default["still"] / 1e6:.0f} MB:
-{default["film"] / default["still"]:.2f} times as much. Of one sample
-a pixel, denoised, they take {light["film"] / 1e6:.0f} and {light["still"] / 1e6:.0f} MB:
-{light["film"] / light["still"]:.2f} times as much.
-With what encoders hold while they wait, a still as it is by default takes, by addition,
+Whole commands for {measured["count"]} frames of a turntable as quilts of a Portrait, as they are by default, one
+after the other, medians of {len(measured["film"])}; the film is H.264.
+
+| command | by the clock | processor time | largest memory |
+|---|---|---|---|
+{table}
+
+The film takes {median_ratio(wall["film"], wall["frames"]):.3f} times as long as the frames alone and
+{median_ratio(cpu["film"], cpu["frames"]):.3f} times as much processor time; its largest memory is
+{median_ratio(peak["film"], peak["still"]):.2f} times a still's.
+With what encoders hold while they wait, a still takes, by addition,
 {shares}.
 """
     return text
@@ -179,7 +173,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--codecs", nargs="*", default=CODECS)
     parser.add_argument("--rendered", type=int)
-    parser.add_argument("--peak", type=int)
+    parser.add_argument("--turns", type=int, default=2)
     parser.add_argument("--one", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
@@ -192,11 +186,9 @@ def main() -> None:
         done = subprocess.run(command, check=True, capture_output=True, text=True)
         codecs[codec] = json.loads(done.stdout.splitlines()[-1])
         print(codec, codecs[codec], flush=True)
-    found = {"codecs": codecs, "rendered": result.get("rendered"), "peak": result.get("peak")}
+    found = {"codecs": codecs, "rendered": result.get("rendered")}
     if options.rendered:
-        found["rendered"] = rendered(options.rendered)
-    if options.peak:
-        found["peak"] = peak(options.peak)
+        found["rendered"] = rendered(options.rendered, options.turns)
     save("film_encoding", found)
 
 
