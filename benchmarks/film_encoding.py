@@ -1,7 +1,6 @@
 """What a film takes beside its frames: memory of encoders by its length, and whole commands with and without it.
 
-Time on two cores: about six minutes for the encoders, and as long as five times its frames for ``--rendered`` (48
-frames: 50 minutes).
+Time on two cores: about six minutes for the encoders, and 50 for two turns of 48 rendered frames.
 
 python benchmarks/film_encoding.py [--codecs [NAME...]] [--rendered FRAMES] [--turns N]
 
