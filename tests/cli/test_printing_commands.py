@@ -99,7 +99,7 @@ def test_the_pitch_that_was_found_is_rendered(lippmann, engine, tmp_path):
         (("--size", "40x20yards"), "--size: unknown unit 'yards'"),
         (("--viewing-distance", "-1"), "--viewing-distance: viewing_distance is -1 mm"),
         (("--viewing-distance", "soon"), "--viewing-distance: 'soon' is not a length"),
-        (("--thickness", "0"), "--thickness: thickness is 0 mm"),
+        (("--thickness", "0"), "--thickness: thickness is 0.0; it must be a finite length above zero; sheets"),
         (("--index", "1.5"), "--index: index is given without a thickness"),
         (("--field", "0"), "--field: field is 0"),
     ],

@@ -51,6 +51,7 @@ def test_crests_reach_to_where_lenses_meet():
         (CYLINDERS, {"radius": 1e300}, "radius is 1e+300; it must lie between 1e-09 and 1e+12 mm"),
         (CYLINDERS, {"thickness": 120.0}, "thickness is 120 mm; 100 mm is the most; sheets are 1.2 to 4 pitches thick"),
         (CYLINDERS, {"thickness": "2 mm"}, "thickness is '2 mm'"),
+        (CYLINDERS, {"radius": math.nan}, "it must be a finite length above zero; sheets have 0.53 to 1.7 pitches"),
     ],
 )
 def test_what_cannot_be_is_refused(lenses, values, said):

@@ -11,11 +11,19 @@ import math
 from dataclasses import dataclass
 
 from lippmann.display.lens_array import LensArray
-from lippmann.display.validation import finite, positive
+from lippmann.display.validation import POSITIVE, finite, positive
 from lippmann.errors import DisplayError
 
 #: Refractive index of PETG and APET, which most sheets are made of; acrylic has 1.49.
 DEFAULT_INDEX = 1.57
+
+#: Lengths of real sheets, by the key that has them.
+TYPICAL = {
+    "radius": "sheets have 0.53 to 1.7 pitches",
+    "thickness": "sheets are 1.2 to 4 pitches thick",
+    "diameter": "lenses are at most a pitch wide",
+    "blur": "prints have a fifth to half of a pixel",
+}
 
 #: Refractive indices of water and of the densest plastics and glasses that lenses are cast in.
 INDICES = (1.3, 2.0)
@@ -58,12 +66,12 @@ class LensProfile:
     diameter: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", positive(self.radius, "lens.radius"))
-        object.__setattr__(self, "thickness", positive(self.thickness, "lens.thickness"))
+        for name in ("radius", "thickness"):
+            object.__setattr__(self, name, check_length(getattr(self, name), f"lens.{name}"))
         object.__setattr__(self, "index", check_index(self.index, "lens.index"))
         object.__setattr__(self, "conic", check_conic(self.conic, "lens.conic"))
         if self.diameter is not None:
-            object.__setattr__(self, "diameter", positive(self.diameter, "lens.diameter"))
+            object.__setattr__(self, "diameter", check_length(self.diameter, "lens.diameter"))
 
     def sag(self, distance: float) -> float:
         """Depth of the crest below its top in mm, at a distance from its axis."""
@@ -92,13 +100,23 @@ class LensProfile:
         reach = self.reach(lenses)
         least = reach * math.sqrt(max(0.0, 1.0 + self.conic))
         if self.radius <= least:
-            rule = f"lenses {2 * reach:.4g} mm wide need more than {least:.4g} mm; sheets have 0.53 to 1.7 pitches"
+            rule = f"lenses {2 * reach:.4g} mm wide need more than {least:.4g} mm; {TYPICAL['radius']}"
             raise DisplayError(f"radius is {self.radius:.4g} mm", where="lens.radius", rule=rule)
         sag, most = self.sag(reach), _THICKEST * lenses.pitch
         if not sag < self.thickness <= most:
             limit = f"the crest alone is {sag:.4g} mm high" if self.thickness <= sag else f"{most:.4g} mm is the most"
-            rule = f"{limit}; sheets are 1.2 to 4 pitches thick"
+            rule = f"{limit}; {TYPICAL['thickness']}"
             raise DisplayError(f"thickness is {self.thickness:.4g} mm", where="lens.thickness", rule=rule)
+
+
+def check_length(value: object, key: str) -> float:
+    """``value`` as a length of a lens in millimetres, finite and above zero."""
+    return positive(value, key, length_rule(key, POSITIVE))
+
+
+def length_rule(key: str, rule: str) -> str:
+    """A rule of a length of a lens or its ink, with what real sheets and prints have."""
+    return "; ".join(filter(None, (rule, TYPICAL.get(key.rpartition(".")[2]))))
 
 
 def check_index(value: object, key: str) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from lippmann.display.lens_profile import length_rule
 from lippmann.display.panel import Panel
 from lippmann.display.validation import finite
 from lippmann.errors import DisplayError
@@ -39,7 +40,7 @@ class PixelAperture:
             if value is None:
                 continue
             least = "above zero" if name in ("width", "height") else "of zero or more"
-            rule = f"it must be a length {least}"
+            rule = length_rule(name, f"it must be a length {least}")
             length = finite(value, f"pixel.{name}", rule=rule)
             if length < 0 or (length == 0 and name in ("width", "height")):
                 raise DisplayError(f"{name} is {length:g} mm", where=f"pixel.{name}", rule=rule)
@@ -66,7 +67,7 @@ class PixelAperture:
                 raise DisplayError(what, where="pixel.black_matrix", rule=rule)
             lit.append(size - self.black_matrix)
         if self.blur > panel.pixel_pitch:
-            rule = f"it must not exceed a pixel of {panel.pixel_pitch:.4g} mm; prints have a fifth to half of one"
+            rule = length_rule("blur", f"it must not exceed a pixel of {panel.pixel_pitch:.4g} mm")
             raise DisplayError(f"blur is {self.blur:.4g} mm", where="pixel.blur", rule=rule)
         return lit[0], lit[1]
 

@@ -24,6 +24,7 @@ Arguments: TypeAlias = Mapping[str, Any]
 LENGTHS = (1e-9, 1e12)
 
 POSITIVE = "it must be a finite length above zero"
+LENGTH = 'a length is a number of millimetres or a string with a unit such as "6.8 mm"'
 
 
 def number(value: object, key: str, *, rule: str) -> float:
@@ -45,11 +46,11 @@ def finite(value: object, key: str, *, rule: str = "it must be a finite number")
     return checked
 
 
-def positive(value: object, key: str) -> float:
+def positive(value: object, key: str, rule: str = POSITIVE) -> float:
     """``value`` as a finite float above zero."""
-    checked = finite(value, key, rule=POSITIVE)
+    checked = finite(value, key, rule=rule)
     if checked <= 0:
-        raise DisplayError(f"{_last(key)} is {value!r}", where=key, rule=POSITIVE)
+        raise DisplayError(f"{_last(key)} is {value!r}", where=key, rule=rule)
     if not LENGTHS[0] <= checked <= LENGTHS[1]:
         rule = "it must lie between {:g} and {:g} mm".format(*LENGTHS)
         raise DisplayError(f"{_last(key)} is {value!r}", where=key, rule=rule)
@@ -126,7 +127,12 @@ _SIZE = re.compile(rf"({_NUMBER})\s*([^\W\d]+?)?\s*[xX]\s*({_NUMBER})\s*([^\W\d]
 
 
 def length(
-    text: str, key: str, scales: Mapping[str, float] = MILLIMETRES, per_inch: tuple[str, ...] = (), unit: str = "mm"
+    text: str,
+    key: str,
+    scales: Mapping[str, float] = MILLIMETRES,
+    per_inch: tuple[str, ...] = (),
+    unit: str = "mm",
+    rule: str = LENGTH,
 ) -> float:
     """Millimetres of a text such as ``"6.8 mm"``.
 
@@ -140,6 +146,8 @@ def length(
         Units with their millimetres, and units that count per inch, which give the distance from one to the next.
     unit:
         Unit of a bare number.
+    rule:
+        What is said of a text that is no length.
 
     Raises
     ------
@@ -148,7 +156,6 @@ def length(
     """
     match = _QUANTITY.fullmatch(text.strip())
     if match is None:
-        rule = 'a length is a number of millimetres or a string with a unit such as "6.8 mm"'
         raise DisplayError(f"{text!r} is not a length", where=key, rule=rule)
     amount, symbol = float(match[1]), match[2] or unit
     if symbol in scales:

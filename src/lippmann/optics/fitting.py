@@ -10,8 +10,15 @@ from functools import lru_cache
 import numpy as np
 
 from lippmann.display.lens_array import LensArray
-from lippmann.display.lens_profile import DEFAULT_INDEX, LensProfile, check_conic, check_index
-from lippmann.display.validation import finite, positive
+from lippmann.display.lens_profile import (
+    DEFAULT_INDEX,
+    LensProfile,
+    check_conic,
+    check_index,
+    check_length,
+    length_rule,
+)
+from lippmann.display.validation import finite
 from lippmann.errors import DisplayError
 from lippmann.optics.first_order import extreme_ray_field
 from lippmann.optics.lens import Lens
@@ -56,7 +63,7 @@ def fit_profile(
     if radius is not None and field is not None:
         rule = "the crest radius gives the viewing angle"
         raise DisplayError("radius and field are both given", where="lens.field", rule=rule, fix="leave one out")
-    thickness = positive(thickness, "lens.thickness")
+    thickness = check_length(thickness, "lens.thickness")
     values = (check_index(index, "lens.index"), check_conic(conic, "lens.conic"), diameter)
     if radius is None:
         flat = LensProfile(_FLATTEST * max(thickness, lenses.pitch), thickness, *values)
@@ -83,7 +90,7 @@ def gap_of(profile: LensProfile, lenses: LensArray) -> float:
     traced = trace(lens, *lens.samples(_samples(lens)), _SMALL_SLOPE)
     gap = -float(np.average(traced.x, weights=traced.light)) / _SMALL_SLOPE
     if gap <= 0.0:
-        rule = "behind this crest it forms no image of directions; sheets are 1.2 to 4 pitches thick"
+        rule = length_rule("thickness", "behind this crest it forms no image of directions")
         raise DisplayError(f"thickness is {profile.thickness:.4g} mm", where="lens.thickness", rule=rule)
     return gap
 

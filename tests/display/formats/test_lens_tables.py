@@ -94,7 +94,10 @@ def test_a_pixels_aperture_may_be_in_pixels(load):
         (SHEET + "[lens]\nthickness = 0.66\nradios = 1", "own.toml:13: unknown key 'radios', did you mean 'radius'?"),
         (SHEET + "[lens]\nthickness = 0.66\nradius = 0.2", "own.toml:13: radius is 0.2 mm; lenses 0.4233 mm wide need"),
         (SHEET + "[lens]\nthickness = 0.66\nindex = 1", "own.toml:13: index is 1; it must lie between 1.3 and 2"),
-        (SHEET + "[lens]\nthickness = nan", "own.toml:12: thickness is nan"),
+        (
+            SHEET + "[lens]\nthickness = nan",
+            "own.toml:12: thickness is nan; it must be a finite length above zero; sheets",
+        ),
         (SHEET + '[lens]\nthickness = "26 px"', "unknown unit 'px'"),
         ("lens = 3" + SHEET, "own.toml:1: lens is 3; it must be a table of keys"),
         ("gap = 1" + SHEET + "[pixel]\nwidht = 1", "unknown key 'widht', did you mean 'width'?"),

@@ -29,9 +29,9 @@ from lippmann.display.display import Display
 from lippmann.display.formats.monitor_toml import TABLE as MONITOR
 from lippmann.display.formats.monitor_toml import monitor_of_tables
 from lippmann.display.lens_array import LensArray
-from lippmann.display.lens_profile import LensProfile
+from lippmann.display.lens_profile import LensProfile, length_rule
 from lippmann.display.pixel_aperture import PixelAperture
-from lippmann.display.validation import INCH, MILLIMETRES, Arguments, check_keys, length, table_of
+from lippmann.display.validation import INCH, LENGTH, MILLIMETRES, Arguments, check_keys, length, table_of
 from lippmann.errors import DisplayError
 
 _LENS_KEYS = ("thickness", "index", "radius", "field", "conic", "diameter")
@@ -95,6 +95,8 @@ def aperture_of_table(table: object, pixel_pitch: float) -> PixelAperture:
 
 def _in_millimetres(table: Arguments, lengths: tuple[str, ...], name: str, scales: Mapping[str, float]) -> Arguments:
     return {
-        key: length(value, f"{name}.{key}", scales) if key in lengths and isinstance(value, str) else value
+        key: length(value, f"{name}.{key}", scales, rule=length_rule(key, LENGTH))
+        if key in lengths and isinstance(value, str)
+        else value
         for key, value in table.items()
     }

@@ -22,7 +22,7 @@ from lippmann.display import validation
 from lippmann.display.display import INFINITE, Display
 from lippmann.display.formats.recorded_depth import default_aperture
 from lippmann.display.lens_array import LensArray
-from lippmann.display.lens_profile import DEFAULT_INDEX, LensProfile, check_index
+from lippmann.display.lens_profile import DEFAULT_INDEX, LensProfile, check_index, check_length, length_rule
 from lippmann.display.panel import Panel, stripe
 from lippmann.display.pixel_aperture import PixelAperture
 from lippmann.display.sheet import Sheet
@@ -154,7 +154,7 @@ class Print:
         if number(self.viewing_distance, "viewing_distance", rule=rule) < _NEAREST:
             raise DisplayError(f"viewing_distance is {self.viewing_distance:g} mm", where="viewing_distance", rule=rule)
         if self.field is not None:
-            _check(self.field, "field", _FIELDS, "degrees")
+            _check(self.field, "field", _FIELDS, "degrees; makers state 25 to 60")
         if self.thickness is not None:
             self._check_thickness(self.thickness)
             _ = self._lens_and_gap
@@ -195,15 +195,15 @@ class Print:
             object.__setattr__(self, name, getattr(sheet, name))
 
     def _check_thickness(self, thickness: float) -> None:
-        field, index = 0.0, check_index(DEFAULT_INDEX if self.index is None else self.index, "index")
-        if finite(thickness, "thickness") > 0:
-            field = math.degrees(2 * math.atan(validation.INCH / self._stated_lpi / 2 * index / thickness))
+        index = check_index(DEFAULT_INDEX if self.index is None else self.index, "index")
+        slope = validation.INCH / self._stated_lpi / 2 * index / check_length(thickness, "thickness")
+        field = math.degrees(2 * math.atan(slope))
         if field > _FIELDS[1]:
             # A sheet thinner than its own crest is refused for that.
             _ = self._lens_and_gap
         if not _FIELDS[0] <= field <= _FIELDS[1]:
             rule = f"such lenses must have a field of view of {_FIELDS[0]:g} to {_FIELDS[1]:g} degrees"
-            fix = "look at its unit"
+            rule, fix = length_rule("thickness", rule), "look at its unit"
             raise DisplayError(f"thickness is {thickness:g} mm", where="thickness", rule=rule, fix=fix)
 
     def _check_side(self, side: object) -> None:
@@ -339,7 +339,11 @@ def print_of_texts(texts: Mapping[str, str]) -> Print:
         if key not in texts:
             raise DisplayError(f"{key} is missing", where=key, rule="a print needs lpi (or print-lpi), ppi and size")
     numbers = {key: validation.plain_number(texts[key], key) for key in _NUMBERS if key in texts}
-    lengths = {key: validation.length(texts[key], key) for key in _LENGTHS if key in texts}
+    lengths = {
+        key: validation.length(texts[key], key, rule=length_rule(key, validation.LENGTH))
+        for key in _LENGTHS
+        if key in texts
+    }
     distance = texts.get("viewing-distance", str(DEFAULT_DISTANCE))
     lengths["viewing-distance"] = math.inf if distance == INFINITE else validation.length(distance, "viewing-distance")
     values = {key.replace("-", "_"): value for key, value in (numbers | lengths).items()}
