@@ -168,13 +168,19 @@ def test_scenes_may_be_freed_while_another_thread_renders():
     code = """
     from lippmann.device.pbr import build
     alone = render()
+    def loaded():
+        scene = native()
+        scene.bounds
+        return scene
+
     with exclusive():
-        heap = [build(ball) if number % 2 else native().description.scene() for number in range(12)]
+        heap = [build(ball) if number % 2 else loaded() for number in range(24)]
 
     def free():
         while heap:
             cycle = [heap.pop()]
-            cycle.append(cycle)
+            if len(heap) % 4 < 2:
+                cycle.append(cycle)
             del cycle
             gc.collect()
             time.sleep(0.02)

@@ -1,8 +1,9 @@
 """The lock of the rendering engine: one thread of a process uses the engine at a time, and no forked child does.
 
 The variant of Mitsuba and the thread count, plugin registry and recorded kernel of Dr.Jit belong to the whole process:
-two threads that render at the same time crash it. The threads of Dr.Jit and of Open Image Denoise do not survive
-``os.fork``, and locks that they held are never released in the child.
+two threads that render at the same time crash it, and so does one that frees a scene while another renders. The
+threads of Dr.Jit and of Open Image Denoise do not survive ``os.fork``, and locks that they held are never released in
+the child.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import gc
 import os
 import sys
 import threading
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -23,6 +25,7 @@ from lippmann.runtime import open_image_denoise
 _lock = threading.RLock()
 _next = threading.Lock()  # held by the one thread that waits for its turn
 _depth = threading.local()  # ``of_thread``: how often this thread holds the lock
+_dropped: deque[object] = deque()  # objects to free once no thread uses the engine
 _lost = False  # whether this process was forked from one that had loaded such a library
 
 
@@ -54,8 +57,26 @@ def exclusive() -> Iterator[None]:
         with no_collection():
             yield
     finally:
-        _depth.of_thread -= 1
+        if not depth:
+            _dropped.clear()
+        _depth.of_thread = depth
         lock.release()
+
+
+class EngineOwner:
+    """Base of what holds scenes of the engine: whichever thread drops it, they are freed while no thread renders.
+
+    An emitter or a surface that another thread frees while a kernel is recorded aborts the process, for the reason
+    that :func:`no_collection` gives. Where the engine is in use, its user frees them at its end.
+    """
+
+    def __del__(self) -> None:
+        _dropped.append([*vars(self).values()])
+        if not getattr(_depth, "of_thread", 0) and _lock.acquire(blocking=False):
+            try:
+                _dropped.clear()
+            finally:
+                _lock.release()
 
 
 def _after_fork() -> None:

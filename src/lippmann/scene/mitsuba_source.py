@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
-from lippmann.runtime.engine_lock import exclusive
+from lippmann.runtime.engine_lock import EngineOwner, exclusive
 from lippmann.scene.mitsuba_plugins import check_plugins_of
 from lippmann.scene.mitsuba_trial_child import NO_ROOM
 from lippmann.scene.mitsuba_xml import MitsubaXml, read_mitsuba_xml
@@ -33,7 +33,7 @@ _TEXT_POSITION = re.compile(r"string \(line (\d+), col \d+\)")
 
 
 @dataclass(frozen=True, eq=False)
-class MitsubaSource:
+class MitsubaSource(EngineOwner):
     """A scene in Mitsuba's own terms.
 
     ``content`` is an XML file that was read, a dictionary for ``mi.load_dict`` or a ``mi.Scene``. ``environment`` takes

@@ -22,6 +22,7 @@ from lippmann.errors import SceneError, UsageError
 from lippmann.options.light import LightOptions
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
+from lippmann.runtime.engine_lock import EngineOwner
 from lippmann.scene.matrices import transform_points
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Color, Matrix, SceneDescription
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class BuiltScene:
+class BuiltScene(EngineOwner):
     """A scene on the device.
 
     Attributes

@@ -11,11 +11,12 @@ from lippmann.device.whitted.geometry import Geometry
 from lippmann.device.whitted.materials import MaterialTable
 from lippmann.device.whitted.shading import LightTable, Shader
 from lippmann.device.whitted.textures import TextureTable
+from lippmann.runtime.engine_lock import EngineOwner
 from lippmann.scene.values.whitted_scene import ClassicScene
 
 
 @dataclass(frozen=True, eq=False)
-class BuiltClassic:
+class BuiltClassic(EngineOwner):
     """The parts of a classic scene on the device; ``seconds`` is what making them took."""
 
     scene: ClassicScene
