@@ -19,6 +19,7 @@ from lippmann.display import (
     pixel_indices_under_lens,
     pixel_lenses,
 )
+from lippmann.display.micro_image_layout import lens_indices, row_blocks
 
 many = settings(deadline=None, max_examples=60)
 
@@ -164,3 +165,18 @@ def test_the_papers_display():
     k_x, k_y = pixel_indices_under_lens(display, (100, 102))
     np.testing.assert_array_equal(k_x, [np.arange(512) % 8] * 2)
     np.testing.assert_array_equal(k_y, [[100] * 512, [101] * 512])
+
+
+def test_lens_indices_count_row_by_row():
+    display = Display("x", Panel(6, 4, 0.1), LensArray("square", 0.2), gap=1)
+    indices = lens_indices(display)
+    assert indices[:, ::2].tolist() == [[0, 1, 2], [0, 1, 2], [3, 4, 5], [3, 4, 5]]
+    np.testing.assert_array_equal(lens_indices(display, (1, 3)), indices[1:3])
+
+
+@pytest.mark.parametrize("first", [0, 5])
+def test_row_blocks_cover_all_rows_once(first):
+    for height, width in ((1, 1), (4320, 7680), (3, 1 << 21)):
+        blocks = list(row_blocks(height, width, first))
+        assert [start for start, _ in blocks] == [first, *(stop for _, stop in blocks[:-1])]
+        assert blocks[-1][1] == first + height

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from lippmann.display import NUMPY, Display, LensArray, Panel
 from lippmann.errors import PictureError
 from lippmann.image import IntegralImage
-from lippmann.image.micro_images import Permutation, lens_indices, micro_images_as_views, row_blocks
+from lippmann.image.micro_images import Permutation, micro_images_as_views
 
 
 def numbered(display):
@@ -136,15 +136,3 @@ def test_another_size_is_refused(display):
         permutation.split(np.zeros((9, 11)))
     with pytest.raises(PictureError, match="shape"):
         permutation.join(np.zeros((3, 4, 3, 2)))
-
-
-def test_lens_indices_count_row_by_row(display):
-    indices = lens_indices(display("square", lenses=(3, 2), pixels=2))
-    assert indices[:, ::2].tolist() == [[0, 1, 2], [0, 1, 2], [3, 4, 5], [3, 4, 5]]
-
-
-def test_row_blocks_cover_all_rows_once():
-    for height, width in ((1, 1), (4320, 7680), (3, 1 << 21)):
-        blocks = list(row_blocks(height, width))
-        assert [first for first, _ in blocks] == [0, *(last for _, last in blocks[:-1])]
-        assert blocks[-1][1] == height

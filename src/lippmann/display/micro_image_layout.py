@@ -7,7 +7,7 @@ display, so cutting a picture into micro-images and putting it together again lo
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,8 @@ from lippmann.display.panel import PixelWindow
 
 Indices = NDArray[np.int32]
 
-_BLOCK_PIXELS = 1 << 20
+#: Pixels whose geometry is computed at a time: its double-precision temporaries are far larger than the result.
+_BLOCK = 1 << 20
 
 
 def pixel_lenses(display: Display, row_range: tuple[int, int] | None = None) -> tuple[Indices, Indices]:
@@ -31,13 +32,28 @@ def pixel_lenses(display: Display, row_range: tuple[int, int] | None = None) -> 
     return _block_by_block(display, row_range, _lenses_of_block)
 
 
-def lens_numbers(display: Display, window: PixelWindow | None = None, *, subpixels: bool = False) -> NDArray[np.int32]:
-    """``(1, H, W)`` number of the lens of every pixel, lenses counted row by row; ``(3, H, W)`` of every sub-pixel."""
+def row_blocks(height: int, width: int, first: int = 0) -> Iterator[tuple[int, int]]:
+    """First and past-the-last of ``height`` rows from ``first`` on, in consecutive blocks of about a million pixels."""
+    step, end = max(1, _BLOCK // width), first + height
+    return ((start, min(start + step, end)) for start in range(first, end, step))
+
+
+def lens_indices(display: Display, row_range: tuple[int, int] | None = None) -> Indices:
+    """Flat index ``j * lens_cols + i`` of every pixel's lens, ``(rows, width)``; of all rows by default."""
+    first, last = row_range or (0, display.panel.height)
+    indices = np.empty((last - first, display.panel.width), dtype=np.int32)
+    for start, stop in row_blocks(last - first, display.panel.width, first):
+        i, j = pixel_lenses(display, (start, stop))
+        indices[start - first : stop - first] = j * display.lens_grid.columns + i
+    return indices
+
+
+def lens_numbers(display: Display, window: PixelWindow | None = None, *, subpixels: bool = False) -> Indices:
+    """``(1, H, W)`` :func:`lens_indices` of a window's pixels, or ``(3, H, W)`` of every sub-pixel."""
     panel, grid = display.panel, display.lens_grid
     window = window or PixelWindow(0, 0, panel.width, panel.height)
     if not subpixels:
-        i, j = pixel_lenses(display, (window.top, window.bottom))
-        return (j * np.int32(grid.columns) + i)[None, :, window.columns]
+        return lens_indices(display, (window.top, window.bottom))[None, :, window.columns]
     result = np.empty((3, *window.shape), dtype=np.int32)
     for first in range(0, window.height, 64):
         last = min(first + 64, window.height)
@@ -50,7 +66,7 @@ def lens_numbers(display: Display, window: PixelWindow | None = None, *, subpixe
     return result
 
 
-def lens_numbers_in_full_color(display: Display, window: PixelWindow | None = None) -> NDArray[np.int32]:
+def lens_numbers_in_full_color(display: Display, window: PixelWindow | None = None) -> Indices:
     """``(1, H, 3 W)``: :func:`lens_numbers` of the sub-pixels, in their order from left to right."""
     numbers = lens_numbers(display, window, subpixels=True)[list(display.panel.subpixel_order)]
     return np.ascontiguousarray(np.moveaxis(numbers, 0, 2)).reshape(1, numbers.shape[1], -1)
@@ -136,9 +152,7 @@ def _block_by_block(
     first, last = row_range or (0, display.panel.height)
     shape = (last - first, display.panel.width)
     whole = np.empty(shape, dtype=np.int32), np.empty(shape, dtype=np.int32)
-    step = max(1, _BLOCK_PIXELS // display.panel.width)
-    for start in range(first, last, step):
-        stop = min(start + step, last)
+    for start, stop in row_blocks(last - first, display.panel.width, first):
         for target, part in zip(whole, of_block(display, start, stop), strict=True):
             target[start - first : stop - first] = part
     return whole

@@ -18,10 +18,10 @@ from lippmann.codecs import png, tiff
 from lippmann.codecs.icc import srgb_profile
 from lippmann.color.transfer import Transfer, dequantize, quantize
 from lippmann.display import Display
+from lippmann.display.micro_image_layout import row_blocks
 from lippmann.display.panel import TileGrid
 from lippmann.display.sheet import SRGB
 from lippmann.errors import PictureError
-from lippmann.image.micro_images import row_blocks
 from lippmann.image.stored_values import FloatArray, Layer, Stored, Values
 
 FormatName = Literal["png", "exr", "tiff", "zarr"]

@@ -9,7 +9,6 @@ A lenticular sheet has one row of lenses, each with a box as high as the panel.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -17,13 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display, covers_whole_pixels, micro_image_shape, pixel_indices_under_lens, pixel_lenses
+from lippmann.display.micro_image_layout import row_blocks
 from lippmann.errors import PictureError
 from lippmann.runtime.engine_lock import cached_property
 
 Scalar = TypeVar("Scalar", bound=np.generic)
-
-#: Pixels whose geometry is computed at a time: its double-precision temporaries are far larger than the result.
-_BLOCK = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -122,19 +119,3 @@ def micro_images_as_views(micro_images: NDArray[Scalar], display: Display) -> ND
     if display.lens_array.layout == "lenticular":
         return micro_images.swapaxes(1, 3)
     return micro_images.swapaxes(0, 2).swapaxes(1, 3)
-
-
-def row_blocks(height: int, width: int) -> Iterator[tuple[int, int]]:
-    """First and past-the-last row of consecutive blocks of ``height`` rows, each of about a million pixels."""
-    step = max(1, _BLOCK // width)
-    return ((first, min(first + step, height)) for first in range(0, height, step))
-
-
-def lens_indices(display: Display) -> NDArray[np.int32]:
-    """Flat index ``j * lens_cols + i`` of every pixel's lens, ``(H, W)`` int32."""
-    panel, columns = display.panel, display.lens_grid.columns
-    indices = np.empty((panel.height, panel.width), dtype=np.int32)
-    for first, last in row_blocks(panel.height, panel.width):
-        i, j = pixel_lenses(display, (first, last))
-        indices[first:last] = j * columns + i
-    return indices

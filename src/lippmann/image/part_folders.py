@@ -18,12 +18,13 @@ from typing import Literal, cast, get_args
 import numpy as np
 
 from lippmann.display import Display, micro_image_shape, pixel_indices_under_lens, pixel_lenses
+from lippmann.display.micro_image_layout import row_blocks
 from lippmann.display.panel import PixelWindow
 from lippmann.errors import OutputError, PictureError
 from lippmann.image.encoding import STORED, FormatName, converted_values, encode_values, linear_values
 from lippmann.image.integral_image import IntegralImage
 from lippmann.image.metadata import KEY, Metadata, from_dict, metadata_of, parse_json
-from lippmann.image.micro_images import Permutation, micro_images_as_views, row_blocks
+from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.picture import Picture
 from lippmann.image.read import open_file
 from lippmann.image.stored_values import Layer, Stored, Values

@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 
 from lippmann.display import NUMPY, Display, micro_image_extent, micro_image_shape
 from lippmann.display.lens_array import BOUNDARY_TOLERANCE, WHOLE_TOLERANCE
+from lippmann.display.micro_image_layout import lens_indices, row_blocks
 from lippmann.errors import PictureError
-from lippmann.image.micro_images import Permutation, lens_indices, row_blocks
+from lippmann.image.micro_images import Permutation
 from lippmann.image.stored_values import FloatArray, Indices
 
 Real = NDArray[np.float64]

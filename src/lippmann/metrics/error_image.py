@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.display.micro_image_layout import lens_indices
 from lippmann.image import IntegralImage, Provenance
-from lippmann.image.micro_images import lens_indices
 from lippmann.metrics.comparison import Comparison
 from lippmann.metrics.silhouettes import find_silhouettes
 

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from lippmann.color.transfer import Transfer, encode, linear_levels
 from lippmann.display import Display
+from lippmann.display.micro_image_layout import lens_indices, row_blocks
 from lippmann.image import Picture
-from lippmann.image.micro_images import lens_indices, row_blocks
 from lippmann.image.stored_values import Values
 
 Real = NDArray[np.float64]

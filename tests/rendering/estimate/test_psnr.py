@@ -9,8 +9,8 @@ import pytest
 
 from lippmann.display import Display
 from lippmann.display.lens_array import LensArray
+from lippmann.display.micro_image_layout import lens_indices
 from lippmann.display.panel import Panel
-from lippmann.image.micro_images import lens_indices
 from lippmann.metrics.mse_psnr import micro_image_means, psnr
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.psnr import FLOOR, Estimate, PixelErrors

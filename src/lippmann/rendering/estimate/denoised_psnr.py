@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.image.micro_images import row_blocks
+from lippmann.display.micro_image_layout import row_blocks
 from lippmann.rendering.estimate.psnr import (
     NORMAL_95,
     ErrorSums,

@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
+from lippmann.display.micro_image_layout import lens_indices
 from lippmann.display.panel import PixelWindow
-from lippmann.image.micro_images import lens_indices
 from lippmann.rendering.estimate.tuning import TUNING
 from lippmann.rendering.request.tuning import TUNING as REQUEST
 
