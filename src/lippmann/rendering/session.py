@@ -265,6 +265,8 @@ class Session:
         request = self.request
         height, width = frame.pixels.shape[:2]
         rays, work = frame.rays, height * width * samples * request.channels
+        assert request.plan is not None  # of a resolved request
+        plan = request.plan.with_pilot(self.choices).lines()
         return Provenance(
             method=request.method,
             integrator=request.integrator,
@@ -281,7 +283,7 @@ class Session:
             rays={"primary": rays.primary, "shadow": rays.shadow, "secondary": rays.secondary},
             seconds=_stage_seconds(self.watch, frame),
             estimate=stated_error(estimate, self.choices),
-            options={**options, **self.choices, **self._plan_options(), "settings": self._settings()},
+            options={**options, **self.choices, "plan": plan, "settings": self._settings()},
             notes=(
                 *self.notes,
                 *notes,
@@ -290,11 +292,6 @@ class Session:
                 *self._warn_of_emptiness(frame, has_pixels),
             ),
         )
-
-    def _plan_options(self) -> dict[str, object]:
-        """The plan as files hold it, a line for each choice."""
-        plan = self.request.plan
-        return {} if plan is None else {"plan": plan.with_pilot(self.choices).lines()}
 
     def _settings(self) -> list[str]:
         """Every option that is not at its default, as it was decided."""
