@@ -11,9 +11,9 @@ from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
 from lippmann.options.placement import PlacementOptions
 from lippmann.scene.camera_placement import FILL, VisibleDepth, place_by_camera
+from lippmann.scene.extent import box_corners
 from lippmann.scene.matrices import inverse, rotation_of
 from lippmann.scene.placement import place
-from lippmann.scene.scene import box_corners
 from lippmann.scene.values.description import Camera, Instance, Light, Material, Mesh, SceneDescription
 
 BOUNDS = np.array([[-5.0, -5.0, -30.0], [5.0, 5.0, -1.0]])

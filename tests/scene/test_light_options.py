@@ -10,8 +10,7 @@ import pytest
 import lippmann
 from lippmann.errors import UsageError
 from lippmann.options.light import LightOptions
-from lippmann.scene.light_options import change_environment, change_source, light_rotation
-from lippmann.scene.scene import Scene
+from lippmann.scene.scene import Scene, change_environment, change_source, light_rotation
 from lippmann.scene.values.description import Environment, Light
 
 

@@ -6,18 +6,9 @@ import numpy as np
 import pytest
 
 from lippmann.errors import SceneError
-from lippmann.scene import scene as scene_module
-from lippmann.scene.scene import (
-    STUDIO_NOTE,
-    Scene,
-    bounds_of,
-    box_corners,
-    check_description,
-    find_camera,
-    framing_camera,
-    override_light,
-    thin_axis,
-)
+from lippmann.scene import extent
+from lippmann.scene.extent import bounds_of, box_corners, thin_axis
+from lippmann.scene.scene import STUDIO_NOTE, Scene, check_description, find_camera, framing_camera, override_light
 from lippmann.scene.studio_light import BACKDROP, studio
 from lippmann.scene.values.description import Camera, Environment, Instance, Light, Material, Mesh, SceneDescription
 
@@ -62,7 +53,7 @@ def test_bounds_of_a_turned_mesh_are_exact_until_there_are_very_many(monkeypatch
     eighth[:2, :2] = np.array([[1, -1], [1, 1]]) / np.sqrt(2)
     exact = bounds_of(describe(matrices=[eighth]))
     assert exact[1] == pytest.approx([np.sqrt(2), np.sqrt(2), 0])
-    monkeypatch.setattr(scene_module, "_EXACT_VERTICES", 2)
+    monkeypatch.setattr(extent, "_EXACT_VERTICES", 2)
     loose = bounds_of(describe(matrices=[eighth]))
     assert (loose[0] <= exact[0] + 1e-12).all()
     assert (loose[1] >= exact[1] - 1e-12).all()

@@ -13,8 +13,8 @@ import numpy as np
 
 from lippmann.display import Display
 from lippmann.errors import SceneError, UsageError
+from lippmann.scene.extent import box_corners
 from lippmann.scene.matrices import Bounds, inverse, scaling, transform_points, translation
-from lippmann.scene.scene import box_corners
 from lippmann.scene.values.description import Camera, Matrix
 
 #: Scene units per millimetre of the display, least and most, as cameras give them: products of matrices with larger

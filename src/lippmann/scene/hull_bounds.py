@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from lippmann.scene.extreme_points import used_positions
+from lippmann.scene.extent import used_positions
 from lippmann.scene.matrices import Bounds, transform_points
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Matrix, SceneDescription

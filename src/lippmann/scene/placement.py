@@ -17,6 +17,7 @@ from lippmann.display.stereo import COMFORTABLE, EYE_DISTANCE, depth_of_disparit
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.placement import Mode, PlacementOptions
 from lippmann.scene.camera_placement import DepthProbe, frame_whole, place_by_camera, remove_scale
+from lippmann.scene.extent import box, box_corners, thin_axis
 from lippmann.scene.matrices import (
     Bounds,
     depth_scaling,
@@ -28,7 +29,7 @@ from lippmann.scene.matrices import (
     translation,
     turn_of,
 )
-from lippmann.scene.scene import box, box_corners, find_camera, thin_axis
+from lippmann.scene.scene import find_camera
 from lippmann.scene.values.description import Camera, Matrix
 
 #: Flattening above this factor is too little to be said.

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
+from lippmann.scene.extent import box_corners
 from lippmann.scene.matrices import Bounds, transform_points
 from lippmann.scene.placement import Placement
-from lippmann.scene.scene import Scene, box_corners
+from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import SceneDescription, Texture
 
 #: The farthest that anything moves without a cut, as a share of the display's width: a turn by 39 degrees moves the

@@ -15,12 +15,12 @@ from lippmann.color.primaries import REC709
 from lippmann.display import load_display
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.placement import PlacementOptions
+from lippmann.scene.extent import bounds_of
 from lippmann.scene.matrices import transform_points
 from lippmann.scene.placement import place
 from lippmann.scene.readers.depth_layers import EDGE, split_layers
 from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map
 from lippmann.scene.readers.load import load_scene
-from lippmann.scene.scene import bounds_of
 
 DEPTH = np.array([[1.0, 2.0, 4.0], [2.0, 0.0, np.nan]], np.float32)
 INVERSE = np.array([[1.0, 0.5, 0.25], [0.5, np.nan, np.nan]])

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from lippmann.errors import SceneError, UsageError
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.scene.extent import bounds_of
 from lippmann.scene.readers.load import load_scene
-from lippmann.scene.scene import bounds_of
 from lippmann.scene.values.whitted_scene import ClassicCamera
 from lippmann.scene.values.whitted_surfaces import (
     Background,

@@ -10,8 +10,7 @@ import numpy as np
 
 from lippmann.device.pbr.emitters import active_lights, environment_to_world
 from lippmann.options.light import LightOptions
-from lippmann.scene.light_options import change_source, light_rotation
-from lippmann.scene.scene import Scene
+from lippmann.scene.scene import Scene, change_source, light_rotation
 from lippmann.scene.values.description import Light, Matrix
 
 if TYPE_CHECKING:

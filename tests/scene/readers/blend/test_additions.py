@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
 from lippmann.scene.extreme_points import extreme_points_of
+
+from lippmann.scene.extent import bounds_of
 from lippmann.scene.readers.blend.in_blender.additions import (
     add_default_material,
     add_focus,
@@ -21,7 +22,6 @@ from lippmann.scene.readers.blend.in_blender.additions import (
 )
 from lippmann.scene.readers.blend.in_blender.glb import Glb
 from lippmann.scene.readers.gltf import read_gltf
-from lippmann.scene.scene import bounds_of
 
 SIZES = st.floats(0.01, 100.0)
 COLORS = st.tuples(*[st.floats(0.0, 1.0)] * 3).filter(lambda color: max(color) > 0.01)

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from lippmann.scene import extreme_points
-from lippmann.scene.extreme_points import extreme_points_of
+from lippmann.scene import extent
+from lippmann.scene.extent import extreme_points_of
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 
 
@@ -24,14 +24,14 @@ def test_copies_within_others_change_nothing(seed, count, flat, away):
     mesh = Mesh("copied", points, np.arange(18, dtype=np.uint32).reshape(6, 3), 0)
     scene = SceneDescription("copies", [mesh], [Material()], [Instance(0, places)])
     whole = extreme_points_of(scene)
-    kept, extreme_points._MANY = extreme_points._MANY, 0
+    kept, extent._MANY = extent._MANY, 0
     try:
         few = extreme_points_of(scene)
-        left = extreme_points._may_lie_outside(points[:18], places).mean()
+        left = extent._may_lie_outside(points[:18], places).mean()
     finally:
-        extreme_points._MANY = kept
+        extent._MANY = kept
     # Farthest in each direction, whichever of two equal ones was taken.
-    directions = extreme_points._directions(256).astype(np.float64)
+    directions = extent._directions(256).astype(np.float64)
     slack = 1e-6 * (1 + away)
     np.testing.assert_allclose((few @ directions.T).max(axis=0), (whole @ directions.T).max(axis=0), atol=slack)
     assert count < 300 or left < 0.9
@@ -42,4 +42,4 @@ def test_most_copies_are_left_out():
     places = np.tile(np.eye(4), (20_000, 1, 1))
     places[:, :3, :3] *= 0.4
     places[:, :3, 3] = rng.uniform(-40, 40, (20_000, 3))
-    assert extreme_points._may_lie_outside(np.eye(3), places).mean() < 0.2
+    assert extent._may_lie_outside(np.eye(3), places).mean() < 0.2
