@@ -129,7 +129,7 @@ def test_an_unknown_display_suggests_a_known_one(lippmann, kept):
         (("--background", "1,2"), "--background"),
         (
             ("--background", "255,255,255"),
-            "--background: '255,255,255'; three numbers from 0 to 1, linear; 1,1,1 is white",
+            "--background: (255.0, 255.0, 255.0); three numbers from 0 to 1, linear: 1,1,1 is white",
         ),
         (("--pop-out", "2"), "pop"),
         (("--scale", "0"), "scale"),

@@ -1,11 +1,9 @@
 """How the light of a scene differs from what its file says."""
 
-import math
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from lippmann.errors import UsageError
 from lippmann.options import texts
 from lippmann.options.option import Options, option
 
@@ -54,12 +52,8 @@ class LightOptions(Options):
         "Turn light from far away, degrees to the right and up: the environment, the studio, directional lights.",
         first=True,
         metavar="AZIMUTH[,ELEVATION]",
+        rule="two finite angles in degrees",
         read=texts.light_turn,
     )
     light_strength: float = _light(1.0, "Factor on the scene's own light sources.", **_STRENGTH)
     environment_strength: float = _light(1.0, "Factor on light of the environment or the studio.", **_STRENGTH)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if len(self.light_turn) != 2 or not all(map(math.isfinite, self.light_turn)):
-            raise UsageError(f"{self.light_turn!r}", parameter="light_turn", rule="two finite angles in degrees")

@@ -12,7 +12,7 @@ import math
 import re
 import textwrap
 import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
 from numbers import Integral, Real
 from typing import Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
@@ -110,6 +110,9 @@ class Option:
                 raise UsageError(f"{value!r}", parameter=name, rule=self.rule or "must be True, False or None")
         elif int in kinds or float in kinds:
             self._check_number(name, value, int in kinds)
+        elif count := len(_parts_of(kind)):
+            if not (isinstance(value, tuple) and len(value) == count and all(map(self._is_finite_in_range, value))):
+                raise UsageError(f"{value!r}", parameter=name, rule=self.rule or f"must be {count} finite numbers")
         elif choices:
             self._check_word(name, value, choices)
 
@@ -125,11 +128,16 @@ class Option:
             raise UsageError.unknown(name, value, known, parameter=name, fix=door.problems)
 
     def _check_number(self, name: str, value: object, is_whole: bool) -> None:
-        kind: type = int if is_whole else Real
-        is_number = isinstance(value, kind) and not isinstance(value, bool)
-        if not (is_number and self.low <= value <= self.high and (value != self.low or not self.excludes_low)):  # type: ignore[operator]
+        if not self._is_in_range(value, int if is_whole else Real):
             rule = f"must be {f'a whole number from {self.low}' if is_whole else f'a number from {self.low:g}'}"
             raise UsageError(f"{value!r}", parameter=name, rule=self.rule or f"{rule} to {self.high}")
+
+    def _is_in_range(self, value: Any, kind: type) -> bool:
+        is_number = isinstance(value, kind) and not isinstance(value, bool)
+        return is_number and self.low <= value <= self.high and (value != self.low or not self.excludes_low)
+
+    def _is_finite_in_range(self, value: Any) -> bool:
+        return self._is_in_range(value, Real) and math.isfinite(value)
 
 
 def option(default: Any, help: str, **facts: Any) -> Any:
@@ -160,7 +168,9 @@ class Options:
 
     def __post_init__(self) -> None:
         for each, its in options_of(type(self)):
-            value = _own_number(getattr(self, each.name))
+            value = getattr(self, each.name)
+            is_list = _parts_of(each.type) and isinstance(value, Iterable)
+            value = tuple(map(_own_number, value)) if is_list else _own_number(value)
             its.check(each.name, value, each.type)
             object.__setattr__(self, each.name, value)
 
@@ -197,6 +207,11 @@ def default_of(each: Field[Any]) -> Any:
 def kinds_of(kind: Any) -> tuple[Any, ...]:
     """The members of a union, or the one type."""
     return get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
+
+
+def _parts_of(kind: Any) -> tuple[Any, ...]:
+    """The types of a tuple's elements, where ``kind`` is one or may be None; else empty."""
+    return next((get_args(each) for each in kinds_of(kind) if get_origin(each) is tuple), ())
 
 
 def flag_of(name: str) -> str:

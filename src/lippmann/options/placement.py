@@ -95,11 +95,11 @@ class PlacementOptions(Options):
     )
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "turn", _three_numbers("turn", self.turn, least=1))
+        object.__setattr__(self, "shift", _three_numbers("shift", self.shift, least=3))
         super().__post_init__()
         if self.camera is not None and not isinstance(self.camera, str):
             raise UsageError(f"{self.camera!r}", parameter="camera", rule="must be the name of a camera")
-        object.__setattr__(self, "turn", _three_numbers("turn", self.turn, least=1))
-        object.__setattr__(self, "shift", _three_numbers("shift", self.shift, least=3))
         if self.camera is not None and self.place not in (None, "camera"):
             raise UsageError(
                 f"camera '{self.camera}' beside placement '{self.place}'", parameter="camera", rule="only one"

@@ -95,7 +95,13 @@ class SceneOptions(Options):
         is_file=True,
     )
     background: tuple[float, float, float] | None = _light(
-        None, "Colour seen where nothing is hit: R,G,B, linear, 0 to 1.", first=True, read=texts.color
+        None,
+        "Colour seen where nothing is hit: R,G,B, linear, 0 to 1.",
+        first=True,
+        low=0.0,
+        high=1.0,
+        rule="three numbers from 0 to 1, linear: 1,1,1 is white",
+        read=texts.triple,
     )
     single_scattering: bool = _scene(
         False, "Shade rough metal and glass exactly by glTF's formulas, which lose light between microfacets."

@@ -129,14 +129,6 @@ def triple(text: str, option: str) -> tuple[float, float, float]:
     return x, y, z
 
 
-def color(text: str, option: str) -> tuple[float, float, float]:
-    """A linear colour: three numbers from 0 to 1."""
-    values = triple(text, option)
-    if not all(0.0 <= value <= 1.0 for value in values):
-        raise UsageError(f"'{text}'", where=option, rule="three numbers from 0 to 1, linear", fix="1,1,1 is white")
-    return values
-
-
 def number(text: str, option: str, rule: str) -> float:
     """One number; ``rule`` says what else could have been typed."""
     try:

@@ -207,8 +207,8 @@ def test_objects():
 
 
 def test_light_and_background():
-    scene = load_scene(triangle(), background=(0, 0.5, 2))
-    assert (scene.background, scene.environment) == ((0, 0.5, 2), studio())
+    scene = load_scene(triangle(), background=(0, 0.5, 1))
+    assert (scene.background, scene.environment) == ((0, 0.5, 1), studio())
     for kind in (str, Path):
         scene = load_scene(triangle(), environment=kind("studio"))
         assert scene.environment is studio()
@@ -232,9 +232,9 @@ def test_single_scattering_is_noted(save):
         load_scene(save("a.xml", XML.encode()), single_scattering=True)
 
 
-@pytest.mark.parametrize("background", [(1, 2), (0, 0, -1), (0, 0, np.nan), (1e300, 0, 0), (1, 1, 1, 1)])
+@pytest.mark.parametrize("background", [(1, 2), (0, 0, -1), (0, 0, np.nan), (1.01, 0, 0), (1, 1, 1, 1), 0.5, "red"])
 def test_backgrounds_that_are_no_colour(background):
-    with pytest.raises(UsageError, match=r"background: .*three numbers of 0 or more"):
+    with pytest.raises(UsageError, match=r"background: .*three numbers from 0 to 1"):
         load_scene(triangle(), background=background)
 
 

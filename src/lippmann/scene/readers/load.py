@@ -25,7 +25,6 @@ from lippmann.scene.scene import Scene, check_description, override_light
 from lippmann.scene.splat_clouds import moved
 from lippmann.scene.values.description import (
     Camera,
-    Color,
     Direction,
     Environment,
     Material,
@@ -48,9 +47,6 @@ _LIBRARIES = {
     "trimesh": "lippmann.scene.readers.trimesh_objects:adapter_for",
     "pyvista": "lippmann.scene.readers.vtk.objects:adapter_for",
 }
-
-#: Radiance whose square single precision holds.
-_BRIGHTEST = 1e18
 
 #: Ray depth with which the paper renders its scenes.
 _PAPER_DEPTH = 2
@@ -158,7 +154,7 @@ def read_scene(
         As :func:`load_scene`.
     """
     sky = _environment(asked.environment)
-    color = _background(asked.background)
+    color = asked.background
     if isinstance(source, str | Path):
         scene = _from_name(source, allow_outside, asked)
     else:
@@ -528,13 +524,3 @@ def _environment(environment: str | Path | Environment | None) -> Environment | 
     from lippmann.scene.readers.environment_map import read_environment
 
     return read_environment(Path(environment))
-
-
-def _background(background: Color | None) -> Color | None:
-    if background is None:
-        return None
-    values = tuple(float(value) for value in background)
-    if len(values) != 3 or not all(0.0 <= value <= _BRIGHTEST for value in values):
-        rule = f"three numbers of 0 or more, linear RGB, none beyond {_BRIGHTEST:g}"
-        raise UsageError(f"{background!r}", parameter="background", rule=rule)
-    return (values[0], values[1], values[2])
