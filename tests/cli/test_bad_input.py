@@ -120,7 +120,9 @@ def test_an_unknown_display_suggests_a_known_one(lippmann, kept):
     ("words", "named"),
     [
         (("--spp", "0"), "--spp"),
-        (("--spp", "many"), "--spp"),
+        (("--spp", "many"), "--spp: 'many'; must be a whole number"),
+        (("--quality", "good"), "--quality: 'good'; must be a number"),
+        (("--depth", "far.png"), "--depth: 'far.png'; must be a whole number; for a map of depths --depth-map"),
         (("--integrator", "magic"), "magic"),
         (("--method", "guess"), "guess"),
         (("--depth", "0"), "--depth"),
@@ -143,6 +145,17 @@ def test_an_unknown_display_suggests_a_known_one(lippmann, kept):
 )
 def test_options_that_will_not_do(lippmann, kept, engine, words, named):
     refuse(lippmann("render", "teapot", "--spp", "1", *words, "-o", kept), named)
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("--eye", "0,0,-600"), "the eye is at 0,0,-600; it must be in front of the lens plane"),
+        (("--pixels", "99999x9"), "the size is (99999, 9)"),
+    ],
+)
+def test_no_eye_behind_the_display_and_no_endless_preview(lippmann, kept, words, named):
+    refuse(lippmann("preview", "no.glb", *words, "-o", kept), named)
 
 
 def test_an_unknown_output_format(lippmann, tmp_path):

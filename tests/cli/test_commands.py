@@ -199,7 +199,7 @@ def test_version_and_help(lippmann):
 
     assert lippmann("--version").out.strip() == f"lippmann {package.__version__}"
     for words in ((), *((name,) for name in ("render", "preview", "info", "views", "compose", "replay", "refocus"))):
-        assert "--help" in lippmann(*words, "--help").out
+        assert "-h, --help" in lippmann(*words, "-h").out
 
 
 def test_what_is_split_or_refocused_is_named_after_the_picture(lippmann, picture, tmp_path, monkeypatch):

@@ -56,7 +56,21 @@ def test_an_empty_folder_and_a_pattern_without_files_are_named(lippmann, tmp_pat
     for given in (tmp_path / "frames", tmp_path / "none*.jpg"):
         outcome = lippmann("interlace", given, *SHEET, "--size", "30x20mm", "-o", tmp_path / "print.tif")
         assert outcome.code == 2
-        assert "0 photographs are given; at least 2 are interlaced" in outcome.err
+        assert "no photographs are given; at least 2 are interlaced" in outcome.err
+
+
+def test_one_photograph_may_be_a_pair_and_monitors_weave_by_themselves(lippmann, tmp_path):
+    pair = tmp_path / "pair.png"
+    Image.new("RGB", (8, 4)).save(pair)
+    for words, said in (
+        (("interlace", pair, *SHEET, "--size", "30x20mm"), "one photograph is given; at least 2 are interlaced"),
+        (("interlace", pair, *SHEET, "--size", "30x20mm"), "lippmann weave --layout 2x1"),
+        (("interlace", pair, pair, "-d", "elf-sr"), "--display: elf-sr takes no native pixels"),
+        (("weave", pair, "--layout", "2x1", "-d", "elf-sr"), "--display: elf-sr takes no native pixels"),
+    ):
+        outcome = lippmann(*words, "-o", tmp_path / "out.tif")
+        assert outcome.code == 2
+        assert said in outcome.err
 
 
 @pytest.mark.long_cases("options0-print.tif")

@@ -132,6 +132,13 @@ def test_a_page_in_one_file_has_its_limits(lippmann, shot, tmp_path, monkeypatch
     assert not (tmp_path / "a.html").exists()
 
 
+def test_a_page_does_not_replace_a_picture(lippmann, shot, tmp_path):
+    page = tmp_path / "page.png"
+    page.write_bytes(b"older")
+    refuse(lippmann("view", shot, "--export", page), f"{page}: the ending is '.png'; a page ends in .html")
+    assert page.read_bytes() == b"older"
+
+
 @pytest.mark.parametrize("extra", [("--port", "1234"), ("--host", "localhost"), ("--no-browser",)])
 def test_options_of_the_server_mean_nothing_to_a_file(lippmann, shot, tmp_path, extra):
     refuse(lippmann("view", shot, "--export", tmp_path / "a.html", *extra), extra[0])

@@ -225,6 +225,8 @@ def test_a_manifest_that_makes_no_sense_is_named(views, changes, message):
 def test_a_folder_without_a_manifest(tmp_path, views):
     with pytest.raises(PictureError, match=r"lippmann.json: not found; give a folder written by"):
         compose(tmp_path)
+    with pytest.raises(PictureError, match=r"lippmann.json: not found; give a folder written by"):
+        compose(views / MANIFEST)
     for content in (b"", b"{}", b"\xff\xfe", b"[]"):
         (views / MANIFEST).write_bytes(content)
         with pytest.raises(PictureError, match="describes no folder of views or micro-images"):

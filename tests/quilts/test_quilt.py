@@ -69,7 +69,7 @@ def test_names_are_read(tmp_path, name, layout):
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("teapot.png", "does not say how many views"),
+        ("teapot.png", "does not say how many views.*--layout 8x6, or 2x1 of a pair"),
         ("teapot_3x4_1920x1080.png", "--layout 3x4"),
         ("teapot 12BY5.jpg", "--layout 12x5"),
         ("x_qs8x.png", "does not say how many views"),

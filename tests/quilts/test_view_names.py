@@ -45,7 +45,7 @@ def test_cameras_of_the_stanford_archive_are_ordered_by_where_they_stood(down, r
 
 
 def test_names_without_numbers_and_doubles_are_named():
-    with pytest.raises(PictureError, match=r"a\.png: the name has no number"):
+    with pytest.raises(PictureError, match=r"a\.png: the name has no number.*rename it: view_00"):
         places("a.png", "b_1.png")
     with pytest.raises(PictureError, match=r"a_1\.png: is the same view as a_01\.png"):
         places("a_01.png", "a_1.png")

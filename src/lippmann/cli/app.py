@@ -128,7 +128,7 @@ def app_of(words: Sequence[str]) -> typer.Typer:
     if _COMPLETION in os.environ:
         return make_app()
     first = words[0] if words else "--help"
-    if first in ("--help", "--version"):
+    if first in ("--help", "-h", "--version"):
         return _outline()
     if first not in COMMANDS:
         return make_app()
@@ -164,6 +164,7 @@ def _empty() -> typer.Typer:
         cls=HelpfulGroup,
         help="Render 3D scenes into the native pixels of integral-imaging displays.",
         add_completion=True,
+        context_settings={"help_option_names": ["--help", "-h"]},
         rich_markup_mode=None,
     )
     app.callback(invoke_without_command=True)(_top)
@@ -269,6 +270,8 @@ def _is_interrupt(error: BaseException | None) -> bool:
 _NOT_LISTED = re.compile(r"Invalid value for '(--[\w-]+)'.*: (?:Value error, )?('.*?') is not one of (.*)\.")
 
 
+#: How typer refuses what is no number.
+_NO_NUMBER = re.compile(r"Invalid value for '(--[\w-]+)'.*: ('.*') is not a valid (int|float)\.")
 #: How typer refuses a group of commands without one of them, and a word that is like none.
 _NO_COMMAND = re.compile(r"Missing command\.|No such command '[^']*'\.")
 _NO_SUCH = re.compile(r"No such option: (--[\w-]+)")
@@ -285,6 +288,11 @@ def _usage(error: BaseException) -> str:
     former = _NO_SUCH.search(message)
     if former is not None and former[1] in _OTHER_NAMES:
         return f"{former[1]}: {_OTHER_NAMES[former[1]]}"
+    number = _NO_NUMBER.fullmatch(message)
+    if number is not None:
+        rule = "must be a whole number" if number[3] == "int" else "must be a number"
+        fix = "for a map of depths --depth-map" if number[1] == "--depth" else ""
+        return str(UsageError(number[2], where=number[1], rule=rule, fix=fix))
     listed = _NOT_LISTED.fullmatch(message)
     if listed is not None:
         option, word, known = listed[1], listed[2].strip("'"), listed[3].replace("'", "").split(", ")

@@ -434,7 +434,9 @@ class Display:
         if self.stereo is not None:
             rule = "an eye-tracked monitor weaves the pictures of the two eyes by itself"
             what = f"{self.name} takes no native pixels"
-            raise DisplayError(what, parameter="display", rule=rule, fix="use lippmann quilt render")
+            raise DisplayError(
+                what, parameter="display", rule=rule, fix="use lippmann quilt render, of pictures lippmann quilt pack"
+            )
 
     # ---- Copies and plain values -----------------------------------------------------------------------------------
 

@@ -334,7 +334,7 @@ def _read_manifest(folder: Path) -> _Manifest:
     try:
         check_kind(path, PictureError)
         values = parse_json(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         fix = "give a folder written by 'lippmann views' or 'lippmann micro-images'"
         raise PictureError("not found", where=str(path), fix=fix) from None
     except OSError as error:

@@ -137,8 +137,10 @@ def read_photos(
     """
     sources = [source for path in paths for source in _views_in(path)]
     if len(sources) < 2:
-        what, rule = f"{len(sources)} photographs are given", f"at least 2 are interlaced, of {', '.join(ENDINGS)}"
-        raise UsageError(what, rule=rule, fix="weave views of other formats")
+        what = "one photograph is given" if sources else "no photographs are given"
+        rule = f"at least 2 are interlaced, of {', '.join(ENDINGS)}"
+        fix = "weave two that stand side by side in it: lippmann weave --layout 2x1" if sources else ""
+        raise UsageError(what, rule=rule, fix=fix or "weave views of other formats")
     if fit is not None and fit not in get_args(Fit):
         raise UsageError.unknown("fit", fit, get_args(Fit), parameter="fit")
     headers = [_header(source) for source in sources]

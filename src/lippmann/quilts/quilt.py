@@ -337,7 +337,8 @@ def layout_of_name(path: Path) -> QuiltLayout:
     match = QUILT_NAME.search(path.stem)
     if match is None:
         size = _SIZE.search(path.stem)
-        fix = f"say the columns and rows of views: --layout {'x'.join(size.groups()) if size else '8x6'}"
+        layout = "x".join(size.groups()) if size else "8x6, or 2x1 of a pair"
+        fix = f"say the columns and rows of views: --layout {layout}"
         raise PictureError("the name does not say how many views there are", where=str(path), rule=_CONVENTION, fix=fix)
     aspect = None if match[3] is None else float(match[3].replace(",", "."))  # some languages' mark of decimals
     return checked_layout(int(match[1]), int(match[2]), aspect, where=str(path))

@@ -63,7 +63,7 @@ def places_of_views(paths: Sequence[Path]) -> dict[Place, Path]:
     for path, parts in zip(paths, numbers, strict=True):
         if not parts:
             rule = "views are numbered, or named by row and column"
-            raise PictureError("the name has no number", where=str(path), rule=rule)
+            raise PictureError("the name has no number", where=str(path), rule=rule, fix="rename it: view_00, view_01")
     if len({len(parts) for parts in numbers}) > 1:
         return _by_place(paths, [parts[-1:] for parts in numbers])
     columns = list(zip(*numbers, strict=True))

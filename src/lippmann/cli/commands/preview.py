@@ -70,6 +70,7 @@ def preview(
     """Show in a second or two what a display will show to an eye in front of its middle."""
     from lippmann.image.write import check_output, write_plain_picture
     from lippmann.rendering.request.render_request import RenderRequest
+    from lippmann.viewing.replay import checked_eye, checked_size, default_eye
 
     console = Console(quiet, as_json)
     output = output_of(output, scene, "-preview.png")
@@ -77,18 +78,17 @@ def preview(
     target = display_of(display, printed)
     request = RenderRequest.from_options(how, machine, placement=placement).for_file(output)
     source = SceneSource(scene, asked, light, access)
+    size = checked_size(parse.size(pixels or "512x512", "--pixels"))
+    at = default_eye(target) if eye is None else checked_eye(triple(eye, "--eye"))
     with console.progress() as progress:
         started = time.perf_counter()
         loaded = source.load()
         load_seconds = time.perf_counter() - started
-        size = parse.size(pixels or "512x512", "--pixels")
         if plain:
             image = _plain(loaded, placement.camera, size, eye, request, progress)
         else:
             from lippmann.rendering.live.eye_preview import render_eye_preview
-            from lippmann.viewing.replay import default_eye
 
-            at = default_eye(target) if eye is None else triple(eye, "--eye")
             image = render_eye_preview(loaded, target, at, request, size, progress)
         writing = time.perf_counter()
         provenance = add_seconds(image.provenance, load=load_seconds)

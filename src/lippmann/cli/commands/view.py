@@ -16,7 +16,7 @@ from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import in_options
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.exit_codes import INTERRUPTED
-from lippmann.errors import LippmannError, UsageError
+from lippmann.errors import LippmannError, OutputError, UsageError
 from lippmann.runtime.atomic_write import scratch_folder
 
 if TYPE_CHECKING:
@@ -129,6 +129,8 @@ def _export(paths: list[Path], display: Display | None, output: Path, sources: l
     from lippmann.runtime.atomic_write import check_writable
     from lippmann.viewer.export import check_exportable, export_page
 
+    if output.suffix.lower() not in (".html", ".htm"):
+        raise OutputError(f"the ending is '{output.suffix}'", where=str(output), rule="a page ends in .html")
     files = [open_file(path) for path in paths]
     for file in files:
         check_exportable(file.metadata_for(display).display)
