@@ -23,12 +23,12 @@ def main() -> None:
 
     from lippmann.api import load_scene
     from lippmann.device.pbr import build
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.display import load_display
     from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import DisplayRays
-    from lippmann.rendering.transport.scene_features import make_scene_features
     from lippmann.scene.placement import place
 
     scene = load_scene("teapot")

@@ -50,7 +50,7 @@ def test_what_changes_after_recording_is_seen(frozen):
     import drjit as dr
     import mitsuba as mi
 
-    from lippmann.rendering.transport.scene_features import SceneFeatures
+    from lippmann.device.pbr.scene import SceneFeatures
 
     features = SceneFeatures(absorption=mi.Color3f([1.0], [2.0], [3.0]))
     dr.make_opaque(features.absorption)

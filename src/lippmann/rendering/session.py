@@ -422,8 +422,8 @@ def make_whitted(built: BuiltClassic, request: RenderRequest, frame_from_world: 
 
 def make_path(built: BuiltScene, request: RenderRequest, frame_from_world: Matrix) -> Integrator:
     """Path tracing, through participating media where there are some."""
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.transport.path import PathIntegrator
-    from lippmann.rendering.transport.scene_features import make_scene_features
     from lippmann.rendering.transport.volume_path import VolumePathIntegrator
 
     if built.has_media:

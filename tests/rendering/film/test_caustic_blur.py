@@ -40,9 +40,9 @@ def matt_plane(passes):
     """An integrator before a white plane, seen from z = 5; pixels cover x and y from -0.5 to 0.5."""
     import mitsuba as mi
 
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
-    from lippmann.rendering.transport.scene_features import make_scene_features
     from lippmann.scene.values.description import Camera
 
     plane = {

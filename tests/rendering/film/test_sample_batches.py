@@ -23,8 +23,8 @@ def integrator(engine):
     """A ball in a corner, under an area light and a little sky."""
     import mitsuba as mi
 
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.transport.path import PathIntegrator
-    from lippmann.rendering.transport.scene_features import make_scene_features
 
     def grey(value):
         return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": value}}}
@@ -189,9 +189,9 @@ def test_samples_of_one_pass_are_taken_together():
     """Each stretch of samples has the photons of its pass."""
     import mitsuba as mi
 
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.film.sample_batches import _stretches
     from lippmann.rendering.transport.path import PathIntegrator
-    from lippmann.rendering.transport.scene_features import make_scene_features
 
     class Passes:
         pass_samples = 32

@@ -46,9 +46,9 @@ SKY = {"type": "constant", "radiance": 1.0}
 def stage(scene):
     import mitsuba as mi
 
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
-    from lippmann.rendering.transport.scene_features import make_scene_features
     from lippmann.scene.values.description import Camera
 
     loaded = mi.load_dict(scene)

@@ -33,9 +33,9 @@ def landed(scene_dict, count=1 << 17, seed=3):
     """Photons of a scene, and how many emissions each emitter and caster had."""
     import mitsuba as mi
 
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.transport.casters import find_casters
     from lippmann.rendering.transport.photon_shooter import PhotonShooter
-    from lippmann.rendering.transport.scene_features import make_scene_features
 
     scene = mi.load_dict({"type": "scene"} | scene_dict)
     casters = find_casters(scene)
@@ -155,13 +155,13 @@ def test_photons_pass_holes_on_their_way():
 def traced(scene_dict, view, *, photons, size=24, spp=64, seed=0, depth=6, samples=1 << 26):
     import mitsuba as mi
 
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.transport.casters import find_casters
     from lippmann.rendering.transport.caustic_photons import CausticPhotons
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
-    from lippmann.rendering.transport.scene_features import make_scene_features
 
     scene = mi.load_dict({"type": "scene"} | scene_dict)
     features = make_scene_features(scene, has_null="mask" in str(scene_dict))
@@ -313,9 +313,9 @@ def test_instances_and_curves_throw_what_the_shapes_throw(tmp_path):
 def photons_of(scene_dict, **options):
     import mitsuba as mi
 
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.transport.casters import find_casters
     from lippmann.rendering.transport.caustic_photons import CausticPhotons
-    from lippmann.rendering.transport.scene_features import make_scene_features
 
     scene = mi.load_dict({"type": "scene"} | scene_dict)
     features = make_scene_features(scene, has_null=False)

@@ -47,9 +47,9 @@ def stage(scene, depth=3):
     """Integrator and rays of a Mitsuba scene or the dictionary of one."""
     import mitsuba as mi
 
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
-    from lippmann.rendering.transport.scene_features import make_scene_features
 
     loaded = mi.load_dict(scene) if isinstance(scene, dict) else scene
     return PathIntegrator(loaded, make_scene_features(loaded), depth), CameraRays(camera(), SIZE, SIZE)

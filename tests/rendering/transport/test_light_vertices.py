@@ -99,9 +99,9 @@ def prepared(scene, *, has_null=False, depth=4):
     """Integrator and eye of a Mitsuba scene or its dictionary."""
     import mitsuba as mi
 
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
-    from lippmann.rendering.transport.scene_features import make_scene_features
     from lippmann.scene.values.description import Camera
 
     loaded = mi.load_dict(scene) if isinstance(scene, dict) else scene
@@ -207,9 +207,9 @@ def test_a_limit_on_indirect_light_holds_for_joins():
 def test_coloured_glass_takes_its_light():
     """Light that crosses glass is left to the paths that know how far they went through it."""
     from lippmann.device.pbr import build_description
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
-    from lippmann.rendering.transport.scene_features import make_scene_features
     from lippmann.scene.values.description import Camera
 
     built = build_description(glass_room())

@@ -21,11 +21,11 @@ def camera(distance, fov=40.0):
 def trace(scene_dict, cam, size=32, spp=64, depth=6, seed=0, background=None, absorption=None):
     import mitsuba as mi
 
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
-    from lippmann.rendering.transport.scene_features import make_scene_features
 
     scene = mi.load_dict(scene_dict)
     has_null = "mask" in str(scene_dict)
@@ -188,11 +188,11 @@ def test_roulette_changes_no_mean():
     """A closed white box of radiance 1 whose walls reflect two thirds: light of each bounce is known."""
     import mitsuba as mi
 
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
-    from lippmann.rendering.transport.scene_features import make_scene_features
     from lippmann.scene.values.description import Camera
 
     albedo, depth = 0.66, 12
@@ -276,11 +276,11 @@ def test_later_surfaces_take_one_emitter_sample():
 def test_tiles_and_passes_do_not_change_the_picture():
     import mitsuba as mi
 
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.film.memory_model import Plan
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
-    from lippmann.rendering.transport.scene_features import make_scene_features
 
     scene = mi.load_dict(mixed_scene())
     integrator = PathIntegrator(scene, make_scene_features(scene), 3)

@@ -66,11 +66,11 @@ def described(description):
 
 
 def prepared(scene, *, has_null):
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.preparation.prepare import shoot_photons, trace_pilot
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
-    from lippmann.rendering.transport.scene_features import make_scene_features
     from lippmann.scene.values.description import Camera
 
     integrator = PathIntegrator(scene, make_scene_features(scene, has_null=has_null), 6)
@@ -369,11 +369,11 @@ def test_sky_at_outlines_stays_with_paths(engine):
     """Samples of both sides belong together: of a ball as bright as its sky nothing would be seen."""
     import mitsuba as mi
 
+    from lippmann.device.pbr.scene import make_scene_features
     from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
-    from lippmann.rendering.transport.scene_features import make_scene_features
     from lippmann.scene.values.description import Camera
 
     scene = mi.load_dict(

@@ -1,4 +1,4 @@
-"""From a scene to a ``mi.Scene``: materials, shapes, lights, in this order."""
+"""From a scene to a ``mi.Scene``: materials, shapes, lights, in this order; and the features of it that paths need."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lippmann.device.pbr.materials import Finish, Variant, follows_tangents, mak
 from lippmann.device.pbr.media import MEDIA_NOTE, has_media
 from lippmann.device.pbr.shapes import Dress, has_volume, make_shapes
 from lippmann.device.pbr.textures import TextureStore
-from lippmann.device.types import BSDF, Emitter, MitsubaScene, Shape
+from lippmann.device.types import BSDF, Color3f, Emitter, MitsubaScene, Shape, ShapePtr
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.light import LightOptions
 from lippmann.runtime import engine as engines
@@ -76,6 +76,33 @@ class BuiltScene(EngineOwner):
     splats: SplatTable | None = None
     volume: VolumeTable | None = None
     finishes: Mapping[Variant, Finish] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class SceneFeatures:
+    """Features that switch parts of the path loop on.
+
+    Attributes
+    ----------
+    background:
+        Linear RGB that camera rays see where nothing is hit; None for the environment itself.
+    has_null:
+        Whether some surface lets rays straight through.
+    absorption:
+        ``mi.Color3f`` of absorption coefficients per world unit, indexed by a shape's place in Dr.Jit's registry; None
+        where no shape absorbs.
+    """
+
+    background: Color | None = None
+    has_null: bool = False
+    absorption: Color3f | None = None
+
+    def absorption_of(self, shape: ShapePtr) -> Color3f:
+        """Absorption coefficients per world unit inside ``shape``."""
+        import drjit as dr
+        import mitsuba as mi
+
+        return dr.gather(mi.Color3f, self.absorption, dr.reinterpret_array(mi.UInt32, shape))
 
 
 def build(
@@ -286,6 +313,40 @@ def _absorption(scene: MitsubaScene, shapes: Sequence[Shape], finishes: Sequence
         for shape, finish in zip(shapes, finishes, strict=True)
         if finish is not None and finish.absorption is not None
     }
+
+
+def make_scene_features(
+    scene: MitsubaScene,
+    *,
+    background: Color | None = None,
+    has_null: bool = True,
+    absorption: Mapping[int, Color] | None = None,
+) -> SceneFeatures:
+    """The features of a scene, its absorption uploaded to the device.
+
+    Parameters
+    ----------
+    scene:
+        The scene.
+    background:
+        Linear RGB that camera rays see where nothing is hit; by default the environment itself.
+    has_null:
+        Whether some surface lets rays straight through. True is always correct, but slower.
+    absorption:
+        Absorption coefficients per world unit, by the index of a shape in ``scene.shapes()``.
+    """
+    if not absorption:
+        return SceneFeatures(background, has_null)
+    import drjit as dr
+    import mitsuba as mi
+
+    pointers = dr.reinterpret_array(mi.UInt32, scene.shapes_dr())
+    indices = [int(pointers[i]) for i in range(len(pointers))]
+    table = [[0.0, 0.0, 0.0] for _ in range(max(indices) + 1)]
+    for position, coefficients in absorption.items():
+        table[indices[position]] = list(coefficients)
+    columns = [mi.Float([row[c] for row in table]) for c in range(3)]
+    return SceneFeatures(background, has_null, mi.Color3f(*columns))
 
 
 def is_instance(shape: Shape) -> bool:

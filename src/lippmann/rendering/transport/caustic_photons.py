@@ -17,12 +17,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.pbr.scene import SceneFeatures
 from lippmann.device.sobol import named_seed
 from lippmann.device.types import MitsubaScene
 from lippmann.rendering.transport.casters import Casters
 from lippmann.rendering.transport.photon_map import PhotonMap, Photons, are_inside
 from lippmann.rendering.transport.photon_shooter import PhotonShooter
-from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.tuning import TUNING
 
 #: Photons emitted for each half-buffer, divided by the samples to the power of 2/3. An emission may take as long as two

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import mitsuba as mi
 
+from lippmann.device.pbr.scene import SceneFeatures
 from lippmann.device.sobol import SampleStream
 from lippmann.device.syntax import syntax
 from lippmann.device.types import (
@@ -52,7 +53,6 @@ from lippmann.rendering.transport.path_techniques import (
     WithoutSpecularLight,
 )
 from lippmann.rendering.transport.path_vertex import DIMENSIONS, LastVertex, Scattering, Vertex
-from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.tuning import TUNING
 
 if TYPE_CHECKING:

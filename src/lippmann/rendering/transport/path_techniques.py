@@ -14,6 +14,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.pbr.microfacet import is_sharp
+from lippmann.device.pbr.scene import SceneFeatures
 from lippmann.device.types import (
     Bool,
     Color3f,
@@ -28,7 +29,6 @@ from lippmann.rendering.transport.light_sampling import Clamp
 from lippmann.rendering.transport.light_vertices import Arrival, JointLight, LightVertices, reach_of
 from lippmann.rendering.transport.path_vertex import Scattering, Vertex
 from lippmann.rendering.transport.photon_map import PhotonMap
-from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.sharp_events import MOST_EVENTS, facing_normal, lambertian_share
 from lippmann.rendering.transport.tuning import TUNING
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide, to_numpy, upload
+from lippmann.device.pbr.scene import SceneFeatures
 from lippmann.device.sobol import SampleStream
 from lippmann.device.syntax import syntax
 from lippmann.device.types import (
@@ -25,7 +26,6 @@ from lippmann.device.types import (
 from lippmann.rendering.transport.casters import CasterPoints, Casters
 from lippmann.rendering.transport.path_vertex import DIMENSIONS
 from lippmann.rendering.transport.photon_map import Photons
-from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.sharp_events import (
     MOST_EVENTS,
     facing_normal,

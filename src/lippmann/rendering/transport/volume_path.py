@@ -38,8 +38,8 @@ from lippmann.rendering.transport.light_sampling import (
     roulette_survival,
 )
 from lippmann.rendering.transport.path_vertex import DIMENSIONS
-from lippmann.rendering.transport.scene_features import Color
 from lippmann.rendering.transport.tuning import TUNING
+from lippmann.scene.values.description import Color
 
 #: Collisions, null collisions included, along one path or shadow ray: bounds the loop in media that are all but opaque.
 MAX_COLLISIONS = 1 << 16
