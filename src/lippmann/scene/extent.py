@@ -31,7 +31,7 @@ _EXACT_VERTICES = 20_000_000
 _POINTS_AT_A_TIME = 1 << 20
 #: A scene is flat along an axis where it is thinner than this share of its other sides.
 _FLAT = 0.05
-#: A side below this share of another is no side but the rounding of a line, which is flat from nowhere.
+#: A side below this share of another is no side: rounding gives one to a line, which has no face.
 _LINE = 0.01
 #: A box smaller than this share of its largest coordinate is a single point: a rotation's rounding, a few units in the
 #: last place of double precision, leaves nothing of its extent.

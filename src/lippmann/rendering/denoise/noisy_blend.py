@@ -114,8 +114,8 @@ def leave_one_out_mean(values: Floats, reach: int, bands: Bands, errors: float =
     """Leave-one-out local mean, soft-thresholded at ``errors`` of its own standard errors (>= 0), ``(H, W)``.
 
     The mean of a pixel is that of the others up to ``reach`` pixels away, cut at the edges. Its standard error
-    is the sample standard deviation of those n values over the root of n, as of values that know nothing of each
-    other. Where fewer than two others are left, nothing is known: 0.
+    is that of n independent values: their sample standard deviation over the root of n. Where fewer than two others
+    are left, nothing is known: 0.
     """
     mean = _mean_of_others(values, reach, bands)
     squares = _mean_of_others(np.square(values), reach, bands)

@@ -31,7 +31,8 @@ COLORS = 12
 PICTURE = COLORS + COLORS
 #: The squared error of each pixel, its outliers' share and its blur.
 ERROR_MAPS = COLORS
-#: What a denoiser treats apart: seen light of two halves, its excess, and coverage of two halves by channels.
+#: Sums that a denoiser wants apart: specular light of both half-buffers, its excess above the clamp, and coverage of
+#: both half-buffers in each channel.
 FOR_DENOISER = PICTURE + COLORS + PICTURE
 #: One emission of photons, which lands about once, with what sorting takes, in bytes.
 PHOTON = 128

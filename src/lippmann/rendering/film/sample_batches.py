@@ -270,7 +270,10 @@ def _alternate(number: int) -> tuple[int, ...]:
 
 
 def _sizes(window: PixelWindow, channels: int, memory: int, further: int) -> tuple[int, int]:
-    """Number of batches that fit beside ``further`` bytes per pixel and a row's lanes; and the lanes of a wavefront."""
+    """Number of batches whose sums fit into ``memory``, and the lanes of a wavefront that fit into the rest.
+
+    ``further`` are the bytes that each pixel takes beside its sums; a wavefront has room for one row at least.
+    """
     pixels, row = window.pixels, window.width * channels
     for batches in (memory_model.MOST_BATCHES, memory_model.MOST_BATCHES // 2, STREAMS):
         kept = pixels * (memory_model.batches(batches) + further)

@@ -182,7 +182,7 @@ class LiveRenderer:
         if self._latest is None or self._latest.view != view:
             self.frame(view)
         assert self._latest is not None
-        # The green sub-pixel stands for the pixel where sub-pixels have rays of their own.
+        # Where sub-pixels have rays of their own, the middle one, green, stands for the pixel.
         number = self._latest.pixels.number[..., self._latest.pixels.channels // 2]
         with_nothing = np.append(self._height, np.float32(np.nan))
         return np.asarray(with_nothing[number], np.float32)

@@ -166,7 +166,7 @@ class CasterPoints:
     def is_met(self, si: SurfaceInteraction3f, distance: Float) -> Bool:
         """Whether ``si`` is the sampled caster (point), seen from an emitter at ``distance``."""
         near = dr.squared_norm(si.p - self.p) < dr.square(TUNING.rounding * distance)
-        # The back of a thin body is not met.
+        # On a thin body a point of the back side may lie as near; its normal tells it apart.
         near &= dr.dot(si.n, self._n) > TUNING.least_agreement
         return dr.select(self._boxed, (si.instance == self._shape) | (si.shape == self._shape), near)
 
