@@ -14,7 +14,7 @@ import weakref
 
 import pytest
 
-from lippmann.runtime.engine_lock import exclusive, no_collection
+from lippmann.runtime.engine_lock import EngineOwner, exclusive, no_collection
 
 needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 
@@ -485,6 +485,29 @@ def test_a_thread_that_waits_goes_before_one_that_takes_the_lock_again():
     finally:
         ends.set()
         thread.join()
+
+
+class Part:
+    """Stands for a scene of the engine."""
+
+
+class Owner(EngineOwner):
+    def __init__(self):
+        self.part = Part()
+
+
+def test_what_another_thread_drops_is_freed_when_the_engine_is_free():
+    owners = [Owner(), Owner()]
+    first, second = (weakref.ref(owner.part) for owner in owners)
+    with exclusive():
+        with exclusive():
+            thread = threading.Thread(target=owners.pop)
+            thread.start()
+            thread.join()
+        assert second() is not None
+    assert second() is None
+    owners.pop()
+    assert first() is None
 
 
 class Ring:
