@@ -150,7 +150,7 @@ class Case:
 
     def beside_the_truth(self, traced: Any) -> dict[str, Any]:
         """What a picture says of itself, and what is true."""
-        from lippmann.rendering.light_statements import stated_error
+        from lippmann.rendering.provenance import stated_error
 
         psnr, worst = self.truth(traced.frame.pixels)
         told: Any = stated_error(traced.estimate, self.session.choices)

@@ -431,7 +431,7 @@ MOST_FILES = 95
 MOST_CLIMBING = 4
 
 #: What decides how a picture is made, below ``rendering``: packages and modules.
-DECIDES = ("request", "preparation", "adaptive", "methods", "session", "picture", "light_statements")
+DECIDES = ("request", "preparation", "adaptive", "methods", "session", "picture", "provenance")
 
 #: Decorators, by whose functions others are called: these call for whoever calls them.
 DECORATORS = {

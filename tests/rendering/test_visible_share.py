@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lippmann.rendering.film.wavefront import RayTotals
-from lippmann.rendering.light_statements import visible_share, warn_of_emptiness
+from lippmann.rendering.provenance import visible_share, warn_of_emptiness
 
 GREY = (0.2, 0.2, 0.2)
 

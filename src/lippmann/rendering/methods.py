@@ -24,7 +24,7 @@ from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts, Pixel
 from lippmann.rendering.film.memory_model import cut_wavefronts
 from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
 from lippmann.rendering.film.wavefront import Frame, trace_frame
-from lippmann.rendering.light_statements import is_among_mirrors
+from lippmann.rendering.provenance import is_among_mirrors
 from lippmann.rendering.reprojection.point_image import STATUS_LAYER, TRACED
 from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.request.render_request import RenderRequest

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lippmann.image.picture import Provenance
 from lippmann.progress import ProgressCallback, silent
+from lippmann.rendering.provenance import provenance_of
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session
@@ -62,5 +63,5 @@ def render_preview(
     traced = trace_unjudged(Job(session, integrator, source, frame_from_world))
     session.watch.seconds.update(traced.seconds)
     options = {"pixel_filter": request.pixel_filter, "camera": pose.name, **traced.options}
-    provenance = session.provenance(traced.frame, samples=traced.samples, options=options)
+    provenance = provenance_of(session, traced.frame, samples=traced.samples, options=options)
     return Preview(request.tone_mapped(traced.frame.pixels), provenance)

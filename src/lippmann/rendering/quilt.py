@@ -14,6 +14,7 @@ from lippmann.display.view_cone import view_window
 from lippmann.image.picture import Provenance
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.picture import placed_options
+from lippmann.rendering.provenance import provenance_of
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Build, even_background, open_session
@@ -86,7 +87,8 @@ def render_quilt(
     traced = trace(Job(session, integrator, source, display_from_world))
     session.watch.seconds.update(traced.seconds)
     traced.frame.pixels = _assembled(traced.frame.pixels, source, size, background)
-    provenance = session.provenance(
+    provenance = provenance_of(
+        session,
         traced.frame,
         samples=traced.samples,
         options={

@@ -1,33 +1,27 @@
-"""Rendering sessions: the running engine, the scene on the device, the display's placement, and the provenance.
+"""Rendering sessions: the running engine, the scene on the device, and the display's placement.
 
-Pictures, quilts, previews, forecasts and tiles open a session, get their integrator from it, and let it record how they
-were made. :func:`open_session` loads Mitsuba: modules that need it are imported after that.
+Pictures, quilts, previews, forecasts and tiles open a session and get their integrator from it. :func:`open_session`
+loads Mitsuba: modules that need it are imported after that.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 
-from lippmann._version import VERSION
 from lippmann.display import Display
 from lippmann.display.sheet_layout import trimmed
 from lippmann.errors import EngineError, UsageError
-from lippmann.image.picture import Provenance
-from lippmann.options.choices import LIGHT, POOLED_LIGHT, REUSING
+from lippmann.options.choices import POOLED_LIGHT, REUSING
 from lippmann.options.integrators import INTEGRATORS
-from lippmann.options.option import Options
-from lippmann.options.quality import QualityOptions
-from lippmann.options.texts import settings_of
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.film.memory_model import cut_wavefronts
-from lippmann.rendering.light_statements import light_notes, stated_error, visible_share, warn_of_emptiness
 from lippmann.rendering.request.plan import follow
 from lippmann.rendering.request.render_request import Choice, RenderRequest
 from lippmann.runtime import engine as engines
@@ -43,8 +37,6 @@ if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
     from lippmann.device.whitted.scene import BuiltClassic
     from lippmann.options.placement import PlacementOptions
-    from lippmann.rendering.estimate.psnr import Estimate
-    from lippmann.rendering.film.wavefront import Frame
     from lippmann.rendering.transport.integrator import Integrator
     from lippmann.rendering.transport.ray_source import RaySource
 
@@ -248,68 +240,6 @@ class Session:
         self.choices.update(light.choices)
         return integrator.lit_by(light)
 
-    def provenance(
-        self,
-        frame: Frame,
-        *,
-        samples: int,
-        options: Mapping[str, object],
-        estimate: Estimate | None = None,
-        notes: tuple[str, ...] = (),
-        has_pixels: bool = True,
-    ) -> Provenance:
-        """How a picture of ``frame`` was made, for its file.
-
-        ``has_pixels`` says that the frame holds the picture, not its size alone.
-        """
-        request = self.request
-        height, width = frame.pixels.shape[:2]
-        rays, work = frame.rays, height * width * samples * request.channels
-        assert request.plan is not None  # of a resolved request
-        plan = request.plan.with_pilot(self.choices).lines()
-        return Provenance(
-            method=request.method,
-            integrator=request.integrator,
-            depth=request.surfaces,
-            spp=samples,
-            seed=request.seed,
-            subpixels=bool(request.subpixels),
-            scene=self.scene.name,
-            transfer=request.transfer,
-            version=VERSION,
-            device=self.engine.gpu_name or "cpu",
-            traced_fraction=rays.primary / work,
-            pixel_shares=frame.shares,
-            rays={"primary": rays.primary, "shadow": rays.shadow, "secondary": rays.secondary},
-            seconds=_stage_seconds(self.watch, frame),
-            estimate=stated_error(estimate, self.choices),
-            options={**options, **self.choices, "plan": plan, "settings": self._settings()},
-            notes=(
-                *self.notes,
-                *notes,
-                *light_notes(request, estimate, samples, self.choices),
-                *_frame_notes(frame),
-                *self._warn_of_emptiness(frame, has_pixels),
-            ),
-        )
-
-    def _settings(self) -> list[str]:
-        """Every option that is not at its default, as it was decided."""
-        request, scene = self.request, self.scene
-        parts = (scene.light, request.placement, QualityOptions.part_of(request))
-        return [*scene.settings, *(line for part in parts if isinstance(part, Options) for line in settings_of(part))]
-
-    def _warn_of_emptiness(self, frame: Frame, has_pixels: bool) -> tuple[str, ...]:
-        if self.request.integrator not in LIGHT:
-            return ()
-        background = even_background(self.built, self.request)
-        scene = getattr(self.built, "mitsuba", None)
-        if background is None and scene is not None and scene.environment() is None:
-            background = (0.0, 0.0, 0.0)
-        if not has_pixels and background is not None and max(background) == 0.0:
-            return ()  # neither colours nor rays would tell emitters from the background: paths end at both
-        return warn_of_emptiness(visible_share(frame.pixels if has_pixels else None, background, frame.rays))
-
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks of the scene's reader and builder, one line each."""
@@ -445,23 +375,3 @@ def make_surface(built: BuiltScene, request: RenderRequest, frame_from_world: Ma
     from lippmann.rendering.transport.surface_property import SurfaceIntegrator
 
     return SurfaceIntegrator(built.mitsuba, request.integrator, frame_from_world)
-
-
-def _stage_seconds(watch: Stopwatch, frame: Frame) -> dict[str, float]:
-    """Seconds by stage, in the order of the work; ``write`` is added by the writer of the file."""
-    return {
-        "load": watch.seconds.get("load", 0.0),
-        "build": watch.seconds.get("build", 0.0),
-        "compile": frame.seconds_compile,
-        "trace": frame.seconds_trace,
-        "reuse": frame.seconds_reuse,
-        **{name: watch.seconds[name] for name in ("denoise", "layers") if name in watch.seconds},
-        "write": 0.0,
-        "total": watch.total,
-    }
-
-
-def _frame_notes(frame: Frame) -> tuple[str, ...]:
-    if not frame.rays.discarded:
-        return ()
-    return (f"{frame.rays.discarded} samples were not finite and count as black",)

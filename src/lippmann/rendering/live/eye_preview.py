@@ -15,6 +15,7 @@ from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.picture import placed_options
 from lippmann.rendering.preview import Preview
+from lippmann.rendering.provenance import provenance_of
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.request.tuning import TUNING
@@ -86,7 +87,8 @@ def render_eye_preview(
         picture = visible.arrange_denoised(clean)
         options = {"denoise": "oidn", "denoise_effort": effort}
     frame.pixels = picture
-    provenance = session.provenance(
+    provenance = provenance_of(
+        session,
         frame,
         samples=samples,
         options={"eye": list(eye), **options, **placed_options(resolved, placement)},

@@ -1,4 +1,4 @@
-"""Notes in a picture's metadata about its light: exposure, missing or clamped light, and doubts about the error."""
+"""How a picture was made, for its file: with notes on exposure, missing or clamped light, and doubts on the error."""
 
 from __future__ import annotations
 
@@ -8,16 +8,108 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann._version import VERSION
+from lippmann.image.picture import Provenance
+from lippmann.options.choices import LIGHT
+from lippmann.options.option import Options
+from lippmann.options.quality import QualityOptions
+from lippmann.options.texts import settings_of
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.request.tuning import TUNING
+from lippmann.rendering.session import Session, Stopwatch, even_background
 from lippmann.scene.values.description import Color
 
 if TYPE_CHECKING:
     from lippmann.rendering.estimate.psnr import Estimate
-    from lippmann.rendering.film.wavefront import RayTotals
+    from lippmann.rendering.film.wavefront import Frame, RayTotals
 
 #: Least share of pixels that show the scene; pictures below it carry a warning.
 LEAST_SHARE = 0.01
+
+
+def provenance_of(
+    session: Session,
+    frame: Frame,
+    *,
+    samples: int,
+    options: Mapping[str, object],
+    estimate: Estimate | None = None,
+    notes: tuple[str, ...] = (),
+    has_pixels: bool = True,
+) -> Provenance:
+    """How a picture of ``frame`` was made, for its file.
+
+    ``has_pixels`` says that the frame holds the picture, not its size alone.
+    """
+    request = session.request
+    height, width = frame.pixels.shape[:2]
+    rays, work = frame.rays, height * width * samples * request.channels
+    assert request.plan is not None  # of a resolved request
+    plan = request.plan.with_pilot(session.choices).lines()
+    return Provenance(
+        method=request.method,
+        integrator=request.integrator,
+        depth=request.surfaces,
+        spp=samples,
+        seed=request.seed,
+        subpixels=bool(request.subpixels),
+        scene=session.scene.name,
+        transfer=request.transfer,
+        version=VERSION,
+        device=session.engine.gpu_name or "cpu",
+        traced_fraction=rays.primary / work,
+        pixel_shares=frame.shares,
+        rays={"primary": rays.primary, "shadow": rays.shadow, "secondary": rays.secondary},
+        seconds=_stage_seconds(session.watch, frame),
+        estimate=stated_error(estimate, session.choices),
+        options={**options, **session.choices, "plan": plan, "settings": _settings(session)},
+        notes=(
+            *session.notes,
+            *notes,
+            *light_notes(request, estimate, samples, session.choices),
+            *_frame_notes(frame),
+            *_warn_of_emptiness(session, frame, has_pixels),
+        ),
+    )
+
+
+def _settings(session: Session) -> list[str]:
+    """Every option that is not at its default, as it was decided."""
+    request, scene = session.request, session.scene
+    parts = (scene.light, request.placement, QualityOptions.part_of(request))
+    return [*scene.settings, *(line for part in parts if isinstance(part, Options) for line in settings_of(part))]
+
+
+def _warn_of_emptiness(session: Session, frame: Frame, has_pixels: bool) -> tuple[str, ...]:
+    if session.request.integrator not in LIGHT:
+        return ()
+    background = even_background(session.built, session.request)
+    scene = getattr(session.built, "mitsuba", None)
+    if background is None and scene is not None and scene.environment() is None:
+        background = (0.0, 0.0, 0.0)
+    if not has_pixels and background is not None and max(background) == 0.0:
+        return ()  # neither colours nor rays would tell emitters from the background: paths end at both
+    return warn_of_emptiness(visible_share(frame.pixels if has_pixels else None, background, frame.rays))
+
+
+def _stage_seconds(watch: Stopwatch, frame: Frame) -> dict[str, float]:
+    """Seconds by stage, in the order of the work; ``write`` is added by the writer of the file."""
+    return {
+        "load": watch.seconds.get("load", 0.0),
+        "build": watch.seconds.get("build", 0.0),
+        "compile": frame.seconds_compile,
+        "trace": frame.seconds_trace,
+        "reuse": frame.seconds_reuse,
+        **{name: watch.seconds[name] for name in ("denoise", "layers") if name in watch.seconds},
+        "write": 0.0,
+        "total": watch.total,
+    }
+
+
+def _frame_notes(frame: Frame) -> tuple[str, ...]:
+    if not frame.rays.discarded:
+        return ()
+    return (f"{frame.rays.discarded} samples were not finite and count as black",)
 
 
 def stated_error(estimate: Estimate | None, choices: Mapping[str, object]) -> dict[str, object] | None:

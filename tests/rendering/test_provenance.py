@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from lippmann.rendering.estimate.psnr import Estimate
-from lippmann.rendering.light_statements import light_notes, stated_error
+from lippmann.rendering.provenance import light_notes, stated_error
 from lippmann.rendering.request.render_request import RenderRequest
 
 ESTIMATE = Estimate(40.0, 38.0, 43.0, 34.0, 30.0, 37.0, (3, 0))
