@@ -105,8 +105,8 @@ def test_surfaces_too_small_to_light_a_scene_do_not_count():
         lamp = Material(emission=(emission,) * 3)
         return Scene("s", SceneDescription("s", meshes, [Material(), lamp], [Instance(0, HERE), Instance(1, HERE)]))
 
-    # The diagonal of the whole is sqrt(5): 0.001 pi 5 is what has to be emitted.
-    least = np.sqrt(2 * 0.005 * np.pi / 4)
+    # The diagonal of the whole is sqrt(5): 0.02 pi 5 is what has to be emitted.
+    least = np.sqrt(2 * 0.1 * np.pi / 4)
     assert aircraft(4.0, least * 1.01).has_lights
     assert not aircraft(4.0, least * 0.99).has_lights
 

@@ -38,7 +38,7 @@ Bounds = NDArray[np.float64]
 STUDIO_NOTE = "no lights in the scene: lit by the built-in studio"
 
 #: Radiance of even surroundings; surfaces that light a scene less than these would are no light sources.
-_DIMMEST = 1e-3
+_DIMMEST = 0.02
 
 _FRAMING_FOV = np.radians(30.0)
 

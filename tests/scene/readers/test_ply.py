@@ -58,6 +58,23 @@ def test_equal_polygons_take_the_short_way(read, order):
     assert read(binary_file(order, faces)).meshes[0].faces.tolist() == [[0, 1, 2], [1, 4, 2]]
 
 
+def test_faces_without_finite_coordinates_are_left_out(read):
+    """Depth cameras save a grid of places, those without a measurement as NaN."""
+    scene = read(text_file().replace(b"2 0.5 0", b"nan nan nan"))
+    assert scene.meshes[0].faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert "1 faces without finite coordinates are left out" in scene.notes
+    assert np.isfinite(scene.meshes[0].positions).all()
+
+
+def test_a_normal_without_length_is_taken_from_the_triangles_about_it(read):
+    names = "".join(f"property float {name}\n" for name in ("nx", "ny", "nz"))
+    rows = "\n".join(f"{x} {y} {z} 0 {0 if x == 2 else 3} 0" for x, y, z in VERTICES)
+    (mesh,) = read((header("ascii", names, faces=1) + rows + "\n3 1 4 2\n").encode()).meshes
+    assert mesh.normals.tolist() == [[0, 1, 0]] * 4 + [[0, 0, 1]]
+    (flat,) = read((header("ascii", names, faces=1) + rows.replace(" 3 ", " 0 ") + "\n3 1 4 2\n").encode()).meshes
+    assert flat.normals is None
+
+
 def test_attributes_of_vertices(read, tmp_path):
     Pillow.new("RGB", (4, 2), (9, 8, 7)).save(tmp_path / "my skin.png")
     extra = "".join(f"property float {name}\n" for name in ("nx", "ny", "nz", "s", "t"))
@@ -266,7 +283,10 @@ def test_every_cut_short_file_is_refused(read, data):
         (text_file([(0, 1, 5)]), r"a face uses vertex 5; the file has 0 to 4"),
         (text_file([(0, 1, -1)]), r"a face uses vertex -1"),
         (text_file([(0, 1)]), r"holds no faces with three corners"),
-        (text_file().replace(b"2 0.5 0", b"2 nan 0"), r"vertex 4 is \[2\.0, nan, 0\.0\]; coordinates must be finite"),
+        (
+            text_file([(1, 4, 2)]).replace(b"2 0.5 0", b"2 nan 0"),
+            r"vertex 4 is \[2\.0, nan, 0\.0\]; coordinates must be finite",
+        ),
         (text_file().replace(b"2 0.5 0", b"2 x 0"), r"element 'vertex': could not convert"),
         (text_file().replace(b"2 0.5 0", b"2 0"), r"entry 4 of 'vertex' has too few numbers"),
         (binary_file()[:-1], r"ends after 1 of 2 entries of 'face'; is it cut short\?"),

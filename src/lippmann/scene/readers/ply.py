@@ -17,13 +17,23 @@ from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.far_origin import near_origin
 from lippmann.scene.parsing.files import MissingFileError, NamedFiles, read_bytes, read_image
+from lippmann.scene.parsing.normals import unit_normals
 from lippmann.scene.parsing.ply_body import Columns, Integers, Lists, Numbers, read_body
 from lippmann.scene.parsing.ply_header import Element, read_header
 from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.parsing.vertex_colors import full_brightness
 from lippmann.scene.point_clouds import describe_cloud
 from lippmann.scene.readers.splats.ply import holds_splats, read_splat_ply
-from lippmann.scene.values.description import AlphaMode, Instance, Material, Mesh, SceneDescription, Texture
+from lippmann.scene.values.description import (
+    AlphaMode,
+    FloatArray,
+    IndexArray,
+    Instance,
+    Material,
+    Mesh,
+    SceneDescription,
+    Texture,
+)
 
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _COLOR_NAMES = (
@@ -189,7 +199,17 @@ def _mesh(
     if corners.min() < 0 or corners.max() >= len(positions):
         bad = corners.min() if corners.min() < 0 else corners.max()
         raise SceneError(f"a face uses vertex {bad}", where=where, rule=f"the file has 0 to {len(positions) - 1}")
-    _check_finite(positions, where)
+    finite = _is_finite(positions)
+    if not finite.all():  # places that a depth camera did not measure
+        whole = np.ones(np.count_nonzero(keep), bool)
+        whole[np.repeat(np.arange(len(whole)), outline.sizes[keep])[~finite[corners]]] = False
+        if not whole.any():
+            _check_finite(positions, where)
+        if not whole.all():
+            notes.append(f"{np.count_nonzero(~whole)} faces without finite coordinates are left out")
+        corners = corners[np.repeat(whole, outline.sizes[keep])]
+        keep[keep] = whole
+        positions = np.where(finite[:, None], positions, positions[np.argmax(finite)])
     positions = near_origin(positions, notes)
     places, owners = triangulate(positions, corners, outline.sizes[keep])
     faces = corners[places]
@@ -208,12 +228,13 @@ def _mesh(
         if face_colors is not None and colors is None:
             colors = np.repeat(face_colors[keep][owners], 3, axis=0)
         faces = np.arange(len(flat)).reshape(-1, 3)
+    points, triangles = positions.astype(np.float32), faces.astype(np.uint32)
     mesh = Mesh(
         name=name,
-        positions=positions.astype(np.float32),
-        faces=faces.astype(np.uint32),
+        positions=points,
+        faces=triangles,
         material=0,
-        normals=_unit(normals),
+        normals=_unit(normals, points, triangles),
         uvs=() if uvs is None else ((uvs * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32),),  # v runs upwards in PLY
         colors=colors,
     )
@@ -258,11 +279,8 @@ def _color_names(element: Element) -> list[str]:
     return [name for name in known if name in scalars]
 
 
-def _unit(normals: Numbers | None) -> NDArray[np.float32] | None:
-    """Unit normals; None if one of them has no length, for then the facets are flat."""
-    if normals is None:
+def _unit(normals: Numbers | None, positions: FloatArray, faces: IndexArray) -> FloatArray | None:
+    """Unit normals; None if none of them has a length, for then the facets are flat."""
+    if normals is None or not (np.nan_to_num(normals) != 0.0).any():
         return None
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    if not np.isfinite(length).all() or (length <= 0.0).any():
-        return None
-    return np.asarray(normals / length, np.float32)
+    return unit_normals(normals.astype(np.float32), positions, faces)[0]

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from lippmann.errors import SceneError
+from lippmann.scene.readers.gltf.accessors import JOINTS, Accessors
+from lippmann.scene.readers.gltf.buffers import Buffers
+from lippmann.scene.readers.gltf.document import open_document
 
 
 def _refusal(read, writer):
@@ -175,3 +178,14 @@ def test_an_accessor_is_decoded_once(writer, read):
     assert one.positions is other.positions is backward.positions
     assert one.faces is other.faces
     np.testing.assert_array_equal(backward.faces, [[2, 1, 0]])
+
+
+def test_joints_that_an_encoder_of_draco_quantised_as_floats_are_whole(tmp_path, writer):
+    index = writer.accessor([[0, 0, 0, 0]], "u2")
+    document = open_document(writer.gltf_and_bin(tmp_path), files=None)
+    accessors = Accessors(document, Buffers(document))
+    joints = accessors.with_decoded({index: np.array([[0, 1.0022, 13.0022, 17.9999]], np.float32)})
+    assert joints.integers(index, JOINTS).tolist() == [[0, 1, 13, 18]]
+    for bad in ([[np.nan, 0, 0, 0]], [[-1.0, 0, 0, 0]], [[7e4, 0, 0, 0]]):
+        with pytest.raises(SceneError, match="what was decoded for it"):
+            accessors.with_decoded({index: np.array(bad, np.float32)}).integers(index, JOINTS)

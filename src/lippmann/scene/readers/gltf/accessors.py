@@ -102,7 +102,8 @@ class Accessors:
 
     def count(self, index: int) -> int:
         """The number of elements."""
-        return self.document.all("accessors")[index].integer("count")
+        decoded = self.decoded.get(index)
+        return len(decoded) if decoded is not None else self.document.all("accessors")[index].integer("count")
 
     def floats(self, index: int, storage: Storage) -> FloatArray:
         """Elements as float32 ``(count, width)``; normalised integers become [0, 1] or [-1, 1].
@@ -134,9 +135,14 @@ class Accessors:
         if elements is None:
             return self._elements(fields)
         width, dtype = _WIDTHS[str(fields.text("type"))], _DTYPES[fields.integer("componentType")]
-        if elements.shape[1] != width or (elements.dtype.kind == "f") != (dtype.kind == "f"):
+        if dtype.kind != "f" and elements.dtype.kind == "f":  # old encoders saved joints as floats, and quantised them
+            elements = np.rint(elements)
+        with np.errstate(invalid="ignore"):
+            converted: NDArray[np.generic] = elements.astype(dtype)
+        fits = elements.dtype.kind == "f" if dtype.kind == "f" else bool((converted == elements).all())
+        if elements.shape[1] != width or not fits:
             raise fields.error("type", f"what was decoded for it is {elements.shape[1]} x {elements.dtype}")
-        return elements.astype(dtype)
+        return converted
 
     def _check(self, fields: Fields, storage: Storage) -> bool:
         """Whether the (allowed) storage of an accessor is normalised."""

@@ -38,10 +38,13 @@ class DracoMeshes:
     def decode(self, primitive: Fields) -> Mapping[int, NDArray[np.generic]]:
         """The elements ``(count, width)`` of a compressed primitive's accessors, by their index.
 
+        There may be other counts than the accessors say, as encoders of before 2019 wrote them: the extension lets
+        what was decompressed be rendered as it is.
+
         Raises
         ------
         SceneError
-            The data is damaged, or does not hold what the accessors say.
+            The data is damaged, or lacks an attribute.
         """
         draco = primitive.extension(DRACO)
         assert draco is not None
@@ -55,7 +58,6 @@ class DracoMeshes:
         index = self.document.reference(primitive, "indices", "accessors")
         if index is not None:
             elements[index] = self._decoded[f"{view}/faces"].reshape(-1, 1)
-            self._check_count(primitive, index, len(elements[index]))
         attributes, numbers = primitive.child("attributes"), draco.child("attributes")
         if attributes is None or numbers is None:
             raise self._error(primitive, "names no attributes")
@@ -65,13 +67,7 @@ class DracoMeshes:
             if accessor is None or values is None:
                 raise self._error(primitive, f"has no attribute {name}")
             elements[accessor] = values
-            self._check_count(primitive, accessor, len(values))
         return elements
-
-    def _check_count(self, primitive: Fields, accessor: int, decoded: int) -> None:
-        count = self.document.all("accessors")[accessor].integer("count")
-        if decoded != count:
-            raise self._error(primitive, f"holds {decoded} elements for accessor {accessor}, which has {count}")
 
     def _decode_all(self) -> dict[str, NDArray[np.generic]]:
         views = {

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lippmann.scene.parsing.normals import unit_normals
 from lippmann.scene.readers.gltf import accessors as storage
 from lippmann.scene.readers.gltf.accessors import Accessors, Storage
 from lippmann.scene.readers.gltf.document import DRACO, Document
 from lippmann.scene.readers.gltf.json_fields import Fields
-from lippmann.scene.readers.gltf.skinning import Skin, deform, unit_normals
+from lippmann.scene.readers.gltf.skinning import Skin, deform
 from lippmann.scene.values.description import FloatArray, IndexArray
 
 _POINTS, _LINES, _LINE_LOOP, _LINE_STRIP, _TRIANGLES, _TRIANGLE_STRIP, _TRIANGLE_FAN = range(7)

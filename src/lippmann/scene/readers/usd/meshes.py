@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
 from lippmann.runtime.machine import check_input
+from lippmann.scene.parsing.normals import unit_normals
 from lippmann.scene.parsing.points_lines import MOST, as_mesh
 from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.point_clouds import draw_thin
 from lippmann.scene.readers.gltf.nodes import normal_matrices
-from lippmann.scene.readers.gltf.skinning import unit_normals
 from lippmann.scene.readers.usd.curves import Curves, Points
 from lippmann.scene.readers.usd.materials import Surface
 from lippmann.scene.readers.usd.primitives import primitive_polygons, unit_ball
