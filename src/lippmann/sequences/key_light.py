@@ -29,7 +29,7 @@ from lippmann.scene.matrices import inverse, rotation_of, transform_points
 
 if TYPE_CHECKING:
     from lippmann.display import Display
-    from lippmann.rendering.methods import Job, Traced
+    from lippmann.rendering.job import Job, Traced
     from lippmann.rendering.transport.path import PreparedLight
 
 Floats = NDArray[np.float32]
@@ -254,7 +254,8 @@ def _places_under(display: Display, point: tuple[Reals, Reals, Reals], i: Reals,
 def _trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
     """The picture with ``pixels`` where their light ``is_known``; the others are traced and denoised among them."""
     from lippmann.rendering.film.wavefront import STRIP_ROWS, Coverage
-    from lippmann.rendering.methods import SAMPLES_LAYER, Job, denoise_whole, one_stream
+    from lippmann.rendering.job import Job, one_stream
+    from lippmann.rendering.methods import SAMPLES_LAYER, denoise_whole
     from lippmann.rendering.transport.ray_source import SinglePixelRays
 
     rows, columns = np.nonzero(~is_known)
