@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from lippmann.calibration.panel_photograph import draw_photograph_pattern
 from lippmann.color.transfer import quantize
 from lippmann.display import Display, LensArray, Panel
 from lippmann.image import IntegralImage
@@ -86,6 +87,27 @@ def test_the_pattern_reaches_the_screen_pixel_by_pixel(open_tab, address, tmp_pa
     np.testing.assert_array_equal(screen(tab, tmp_path), pattern())
     tab.page.keyboard.press("h")
     assert tab.page.get_by_role("button", name="Test pattern").is_visible()
+    tab.assert_clean()
+
+
+@pytest.mark.slow
+def test_a_photograph_of_the_pattern_is_answered(open_tab, address, tmp_path):
+    """The photograph is the screen's own: without lenses no view is seen alone."""
+    tab = opened(open_tab, address)
+    check = tab.page.get_by_role("button", name="Check by photograph")
+    check.click()
+    tab.wait_for("document.querySelector('.state').textContent.includes('500 mm away')")
+    tab.page.keyboard.press("h")
+    np.testing.assert_array_equal(screen(tab, tmp_path), draw_photograph_pattern(DISPLAY))
+    tab.page.keyboard.press("h")
+    tab.page.get_by_label("Photograph of the panel").set_input_files(tmp_path / "screen.png")
+    tab.wait_for("document.querySelector('.state').textContent.includes('the pixels without lenses')")
+    tab.page.get_by_label("Photograph of the panel").set_input_files(
+        {"name": "a.jpg", "mimeType": "image/jpeg", "buffer": b"no picture"}
+    )
+    tab.wait_for("document.querySelector('.state').textContent.startsWith('The photograph cannot be read')")
+    check.click()
+    assert tab.page.get_by_label("Photograph of the panel").is_hidden()
     tab.assert_clean()
 
 

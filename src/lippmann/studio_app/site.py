@@ -6,6 +6,8 @@
     GET  /assets/NAME, /viewer/NAME             scripts, style sheets, the icon
     GET  /pictures/N/...                        manifest and tiles of the picture that the Nth render made
     GET  /results/N/NAME                        the file that it made
+    GET  /check.png                             a pattern to photograph, for the display of the page's state
+    POST /check                                 what a photograph of it tells, see panel_check.py
     POST /files/NAME, /files                    a model or an environment dropped onto the page, or several files
     WS   /live, /live-panel                     frames and messages, see live_socket.py
 
@@ -27,6 +29,7 @@ from lippmann.display.formats.bridge import corner_of_screen
 from lippmann.errors import LippmannError, PictureError
 from lippmann.studio_app.live_socket import LiveSocket
 from lippmann.studio_app.pages import static_files
+from lippmann.studio_app.panel_check import camera_distance, check_response, pattern_response
 from lippmann.studio_app.session import StudioSession
 from lippmann.studio_app.uploads import Dropped
 from lippmann.studio_app.wire import Coding
@@ -35,6 +38,7 @@ from lippmann.viewer.responses import RefusedError, Request, json_response, not_
 from lippmann.viewer.responses import Response as PlainResponse
 from lippmann.viewer.served_picture import PictureFile
 from lippmann.viewer.server import ViewerSite
+from lippmann.viewer.site_application import json_body
 
 #: Pages at a time; each has a socket.
 MOST_PAGES = 8
@@ -58,6 +62,8 @@ class StudioSite:
         self._pages = 0
         routes: list[BaseRoute] = [
             _Route("/panel.json", self._panel),
+            _Route("/check.png", self._pattern),
+            _Route("/check", self._check, methods=["POST"]),
             _Route("/pictures/{number:int}/{rest:path}", self._picture),
             _Route("/results/{number:int}/{name}", self._result),
             _Route("/files/{name}", self._file, methods=["POST"]),
@@ -91,7 +97,16 @@ class StudioSite:
         panel = display.panel
         size = {"width": panel.width, "height": panel.height, "name": display.title or display.name}
         corner = corner_of_screen(self._session.panels, panel.width, panel.height)
-        return _as_response(json_response({**size, "live": "live-panel", "corner": corner}))
+        facts = {**size, "live": "live-panel", "corner": corner, "camera": camera_distance(display)}
+        return _as_response(json_response(facts))
+
+    async def _pattern(self, request: ServerRequest) -> Response:
+        display = self._session.display(self._session.state)
+        return _as_response(await anyio.to_thread.run_sync(pattern_response, display))
+
+    async def _check(self, request: ServerRequest) -> Response:
+        display, body = self._session.display(self._session.state), await json_body(request)
+        return _as_response(await anyio.to_thread.run_sync(check_response, display, body))
 
     async def _picture(self, request: ServerRequest) -> Response:
         number, rest = request.path_params["number"], request.path_params["rest"]

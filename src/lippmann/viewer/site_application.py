@@ -13,8 +13,8 @@ from starlette.requests import Request as ServerRequest
 from lippmann.viewer.request_guard import Application, Receive, Scope, Send, send_response
 from lippmann.viewer.responses import RefusedError, Request, Response, Site, not_found
 
-#: Limit on the body of a request in bytes; pages send a few numbers.
-_MAX_BODY = 1 << 16
+#: Limit on the body of a request in bytes; pages send a few numbers, or a small photograph.
+_MAX_BODY = 1 << 20
 #: Limit on the digits of a Content-Length, so that absurd numbers are never parsed.
 _MAX_LENGTH_DIGITS = 12
 

@@ -10,6 +10,9 @@ import { drawPattern } from "studio/pattern.js";
 import { complaint } from "studio/native_check.js";
 import { askScreens, placeInWords, screenOf } from "studio/screens.js";
 
+/** Longest side of a photograph that is sent, in pixels. */
+const LONGEST = 1200;
+
 const asked = new URLSearchParams(location.search);
 const main = document.querySelector("main");
 const canvas = h("canvas", { "aria-label": "Native pixels of the display", role: "img" });
@@ -17,14 +20,25 @@ const alertLine = h("p", { role: "alert", class: "complaint", hidden: true });
 const state = h("output", { class: "state" });
 const full = h("button", { type: "button", class: "primary", onclick: () => goFull() }, "Full screen");
 const pattern = h("button", { type: "button", "aria-pressed": "false", onclick: () => togglePattern() }, "Test pattern");
+const check = h("button", { type: "button", "aria-pressed": "false", onclick: () => toggleCheck() }, "Check by photograph");
+const photograph = h("input", {
+  type: "file",
+  accept: "image/*",
+  capture: "environment",
+  "aria-label": "Photograph of the panel",
+  hidden: true,
+  onchange: () => sendPhotograph(),
+});
 const hide = h("button", { type: "button", onclick: () => setBar(false) }, "Hide this bar");
 const hint = h("p", { class: "hint" }, "Put this window on the display, then go full screen. Keys: F, P, H.");
-const bar = h("div", { class: "bar" }, full, pattern, hide, state, hint, alertLine);
+const bar = h("div", { class: "bar" }, full, pattern, check, hide, photograph, state, hint, alertLine);
 main.append(canvas, bar);
 
 let panel = null;
 let picture = null;
-let showsPattern = false;
+/** What is shown in place of the picture: "pattern", "check", or nothing. */
+let instead = null;
+let checkPattern = null;
 let box = null;
 
 async function start() {
@@ -33,6 +47,7 @@ async function start() {
   document.title = `${panel.name} - Lippmann`;
   canvas.width = panel.width;
   canvas.height = panel.height;
+  check.hidden = panel.camera === null;
   fit();
   const observer = new ResizeObserver(([entry]) => {
     box = entry.devicePixelContentBoxSize?.[0] ?? null;
@@ -73,7 +88,8 @@ function fit() {
 
 function draw() {
   const context = canvas.getContext("2d", { alpha: false });
-  if (showsPattern) drawPattern(context, panel);
+  if (instead === "pattern") drawPattern(context, panel);
+  else if (instead === "check") context.drawImage(checkPattern, 0, 0);
   else if (picture !== null) context.drawImage(picture, 0, 0);
   document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
 }
@@ -89,7 +105,7 @@ function follow(path) {
     onFrame: async (header, frame) => {
       if (header.width !== panel.width || header.height !== panel.height) return location.reload();
       picture = frame instanceof ImageData ? await createImageBitmap(frame) : frame;
-      state.textContent = `${header.samples} sample${header.samples === 1 ? "" : "s"} per pixel`;
+      if (instead !== "check") state.textContent = `${header.samples} sample${header.samples === 1 ? "" : "s"} per pixel`;
       return draw();
     },
   });
@@ -147,9 +163,47 @@ async function goFull() {
 }
 
 function togglePattern() {
-  showsPattern = !showsPattern;
-  pattern.setAttribute("aria-pressed", String(showsPattern));
+  show(instead === "pattern" ? null : "pattern");
+}
+
+function show(what) {
+  instead = what;
+  pattern.setAttribute("aria-pressed", String(what === "pattern"));
+  check.setAttribute("aria-pressed", String(what === "check"));
+  photograph.hidden = what !== "check";
   draw();
+}
+
+async function toggleCheck() {
+  if (instead === "check") return show(null);
+  const response = await fetch("check.png");
+  const options = { colorSpaceConversion: "none", premultiplyAlpha: "none" };
+  checkPattern = await createImageBitmap(await response.blob(), options);
+  state.textContent = `Hide this bar, photograph the whole panel in the dark from straight before it, ${Math.round(panel.camera)} mm away, and open the photograph here.`;
+  return show("check");
+}
+
+/** Sends a photograph, small and upright as the browser shows it, and shows the answer. */
+async function sendPhotograph() {
+  const [file] = photograph.files;
+  if (file === undefined) return;
+  try {
+    const whole = await createImageBitmap(file);
+    const scale = Math.min(1, LONGEST / Math.max(whole.width, whole.height));
+    const small = new OffscreenCanvas(Math.round(whole.width * scale), Math.round(whole.height * scale));
+    const context = small.getContext("2d", { alpha: false });
+    context.imageSmoothingQuality = "high";
+    context.drawImage(whole, 0, 0, small.width, small.height);
+    const bytes = new Uint8Array(await (await small.convertToBlob({ type: "image/jpeg", quality: 0.9 })).arrayBuffer());
+    const text = btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
+    const headers = { "Content-Type": "application/json" };
+    const response = await fetch("check", { method: "POST", headers, body: JSON.stringify({ photograph: text }) });
+    const { line, error } = await response.json();
+    state.textContent = line ?? error;
+  } catch ({ message }) {
+    state.textContent = `The photograph cannot be read: ${message}`;
+  }
+  photograph.value = "";
 }
 
 function setBar(isShown) {
