@@ -1,4 +1,4 @@
-"""Options that are several numbers."""
+"""Options that are several numbers, and settings as files hold them."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,7 @@ import pytest
 from lippmann import LightOptions, PlacementOptions
 from lippmann.errors import UsageError
 from lippmann.options.scene import SceneOptions
+from lippmann.options.texts import settings_of
 
 
 @pytest.mark.parametrize("given", [[0, 0.5, 1], np.array([0.0, 0.5, 1.0], np.float32), (0.0, 0.5, 1.0)])
@@ -29,3 +30,8 @@ def test_lists_and_arrays_become_pythons_own_numbers(given):
 def test_wrong_ones_are_refused(kind, name, value, rule):
     with pytest.raises(UsageError, match=f"{name}: .*{rule}"):
         kind(**{name: value})
+
+
+def test_settings_tell_no_folders_and_no_defaults():
+    asked = SceneOptions(depth_map="some/where/depth.png", unit_scale=2.0, series=None)
+    assert settings_of(asked) == ['depth_map = "depth.png"', "unit_scale = 2.0"]

@@ -240,3 +240,14 @@ def test_wavefronts_of_any_size_share_a_kernel(engine):
         found.add(16)
     assert len(kernels) == 4
     assert len(set(kernels)) == 1
+
+
+def test_batches_leave_room_for_what_else_a_pixel_takes():
+    from lippmann.display.panel import PixelWindow
+    from lippmann.rendering.film import memory_model
+    from lippmann.rendering.film.sample_batches import _sizes
+
+    most, further = memory_model.MOST_BATCHES, memory_model.FOR_DENOISER
+    enough = SIZE * SIZE * (memory_model.batches(most) + further) + SIZE * memory_model.BYTES_PER_LANE
+    window = PixelWindow(0, 0, SIZE, SIZE)
+    assert [_sizes(window, 1, memory, further)[0] for memory in (enough, enough - 1)] == [most, most // 2]
