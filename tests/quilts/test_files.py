@@ -108,7 +108,7 @@ def test_other_formats_are_named(tmp_path):
     with pytest.raises(PictureError, match="views: not found"):
         read_quilt(tmp_path / "views")
     with pytest.raises(PictureError, match="is a film; pictures are read; take a quilt out of it"):
-        read_quilt(tmp_path / "x_qs4x2a2.mp4")
+        read_quilt(tmp_path / "x_qs4x2a2.m4v")
 
 
 @pytest.mark.parametrize("ending", ["bmp", "ppm", "gif", "tga"])

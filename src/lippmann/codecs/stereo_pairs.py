@@ -17,14 +17,13 @@ import numpy as np
 from lippmann.codecs import orientation as orientations
 from lippmann.codecs.photograph import Photograph, open_photograph
 from lippmann.codecs.pillow_formats import codes_of, open_picture
-from lippmann.codecs.types import Pixels
+from lippmann.codecs.types import FILMS, Pixels
 from lippmann.errors import PictureError
 
-#: Endings of the files that hold pairs, and of films.
+#: Endings of the files that hold pairs; films (:data:`lippmann.codecs.types.FILMS`) may, too.
 PAIRS = (".jps", ".mpo")
 #: Endings of HEIF pictures, whose pairs :mod:`lippmann.scene.readers.heif` reads.
 HEIF = (".heic", ".heif", ".hif")
-_FILMS = (".mov", ".mp4", ".m4v")
 
 _APP3, _JPS = b"\xff\xe3", b"_JPSJPS_"
 #: Of the JPS descriptor: a stereo picture, its layouts, and flags.
@@ -82,7 +81,7 @@ def read_pair(path: Path) -> tuple[Photograph, Photograph] | None:
         return _read_jps(path)
     if suffix == ".mpo":
         return _read_mpo(path)
-    if suffix in _FILMS:
+    if suffix in FILMS:
         from lippmann.codecs.spatial_film import read_first_pair
 
         return read_first_pair(path)

@@ -8,6 +8,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+#: Endings of films that others made.
+FILMS = (".mp4", ".m4v", ".mov", ".webm")
 #: Pixels or a map, of whatever stored type.
 Pixels: TypeAlias = NDArray[Any]
 #: A stored type.

@@ -16,6 +16,7 @@ import numpy as np
 
 from lippmann.codecs.photograph import open_photograph
 from lippmann.codecs.picture_notes import FileNotes
+from lippmann.codecs.types import FILMS
 from lippmann.errors import OutputError, PictureError
 from lippmann.image.encoding import FORMATS, STORED, FormatName, converted_values, encode_values
 from lippmann.image.part_folders import MANIFEST
@@ -266,7 +267,7 @@ def _first_missing(numbers: Iterable[int], first: int) -> int | None:
 
 
 def _check_ending(path: Path) -> None:
-    if path.suffix.lower() in (".mp4", ".mov", ".webm"):
+    if path.suffix.lower() in FILMS:
         fix = "take a quilt out of it: ffmpeg -i in.mp4 -frames:v 1 out_qs8x6a0.75.png"
         raise PictureError("is a film", where=str(path), rule="pictures are read", fix=fix)
     if not path.suffix and not path.exists():

@@ -86,6 +86,7 @@ def test_up_of_what_says_it_itself_is_refused():
         ("cage.mol2", r"obabel in\.mol2 -O out\.pdb"),
         ("ring.3dm", "Rhino"),
         ("turn.mp4", "ffmpeg"),
+        ("turn.m4v", "ffmpeg"),
     ],
 )
 def test_files_of_other_programs_are_told_how_to_become_gltf(save, name, said):

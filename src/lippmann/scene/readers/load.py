@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lippmann.codecs.types import FILMS
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.light import LightOptions
 from lippmann.options.option import takes
@@ -91,7 +92,7 @@ _ELSEWHERE = {
     **{kind: _OPEN_BABEL.format(kind) for kind in (".sdf", ".mol", ".mol2", ".cube", ".gro")},
     **dict.fromkeys((".bcif", ".mmtf"), "take the entry's .cif file from the data bank"),
     **dict.fromkeys((".tif", ".tiff", ".bmp", ".avif"), "save photographs with depth as .png or .jpg"),
-    **dict.fromkeys((".mp4", ".mov", ".webm"), "take its pictures out: ffmpeg -i in.mp4 frames/%04d.png"),
+    **dict.fromkeys(FILMS, "take its pictures out: ffmpeg -i in.mp4 frames/%04d.png"),
 }
 
 #: First bytes, in small letters, of files that hold no scene, and what to do about each.
