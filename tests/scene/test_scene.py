@@ -8,7 +8,15 @@ import pytest
 from lippmann.errors import SceneError
 from lippmann.scene import extent
 from lippmann.scene.extent import bounds_of, box_corners, thin_axis
-from lippmann.scene.scene import STUDIO_NOTE, Scene, check_description, find_camera, framing_camera, override_light
+from lippmann.scene.scene import (
+    MIRROR_NOTE,
+    STUDIO_NOTE,
+    Scene,
+    check_description,
+    find_camera,
+    framing_camera,
+    override_light,
+)
 from lippmann.scene.studio_light import BACKDROP, studio
 from lippmann.scene.values.description import Camera, Environment, Instance, Light, Material, Mesh, SceneDescription
 
@@ -88,6 +96,18 @@ def test_a_scene_with_light_keeps_its_own(description):
     assert scene.environment is description.environment
     assert scene.background is None
     assert scene.notes == ()
+
+
+def test_a_note_names_the_studio_where_mirrors_show_black():
+    bulb = [Light("point", (1, 1, 1), np.eye(4))]
+
+    def notes(environment=None, **surface):
+        lit = describe(material=Material(**surface), lights=bulb, environment=environment)
+        return Scene("s", dataclasses.replace(lit, physical_lights=True)).notes
+
+    assert notes(metallic=1.0, roughness=0.1) == notes(transmission=1.0, roughness=0.0) == (MIRROR_NOTE,)
+    assert notes(metallic=1.0, roughness=0.9) == notes(metallic=0.0, roughness=0.1) == ()
+    assert notes(studio(), metallic=1.0, roughness=0.1) == ()
 
 
 def test_light_that_does_not_count():

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 Bounds = NDArray[np.float64]
 
 STUDIO_NOTE = "no lights in the scene: lit by the built-in studio"
+MIRROR_NOTE = 'the lights have no surroundings, so that metal and glass mirror black: environment="studio" adds some'
 
 #: Radiance of even surroundings; surfaces that light a scene less than these would are no light sources.
 _DIMMEST = 0.02
@@ -282,7 +283,21 @@ class Scene:
     def notes(self) -> tuple[str, ...]:
         """Features that the reader ignored, and its assumptions, one line each."""
         notes = tuple(self.physical.notes) if isinstance(self.physical, SceneDescription) else ()
-        return (*notes, STUDIO_NOTE) if self.in_studio else notes
+        if self.in_studio:
+            return (*notes, STUDIO_NOTE)
+        return (*notes, MIRROR_NOTE) if self._mirrors_black() else notes
+
+    def _mirrors_black(self) -> bool:
+        """Whether there are smooth metals or glass that only the point, spot or directional lights of a file light."""
+        if not self.has_physical_lights or not self.lights or self.environment is not None:
+            return False
+        assert isinstance(self.physical, SceneDescription)
+        materials = (self.physical.materials[self.physical.meshes[mesh].material] for mesh in self.physical.placements)
+        return any(
+            each.roughness < 0.5 and max(each.metallic, each.transmission) > 0.5
+            for each in materials
+            if each.metallic_roughness_texture is None
+        )
 
     def camera(self, name: str | None = None) -> Camera:
         """A camera by name; without one the first, or for a scene without cameras one that frames it from +z.
