@@ -173,14 +173,17 @@ def test_absent_buffer_is_named(writer, tmp_path):
 def test_absent_textures_are_named_and_left_out(writer, read):
     image = writer.add("images", uri="wood.png")
     texture = writer.add("textures", source=image)
+    lost = {"index": texture}
+    metal = {"metallicRoughnessTexture": lost}
     writer.add(
-        "materials", normalTexture={"index": texture}, emissiveTexture={"index": texture}, emissiveFactor=[1, 1, 1]
+        "materials", normalTexture=lost, emissiveTexture=lost, emissiveFactor=[1, 1, 1], pbrMetallicRoughness=metal
     )
     writer.triangle(material=0)
     scene = read(writer)
     assert list(scene.notes) == ["texture 'wood.png' not found: shown without it (textures[0])"]
     assert scene.materials[0].normal_texture is scene.materials[0].emission_texture is None
     assert scene.materials[0].emission == (0.0, 0.0, 0.0)
+    assert scene.materials[0].metallic == 0.0
 
 
 @pytest.mark.parametrize(

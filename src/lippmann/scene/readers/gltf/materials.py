@@ -120,13 +120,17 @@ class Materials:
     def _base(self, fields: Fields) -> _Base:
         base = fields.child("pbrMetallicRoughness") or Fields({}, fields.place, fields.file)
         red, green, blue, alpha = self._fractions(base, "baseColorFactor", (1.0, 1.0, 1.0, 1.0))
+        texture = self.textures.read(base, "metallicRoughnessTexture")
+        is_lost = texture is None and base.has(
+            "metallicRoughnessTexture"
+        )  # the factor alone would make all of it metal
         return {
             "base_color": (red, green, blue),
             "base_color_texture": self.textures.read(base, "baseColorTexture", srgb=True),
             "alpha": alpha,
-            "metallic": self._fraction(base, "metallicFactor", 1.0),
+            "metallic": 0.0 if is_lost else self._fraction(base, "metallicFactor", 1.0),
             "roughness": self._fraction(base, "roughnessFactor", 1.0),
-            "metallic_roughness_texture": self.textures.read(base, "metallicRoughnessTexture"),
+            "metallic_roughness_texture": texture,
         }
 
     def _as_specular_glossiness(self, material: Material, fields: Fields) -> Material:
