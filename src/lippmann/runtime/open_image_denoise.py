@@ -59,14 +59,12 @@ def load() -> ctypes.CDLL:
 
     Raises
     ------
-    ModuleNotFoundError
-        The package is not installed.
     OSError
-        Its library does not load.
+        The package is not installed, or its library does not load.
     """
     package = importlib.util.find_spec("pyoidn")
     if package is None or package.origin is None:
-        raise ModuleNotFoundError("pyoidn is not installed")
+        raise OSError("pyoidn is not installed")
     folder = Path(package.origin).parent / "oidn" / ("bin" if sys.platform == "win32" else "lib")
     if sys.platform == "win32":
         ctypes.CDLL(str(folder / "OpenImageDenoise_device_cpu.dll"))  # the library finds it where it is loaded already

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
-
 import numpy as np
 import pytest
 
-from lippmann.errors import UsageError
 from lippmann.rendering.denoise import oidn
-from lippmann.rendering.denoise.oidn import denoise, load_denoiser
+from lippmann.rendering.denoise.oidn import denoise
 from lippmann.runtime import open_image_denoise
 
 
@@ -70,10 +67,3 @@ def test_a_gpu_that_runs_out_of_memory_is_left_too(gpu, monkeypatch):
     assert np.array_equal(denoise(color, threads=1), expected)
     assert not released
     assert set(oidn._devices) == {None, 1}
-
-
-def test_a_missing_package_is_told_with_the_line_that_installs_it(monkeypatch):
-    monkeypatch.setattr(open_image_denoise, "load", open_image_denoise.load.__wrapped__)
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(UsageError, match="Open Image Denoise is not installed; install it: pip install"):
-        load_denoiser()

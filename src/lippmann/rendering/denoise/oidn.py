@@ -127,12 +127,12 @@ def load_denoiser() -> None:
     EngineError
         It does not load.
     """
-    try:
-        library.load()
-    except ModuleNotFoundError:
+    if not machine.has_denoiser():
         raise UsageError(
             "Open Image Denoise is not installed", parameter="denoise", fix='install it: pip install "pyoidn>=2.5"'
-        ) from None
+        )
+    try:
+        library.load()
     except OSError as error:
         raise _failure(str(error)) from error
 
