@@ -162,6 +162,12 @@ def test_a_sweep_is_an_animation(lippmann, picture, tmp_path, ending):
         assert out.read_bytes()[4:8] == b"ftyp"
 
 
+def test_a_sweep_says_how_far_it_is(lippmann, picture, tmp_path, monkeypatch):
+    monkeypatch.setattr("lippmann.progress_bar.PLAIN_INTERVAL", 0.0)
+    done = lippmann("replay", picture, "--sweep", "--frames", 3, "--size", "32x32", "-o", tmp_path / "sweep.png")
+    assert done.err.count(": drawing") == 3
+
+
 @pytest.mark.slow
 def test_preview_renders_the_plain_picture(lippmann, tmp_path, engine):
     done = lippmann("preview", "teapot", "--plain", "--spp", 1, "--pixels", "40x30", "-o", tmp_path / "p.png", "--json")

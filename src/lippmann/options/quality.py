@@ -68,7 +68,7 @@ class QualityOptions(Options):
     tone_map: ToneMap = _light(
         "auto",
         "pbr-neutral: highlights are compressed, not clipped; none: light as it is. auto: pbr-neutral for physically "
-        "based light without `background`, none in files for data (EXR, TIFF, Zarr).",
+        "based light without `background`, none in files of linear light (EXR, 32 bits).",
     )
     effort: Effort = _quality(
         "normal",

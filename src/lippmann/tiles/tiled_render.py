@@ -123,7 +123,7 @@ def render_to_file(
     name, stored = check_output(output, bits)
     finish.check_stored(stored, output)
     finish.check_colors(request.transfer)
-    request = request.for_file(output)
+    request = request.for_file(output, bits)
     printed = finish.display(display)
     if name == "zarr":
         zarr_array.load_zarr(output)

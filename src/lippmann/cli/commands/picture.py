@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -17,6 +17,7 @@ from lippmann.cli.shared.outputs import output_of
 from lippmann.errors import UsageError
 from lippmann.options.outputs import SequenceOptions
 from lippmann.options.texts import triple
+from lippmann.progress import Progress
 from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
@@ -260,7 +261,14 @@ def replay(
         reach = _field_width(target, position[2]) if width is None else width
         start, stop = ((position[0] + side * reach / 2, *position[1:]) for side in (-1, 1))
         places = path_of_eye(start, stop, frames)
-    write_animation((picture_from(place) for place in places), output, transfer=transfer, codec=film.codec)
+    with console.progress() as progress:
+
+        def frames_in_turn() -> Iterator[FloatArray]:
+            for number, place in enumerate(places, 1):
+                yield picture_from(place)
+                progress(Progress("draw", number, len(places)))
+
+        write_animation(frames_in_turn(), output, transfer=transfer, codec=film.codec)
     start, stop = places[0], places[-1]
     result |= {"frames": len(places), "start": list(start), "stop": list(stop)}
     console.result(result, f"{output}: {len(places)} frames, seen{by} from {_position(start)} to {_position(stop)}")

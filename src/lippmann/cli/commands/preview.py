@@ -76,7 +76,7 @@ def preview(
     output = output_of(output, scene, "-preview.png")
     check_output(output, bits)
     target = display_of(display, printed)
-    request = RenderRequest.from_options(how, machine, placement=placement).for_file(output)
+    request = RenderRequest.from_options(how, machine, placement=placement).for_file(output, bits)
     source = SceneSource(scene, asked, light, access)
     size = checked_size(parse.size(pixels or "512x512", "--pixels"))
     at = default_eye(target) if eye is None else checked_eye(triple(eye, "--eye"))

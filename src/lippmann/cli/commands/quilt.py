@@ -126,7 +126,7 @@ def render(
         if resume:
             raise UsageError("a quilt is rendered in one piece", where="--resume", fix="leave it out")
         check_output(file, bits)
-    request = RenderRequest.from_options(how, machine, placement=placement).for_file(path)
+    request = RenderRequest.from_options(how, machine, placement=placement).for_file(path, bits)
     source = SceneSource(scene, asked, light, access)
     if moving:
         from lippmann.cli.commands.sequence import Files, render_frames

@@ -95,7 +95,7 @@ def render(
         *(how, machine),
         placement=placement,
         began=None if moving else standard_streams.command_began(),
-    ).for_file(output)
+    ).for_file(output, bits)
     source = SceneSource(scene, asked, light, access)
     rendered: Callable[..., IntegralImage] = render_picture
     traced = target

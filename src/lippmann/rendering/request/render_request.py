@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: Endings of formats for data, whose values are not for the eye alone.
-_DATA = (".exr", ".tif", ".tiff", ".zarr")
-
 
 @dataclass(frozen=True)
 class Choice(Generic[T]):
@@ -185,9 +182,10 @@ class RenderRequest(MachineOptions, QualityOptions):
         values = {each.name: getattr(part, each.name) for part in parts for each, _ in options_of(type(part))}
         return cls(**{**values, **others})
 
-    def for_file(self, output: Path) -> RenderRequest:
-        """The request for a picture that is written to ``output``: left open, files for data keep light as it is."""
-        return replace(self, tone_map="none") if self.tone_map == "auto" and output.suffix.lower() in _DATA else self
+    def for_file(self, output: Path, bits: int | None = None) -> RenderRequest:
+        """The request for a file: left open, linear light (OpenEXR, 32 ``bits``) stays as it is, codes do not."""
+        is_linear = output.suffix.lower() == ".exr" or bits == 32
+        return replace(self, tone_map="none") if self.tone_map == "auto" and is_linear else self
 
     @property
     def reason(self) -> str:
