@@ -71,8 +71,9 @@ class CorrectionStep:
     share:
         0 for the picture along true directions to 1 for least squares.
     gains:
-        Decibels over the picture along true directions, of the light to eyes in the directions solved for: ``exact``,
-        and ``radius``, ``thickness`` and ``index``, each the worse of 3 % more and less.
+        Decibels over the mean of a pixel's parts, of the light to eyes in the directions solved for: ``exact``, and
+        ``radius``, ``thickness`` and ``index``, each the worse of 3 % more and less. Under slanted lenses these are
+        upper bounds: a sub-pixel of the picture along true directions is narrower than the mean of its parts.
     """
 
     share: float
@@ -89,7 +90,7 @@ class CorrectionStep:
             )
         worst = min(("radius", "thickness", "index"), key=lambda name: self.gains[name])
         return options, (
-            f"corrected for its lens: {self.gains['exact']:+.1f} dB in the directions solved for, "
+            f"corrected for its lens: up to {self.gains['exact']:+.1f} dB in the directions solved for, "
             f"{self.gains[worst]:+.1f} dB where the lens's {worst} is {TOLERANCE:.0%} off; "
             f"{limited:.0%} of the values at black or white"
         )

@@ -124,14 +124,8 @@ class GuidedDenoiser:
                 self._lenses = lens_numbers_in_full_color(source.display, window)
             else:
                 self._lenses = lens_numbers(source.display, window, subpixels=source.channels == 3)
-        return share_light(
-            clean,
-            source.display,
-            self.guides(),
-            stop=SHARING.stop,
-            lenses=self._lenses,
-            columns=3 if isinstance(source, SubpixelRays) else 1,
-        )
+        display, columns = source.display, 3 if isinstance(source, SubpixelRays) else 1
+        return share_light(clean, display, self.guides(), stop=SHARING.stop, lenses=self._lenses, columns=columns)
 
     def coverage(self) -> tuple[Coverage, Coverage] | None:
         """Coverage of every pixel by the guides' rays, one for each half of them; None where it is not known."""
@@ -170,10 +164,14 @@ class GuidedDenoiser:
     def guides(self) -> Guides:
         """Albedo and normal of what the pixels see."""
         if self._guides is None:
+            source = self._source
+            # Off the lens plane a surface changes all across a lens, and noisy guides would blur it.
+            is_whole = isinstance(source, DisplayRays | WindowRays | SubpixelRays) and source.display.lens is not None
+            samples = REQUEST.usual if is_whole else TUNING.guide_samples
             self._guides = trace_guides(
                 self._built,
-                self._source,
-                plan_guides(self._source, TUNING.guide_samples, self._memory),
+                source,
+                plan_guides(source, samples, self._memory),
                 self._display_from_world,
                 # Samples of their own: with those of one half-buffer the guides would carry its noise into the other.
                 seed=named_seed("guides", self._seed),

@@ -14,7 +14,7 @@ class DenoiseTuning:
     runs:
         Times of a run of the network that a picture of two halves takes, guides and shared light included.
     guide_samples:
-        Samples of a pixel for the guides; 16 gain 0.1 dB.
+        Samples of a pixel for the guides; 16 gain 0.1 dB, and 1 dB behind a ``[lens]``, which has the usual number.
     far_beyond_white:
         Linear value above which light goes past the network, white being 1: it would make the pixels around white, too
         (docs/research/seen-light.md).
