@@ -64,15 +64,15 @@ def exclusive() -> Iterator[None]:
 
 
 class EngineOwner:
-    """Base of what holds scenes of the engine: whichever thread drops it, they are freed while no thread renders.
+    """Base of what holds scenes of the engine: a thread that drops it frees them only if no other uses the engine.
 
     An emitter or a surface that another thread frees while a kernel is recorded aborts the process, for the reason
-    that :func:`no_collection` gives. Where the engine is in use, its user frees them at its end.
+    that :func:`no_collection` gives. So the thread that uses the engine frees them at its end.
     """
 
     def __del__(self) -> None:
         _dropped.append([*vars(self).values()])
-        if not getattr(_depth, "of_thread", 0) and _lock.acquire(blocking=False):
+        if _lock.acquire(blocking=False):
             try:
                 _dropped.clear()
             finally:
