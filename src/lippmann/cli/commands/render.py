@@ -159,8 +159,9 @@ def render(
         image.save(output, bits=bits, icc=b"" if finish is None else finish.icc)
     written = _with_seconds(image, write=time.perf_counter() - writing)
     remarks(console, image.provenance)
-    if remark:
-        console.remark(remark)
+    for line in (remark, _overtime(written, how.max_time)):
+        if line:
+            console.remark(line)
     height, width = image.pixels.shape[:2]
     console.result(report(output, (width, height), written.provenance), _sentence(output, written))
     if opens:
@@ -211,6 +212,15 @@ def _sentence(output: Path, image: IntegralImage) -> str:
         f"{output}: {width}x{height} pixels for {image.display.name}, {samples_in_words(image.provenance.spp)}, "
         f"{shares}{millions:.1f} M rays, {image.provenance.seconds['total']:.1f} s"
     )
+
+
+def _overtime(image: IntegralImage, max_time: float | None) -> str:
+    """One line if a picture took longer than it was to; by up to a tenth nothing is said."""
+    seconds = image.provenance.seconds["total"]
+    if max_time is None or seconds <= 1.1 * max_time:
+        return ""
+    samples = samples_in_words(image.provenance.spp)
+    return f"{seconds:.1f} s instead of --max-time {max_time:g}: {samples} and what belongs to it take that long"
 
 
 def _with_seconds(image: IntegralImage, **seconds: float) -> IntegralImage:
