@@ -64,6 +64,8 @@ class Filming(NamedTuple):
         What the film does not show as it is in the files, in one line.
     has_depth:
         Whether depth lies beside colour.
+    reads_only:
+        Whether ``codes`` does nothing but read the file, so that another thread may do it while the next is rendered.
     """
 
     codes: Callable[[SavedFrame], Pixels]
@@ -71,6 +73,7 @@ class Filming(NamedTuple):
     quilt: QuiltLayout | None = None
     note: str | None = None
     has_depth: bool = False
+    reads_only: bool = False
 
 
 def film_of_pictures(
@@ -197,7 +200,9 @@ def film_of_quilts(
         if (width, height) != size:
             rule = f"{chosen} takes sides of at most {widest}" if smaller != view else f"{chosen} takes even sides"
             note = f"the film's pictures are {width}x{height} pixels, smaller than {size[0]}x{size[1]}: {rule}"
-        return Filming(lambda frame: quilt_of_video(form.read(frame.path), widest), chosen, layout, note)
+        return Filming(
+            lambda frame: quilt_of_video(form.read(frame.path), widest), chosen, layout, note, reads_only=True
+        )
     if shows not in ("eye", "hololuminescent"):
         rule = "quilts have neither native pixels nor depth"
         raise UsageError(f"'{shows}' of quilts", parameter="shows", rule=rule, fix="use lippmann render")
