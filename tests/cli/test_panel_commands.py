@@ -155,7 +155,9 @@ def test_bad_input_is_one_line_and_code_2(lippmann, views, calibration, tmp_path
         return outcome.err
 
     native = tmp_path / "native.png"
-    assert "does not say how many views" in refused("quilt", "pack", views, "-o", native)
+    unnamed = refused("quilt", "pack", views, "-o", native)
+    assert "does not say how many views" in unnamed
+    assert "of 8 columns and 6 rows: native_qs8x6a0.75.png" in unnamed
     assert "it holds 48 views; 5x9 views are 45" in refused("quilt", "pack", views, "-o", tmp_path / "x_qs5x9a1.6.png")
     assert "No such file" in refused("quilt", "pack", tmp_path / "no", "-o", tmp_path / NAME)
     assert "not found" in refused("quilt", "unpack", tmp_path / NAME, "-o", tmp_path / "out")

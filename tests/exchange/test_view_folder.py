@@ -74,7 +74,7 @@ def test_other_programs_names_are_understood(tmp_path, names, grid):
         (["a_0_0.png", "b_0_0.png"], None, "b_0_0.png: is the same view as a_0_0.png"),
         (["a_0_2.png", "a_0_3.png"], None, "the first view is missing; views are counted from 0 or 1"),
         (["a_0_0.png", "a_0_999999.png", "a_999999_999999.png"], None, "the view in row 0, column 1, is missing"),
-        (["0.png", "1.png", "3.png"], (2, 2), "holds 3 views; the display has 2 x 2"),
+        (["0.png", "1.png", "3.png"], (2, 2), "holds 3 views; the display has 2 x 2; weave views of"),
         (["0.png", "1.png", "3.png", "4.png"], (2, 2), "view 2 is missing"),
         (["0.png", "1.png"], None, "the number of views in a row is unknown"),
         (["a.png"], None, "a.png: the name has no number"),

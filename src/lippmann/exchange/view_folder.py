@@ -113,7 +113,8 @@ def _in_rows(by_place: Mapping[Place, Path], folder: Path, grid: tuple[int, int]
     across, down = grid if grid is not None and counted else (int(last[-1]) + 1, int(last[0]) + 1)
     if counted and len(by_place) != across * down:
         rule = f"the display has {across} x {down}"
-        raise PictureError(f"holds {len(by_place)} views", where=str(folder), rule=rule)
+        fix = "weave views of a camera that moves sideways: lippmann weave"
+        raise PictureError(f"holds {len(by_place)} views", where=str(folder), rule=rule, fix=fix)
     rows: list[list[Path]] = []
     for row in range(down):
         rows.append([])

@@ -184,7 +184,7 @@ def write_quilt(quilt: Quilt, path: Path, *, bits: int | None = None) -> None:
     OutputError
         If the format is unknown or has no such bits, or the file cannot be written.
     """
-    layout = layout_of_name(path)
+    layout = layout_of_name(path, to_write=True)
     if layout[:2] != quilt.layout[:2]:
         rule = f"the quilt has {quilt.layout.columns}x{quilt.layout.rows} views"
         raise PictureError(f"the name says {layout.columns}x{layout.rows}", where=str(path), rule=rule)

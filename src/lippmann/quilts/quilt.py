@@ -324,8 +324,8 @@ def ending_of_name(path: Path) -> str:
     return pair[0] if pair else layout_of_name(path).ending if names_layout(path) else ""
 
 
-def layout_of_name(path: Path) -> QuiltLayout:
-    """Columns, rows and aspect ratio from a quilt's file name.
+def layout_of_name(path: Path, *, to_write: bool = False) -> QuiltLayout:
+    """Columns, rows and aspect ratio from the file name of a quilt that is read, or is ``to_write``.
 
     Raises
     ------
@@ -339,6 +339,8 @@ def layout_of_name(path: Path) -> QuiltLayout:
         size = _SIZE.search(path.stem)
         layout = "x".join(size.groups()) if size else "8x6, or 2x1 of a pair"
         fix = f"say the columns and rows of views: --layout {layout}"
+        if to_write:
+            fix = f"of 8 columns and 6 rows: {path.stem.partition('_qs')[0]}_qs8x6a0.75{path.suffix}"
         raise PictureError("the name does not say how many views there are", where=str(path), rule=_CONVENTION, fix=fix)
     aspect = None if match[3] is None else float(match[3].replace(",", "."))  # some languages' mark of decimals
     return checked_layout(int(match[1]), int(match[2]), aspect, where=str(path))

@@ -62,7 +62,7 @@ def layout_of_video(path: Path) -> QuiltLayout | None:
     check_animation_path(path)
     if "_qs" not in path.stem:
         return None
-    layout = layout_of_name(path)
+    layout = layout_of_name(path, to_write=True)
     if layout.columns > WIDEST_QUILT // 16:
         rule = f"a view of a quilt in a video has at least 16 of {WIDEST_QUILT} pixels"
         raise OutputError(f"{layout.columns} columns are too many", where=str(path), rule=rule)

@@ -173,7 +173,7 @@ def pack(
     from lippmann.quilts.quilt import layout_of_name
 
     console = Console(quiet, as_json)
-    layout = layout_of_name(output)
+    layout = layout_of_name(output, to_write=True)
     check_output(output, bits)
     with console.progress() as progress:
         packed = read_views(folder, layout, progress=progress)
