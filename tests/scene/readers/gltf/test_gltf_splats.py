@@ -90,13 +90,17 @@ def test_nodes_place_splats_beside_surfaces(writer, load):
     np.testing.assert_allclose(description.splats.scales[:COUNT], 2 * values["SCALE"], rtol=1e-5)
 
 
-def test_splats_compressed_as_spz(writer, load):
+@pytest.mark.parametrize("draft", [False, True])
+def test_splats_compressed_as_spz(writer, load, draft):
     place = b"".join(int(v * 4096).to_bytes(3, "little", signed=True) for v in (1.5, -0.25, 2.0))
     body = place + bytes([51, 128, 128, 128, 112, 112, 112, 128, 128, 128])
     data = gzip.compress(struct.pack("<4sIIBBBB", b"NGSP", 2, 1, 0, 12, 0, 0) + body)
     name = "KHR_gaussian_splatting_compression_spz_2"
     view = writer.view(data)
     extension = {KEY: {"kernel": "ellipse", "extensions": {name: {"bufferView": view}}}}
+    if draft:
+        extension = {"KHR_spz_gaussian_splats_compression": {"bufferView": view}}
+        writer.json["extensionsRequired"] = writer.json["extensionsUsed"] = [*extension]
     mesh = writer.add("meshes", primitives=[{"attributes": {}, "mode": 0, "extensions": extension}])
     writer.node(mesh=mesh)
     np.testing.assert_array_equal(load(writer).description.splats.centers, [[1.5, -0.25, 2.0]])

@@ -39,6 +39,8 @@ BASISU = "KHR_texture_basisu"
 SPLATS = "KHR_gaussian_splatting"
 #: Extensions of that one, which hold the splats as an SPZ file.
 SPLATS_IN_SPZ = ("KHR_gaussian_splatting_compression_spz_2", "KHR_gaussian_splatting_compression_spz")
+#: A draft of both in one, as Cesium wrote it in 2025.
+SPLATS_DRAFT = "KHR_spz_gaussian_splats_compression"
 
 # Extensions whose members are read.
 _UNDERSTOOD = frozenset(
@@ -50,6 +52,7 @@ _UNDERSTOOD = frozenset(
         DRACO,
         SPLATS,
         *SPLATS_IN_SPZ,
+        SPLATS_DRAFT,
         "KHR_lights_punctual",
         "KHR_materials_anisotropy",
         "KHR_materials_clearcoat",

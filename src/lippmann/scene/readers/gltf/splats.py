@@ -9,7 +9,7 @@ import numpy as np
 
 from lippmann.scene.readers.gltf import accessors as storage
 from lippmann.scene.readers.gltf.accessors import Accessors, Storage
-from lippmann.scene.readers.gltf.document import SPLATS, SPLATS_IN_SPZ, Document
+from lippmann.scene.readers.gltf.document import SPLATS, SPLATS_DRAFT, SPLATS_IN_SPZ, Document
 from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.readers.splats.activation import ask_memory, cleaned
 from lippmann.scene.readers.splats.spz import decode_spz
@@ -23,7 +23,7 @@ _POINTS = 0
 
 def is_splats(primitive: Fields) -> bool:
     """Whether a primitive holds Gaussian splats."""
-    return primitive.extension(SPLATS) is not None
+    return any(primitive.extension(name) is not None for name in (SPLATS, SPLATS_DRAFT))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +64,12 @@ class SplatClouds:
         return joined([moved(splats, world) for splats, world in self.placed])
 
     def _read(self, primitive: Fields) -> Splats:
-        extension = primitive.extension(SPLATS)
-        assert extension is not None
         if primitive.optional_integer("mode") != _POINTS:
             raise primitive.error("mode", "splats are points, 0")
+        draft, extension = primitive.extension(SPLATS_DRAFT), primitive.extension(SPLATS)
+        if draft is not None:
+            return self._unpacked(draft, primitive)
+        assert extension is not None
         kernel, space = extension.text("kernel"), extension.text("colorSpace")
         if kernel not in (None, "ellipse"):
             self.document.notes.add(f"splats of the kernel {kernel[:40]} are drawn as Gaussians", primitive.place)
@@ -77,11 +79,7 @@ class SplatClouds:
         for name in SPLATS_IN_SPZ:
             packed = extension.extension(name)
             if packed is not None:
-                view = self.document.required_reference(packed, "bufferView", "bufferViews")
-                data, _ = self.accessors.buffers.view(view)
-                decoded, notes, _ = decode_spz(data, where=self.document.file)
-                self._note(notes, primitive)
-                return decoded
+                return self._unpacked(packed, primitive)
         attributes = primitive.child("attributes")
         if attributes is None:
             raise primitive.error("attributes", "it is required")
@@ -105,6 +103,13 @@ class SplatClouds:
         )
         self._note(notes, primitive)
         return splats
+
+    def _unpacked(self, packed: Fields, primitive: Fields) -> Splats:
+        view = self.document.required_reference(packed, "bufferView", "bufferViews")
+        data, _ = self.accessors.buffers.view(view)
+        decoded, notes, _ = decode_spz(data, where=self.document.file)
+        self._note(notes, primitive)
+        return decoded
 
     def _note(self, notes: Sequence[str], primitive: Fields) -> None:
         for note in notes:
