@@ -10,11 +10,20 @@ import pytest
 import lippmann
 from lippmann.display import load_display
 from lippmann.options.placement import PlacementOptions
-from lippmann.scene.matrices import scaling, translation
+from lippmann.scene.matrices import rotation, scaling, translation
 from lippmann.scene.placement import Placement
 from lippmann.scene.turntable import turn_about
-from lippmann.scene.values.description import Image, Instance, Light, Material, Mesh, SceneDescription, Texture
-from lippmann.sequences.cuts import Moment, is_cut
+from lippmann.scene.values.description import (
+    Environment,
+    Image,
+    Instance,
+    Light,
+    Material,
+    Mesh,
+    SceneDescription,
+    Texture,
+)
+from lippmann.sequences.cuts import Moment, is_cut, is_light_at_rest
 from lippmann.sequences.frames import find_stand
 from lippmann.sequences.motion import open_motion
 from lippmann.sequences.turntable import open_turntable
@@ -120,3 +129,18 @@ def test_scenes_of_whitted_tracers():
     one, other = (Moment(0, scene, PLACEMENT) for scene in (teapot, room))
     assert not is_cut(one, one, DISPLAY)
     assert is_cut(one, other, DISPLAY)
+
+
+@pytest.mark.parametrize(
+    ("follows", "moved", "is_at_rest"),
+    [
+        (False, rotation((0.0, 10.0, 0.0)), True),
+        (True, translation((5.0, 0.0, 0.0)), True),
+        (True, rotation((0.0, 10.0, 0.0)), False),
+    ],
+)
+def test_light_that_turns_with_the_display_is_not_at_rest(follows, moved, is_at_rest):
+    before = moment(environment=Environment(np.ones((4, 8, 3), np.float32), follows_viewer=follows))
+    after = before._replace(placement=replace(before.placement, world_from_display=moved))
+    assert is_light_at_rest(before, after) == is_at_rest
+    assert not is_light_at_rest(before, after._replace(scene=replace(before.scene)))

@@ -151,3 +151,26 @@ def test_other_materials_are_made_anew(engine):
     red = [replace(material, base_color=(1.0, 0.0, 0.0)) for material in scene.physical.materials]
     second = kept.build(teapot(materials=red), engine)
     assert not set(map(id, first.finishes.values())) & set(map(id, second.finishes.values()))
+
+
+def test_a_scene_read_anew_is_known_but_for_its_cameras(engine):
+    first = teapot(lights=[light_source()])
+    description = first.description
+    kept = KeptScene()
+    assert kept.known(first) is first
+    kept.build(first, engine)
+
+    def read(**changed):
+        meshes = [replace(mesh, positions=mesh.positions.copy()) for mesh in description.meshes]
+        return replace(first, description=replace(description, meshes=meshes, **changed))
+
+    assert kept.known(read(cameras=[])) is first
+    for changed in (
+        {"lights": [light_source("spot")]},
+        {"lights": []},
+        {"background": (1.0, 0.0, 0.0)},
+        {"materials": [replace(description.materials[0], metallic=0.5), *description.materials[1:]]},
+        {"instances": [replace(description.instances[0], world_from_mesh=2 * np.eye(4)), *description.instances[1:]]},
+    ):
+        other = read(**changed)
+        assert kept.known(other) is other

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.scene.extent import box_corners
-from lippmann.scene.matrices import Bounds, transform_points
+from lippmann.scene.matrices import Bounds, rotation_of, transform_points
 from lippmann.scene.placement import Placement
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import SceneDescription, Texture
@@ -51,6 +51,17 @@ def is_cut(before: Moment, after: Moment, display: Display) -> bool:
         along = transform_points(before.placement.world_from_display @ after.placement.display_from_world, lights[1])
         moved.append(np.minimum(_distances(*lights), _distances(lights[0], along)))
     return any(distances.max(initial=0.0) > _FARTHEST * reach for distances in moved)
+
+
+def is_light_at_rest(before: Moment, after: Moment) -> bool:
+    """Whether nothing but the display has moved: not the scene, nor light that turns with the display."""
+    environment = after.scene.environment
+    if before.scene is not after.scene:
+        return False
+    if environment is None or not environment.follows_viewer:
+        return True
+    turns = (rotation_of(moment.placement.world_from_display) for moment in (before, after))
+    return bool(np.ptp(list(turns), axis=0).max() < 1e-6)
 
 
 def _distances(one: Bounds, other: Bounds) -> NDArray[np.float64]:

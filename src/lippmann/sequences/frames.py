@@ -32,6 +32,7 @@ from lippmann.sequences.motion import Motion, open_motion
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
+    from lippmann.image.picture import Provenance
     from lippmann.quilts.quilt import Quilt
     from lippmann.tiles.tiled_render import Rendered, Runner
 
@@ -311,17 +312,20 @@ def render_frames(
     request = hold_exposure(request, motion, display, where, kept.build)
 
     def moment(frame: int) -> Moment:
-        return Moment(frame, motion.scene(frame), where(frame))
+        return Moment(frame, kept.known(motion.scene(frame)), where(frame))
 
     def trace(now: Moment, request: RenderRequest, report: ProgressCallback) -> Shown:
         return form.render(now.scene, display, replace(request, placement=now.placement), report, kept.build)
 
-    keys = KeyFrames(display, moment, lambda key, own: trace(key, of_frame(own, key.number), silent).provenance)
+    def render_key(key: Moment, own: RenderRequest) -> Provenance:
+        return trace(key, of_frame(own, key.number), silent).provenance
+
+    keys = KeyFrames(display, moment, render_key, where.first_pose is not None)
 
     def render(position: int, frame: int) -> Shown:
         now = moment(frame)
         key = keys.before(now, request)
-        own = keys.request_of(of_frame(request, frame), frame, key)
+        own = keys.request_of(of_frame(request, frame), now, key)
         image = trace(now, own, _report_of_frame(progress, position, len(frames)))
         made = image.provenance
         keys.add(now, made)

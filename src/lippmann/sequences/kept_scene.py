@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from lippmann.runtime.engine import Engine
 from lippmann.scene.scene import Scene
@@ -21,6 +25,11 @@ class KeptScene:
 
     def __init__(self) -> None:
         self._last: tuple[Scene, BuiltScene] | None = None
+
+    def known(self, scene: Scene) -> Scene:
+        """The scene that was built last where nothing but cameras is different, else ``scene``."""
+        last = None if self._last is None else self._last[0]
+        return scene if last is None or not _is_equal(_without_cameras(last), _without_cameras(scene)) else last
 
     def build(self, scene: Scene, engine: Engine, *, memory: int | None = None) -> BuiltScene:
         """The scene on the device; parameters and errors as those of :func:`lippmann.device.pbr.build`."""
@@ -58,6 +67,30 @@ def _has_same_materials(one: Scene, other: Scene) -> bool:
     if len(before.materials) != len(after.materials) or before.multiple_scattering != after.multiple_scattering:
         return False
     return all(old is new for old, new in zip(before.materials, after.materials, strict=True))
+
+
+def _without_cameras(scene: Scene) -> Scene:
+    description = scene.description
+    if not isinstance(description, SceneDescription):
+        return scene
+    return replace(scene, description=replace(description, cameras=(), notes=()))
+
+
+def _is_equal(one: Any, other: Any) -> bool:
+    """Whether two values are the same, of dataclasses and collections all parts."""
+    if one is other:
+        return True
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, np.ndarray):
+        return bool(np.array_equal(one, other))
+    if isinstance(one, Mapping):
+        return one.keys() == other.keys() and all(_is_equal(one[key], other[key]) for key in one)
+    if isinstance(one, list | tuple):
+        return len(one) == len(other) and all(_is_equal(*pair) for pair in zip(one, other, strict=True))
+    if is_dataclass(one):
+        return all(_is_equal(getattr(one, part.name), getattr(other, part.name)) for part in fields(one))
+    return bool(one == other)
 
 
 __all__ = ["KeptScene"]

@@ -18,7 +18,7 @@ from typing import cast
 from lippmann.display import Display
 from lippmann.image.picture import Provenance
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.sequences.cuts import Moment, is_cut
+from lippmann.sequences.cuts import Moment, is_cut, is_light_at_rest
 from lippmann.sequences.flicker import Figures
 from lippmann.sequences.kept_light import KeptLight
 from lippmann.sequences.key_light import KeyLight
@@ -40,6 +40,8 @@ class KeyFrames:
         Returns a frame by its number.
     render:
         Renders a frame as a request asks, which has no seed of the frame's own yet; its provenance.
+    follows_camera:
+        Whether the display follows a camera, so that it may move alone.
     """
 
     def __init__(
@@ -47,26 +49,32 @@ class KeyFrames:
         display: Display,
         moment: Callable[[int], Moment],
         render: Callable[[Moment, RenderRequest], Provenance],
+        follows_camera: bool,
     ) -> None:
         self._display = display
         self._moment = moment
         self._render = render
+        self._follows_camera = follows_camera
         self._last: tuple[Moment, Provenance] | None = None
         self._light = KeptLight()
         self._shared = KeyLight()
 
-    def request_of(self, request: RenderRequest, frame: int, key: Provenance | None) -> RenderRequest:
-        """The request of a ``frame``, which follows a ``key`` frame or, None, has halves of its own."""
+    def request_of(self, request: RenderRequest, moment: Moment, key: Provenance | None) -> RenderRequest:
+        """The request of a frame, which follows a ``key`` frame or, None, has halves of its own."""
+        frame = moment.number
         if key is not None:
             assert key.spp is not None
+            assert self._last is not None
             told = f"the estimate of the error follows from frame {key_of(frame)}'s, with three quarters of its samples"
             samples = math.ceil(_SHARE * key.spp)
-            own = replace(request, spp=samples, judged_by=told)
-            return replace(own, keep_light=self._light.of_next, trace_through=self._shared.trace_next)
+            own = replace(request, spp=samples, judged_by=told, keep_light=self._light.of_next)
+            is_shared = self._follows_camera and is_light_at_rest(self._last[0], moment)
+            return replace(own, trace_through=self._shared.trace_next) if is_shared else own
         is_key = key_of(frame) == frame and _is_open(request)
         if not is_key:
             return request
-        return replace(request, keep_light=self._light.of_key, trace_through=self._shared.trace_key)
+        own = replace(request, keep_light=self._light.of_key)
+        return replace(own, trace_through=self._shared.trace_key) if self._follows_camera else own
 
     def add(self, moment: Moment, made: Provenance) -> None:
         """Remember how a frame was made, if it is a key frame."""
@@ -88,7 +96,7 @@ class KeyFrames:
         if is_cut(last, moment, self._display):
             return None
         if made is None:
-            made = self._render(last, self.request_of(request, key, None))
+            made = self._render(last, self.request_of(request, last, None))
             self.add(last, made)
         return made if made.estimate is not None and "by_chance" in made.estimate else None
 

@@ -31,15 +31,13 @@ class Guides:
     """``albedo`` and ``normal``, ``(H, W, 3)`` float32 each; components in [0, 1] and in [-1, 1] (display frame).
 
     ``height`` is ``(H, W)`` float32: apparent z (mm), of reflections behind their mirror. ``coverage`` is that of the
-    first and of the second half of the guides' samples. ``diffuse`` is ``(H, W)`` bool: all of the guides' rays hit a
-    diffuse surface at once, which emits no light. All three are None where they are not known.
+    first and of the second half of the guides' samples. Both are None where they are not known.
     """
 
     albedo: FloatArray
     normal: FloatArray
     height: FloatArray | None = None
     coverage: tuple[Coverage, Coverage] | None = None
-    diffuse: NDArray[np.bool_] | None = None
 
     def reflected(self) -> FloatArray:
         """``(H, W, 3)``: divisor that demodulates colour into light that can be shared, and the factor back.
@@ -85,15 +83,13 @@ def trace_guides(
     normal = np.zeros_like(albedo)
     height = np.zeros((plan.height, plan.width), dtype=np.float32)
     covered = np.zeros((2, plan.height, plan.width, plan.channels), dtype=np.float32)
-    diffuse = np.zeros_like(height)
     done = 0
     for tile, run in plan:
         rows = slice(tile.first_row, tile.first_row + tile.rows)
         sums = _trace_tile(surfaces, source, plan, tile, run, seed, box_filter, matrix[2])
         shape = (tile.rows, plan.width, plan.channels)
-        colors, normals, heights, diffuse_hits, *halves = (_in_rows(part, shape) for part in sums)
+        colors, normals, heights, *halves = (_in_rows(part, shape) for part in sums)
         height[rows] += heights.mean(axis=2) / plan.samples
-        diffuse[rows] += diffuse_hits.mean(axis=2)
         if plan.channels == 3:
             colors = np.diagonal(colors, axis1=2, axis2=3)[:, :, None]
         albedo[rows] += colors[:, :, 0] / plan.samples
@@ -105,7 +101,7 @@ def trace_guides(
     first = plan.samples // 2
     samples = first, plan.samples - first
     coverage = [Coverage(hits / np.float32(max(1, n)), n) for hits, n in zip(covered, samples, strict=True)]
-    return Guides(albedo, normal, height, (coverage[0], coverage[1]), diffuse == plan.samples)
+    return Guides(albedo, normal, height, (coverage[0], coverage[1]))
 
 
 def _in_rows(values: Float | Vector3f, shape: tuple[int, int, int]) -> FloatArray:
@@ -125,23 +121,22 @@ def _trace_tile(
     seed: int,
     box_filter: bool,
     z_from_world: NDArray[np.float64],
-) -> tuple[Color3f, Vector3f, Float, Float, Float, Float]:
+) -> tuple[Color3f, Vector3f, Float, Float, Float]:
     """Sums over the samples of one pass, for every pixel and channel in the order of lanes: colours, world-space
-    normals, heights, hits of diffuse surfaces, and hits of any surface by either half of all passes' samples."""
+    normals, heights, and hits of any surface by either half of all passes' samples."""
     lanes = tile.rows * plan.width * plan.channels * run.count
     # Pixels, streams and the order of lanes are the same as for a wavefront of paths.
     pixels, stream = samples_of_tile(source, plan, tile, run, seed, box_filter)
     ray = pixels.ray(stream)
-    albedo, normal, distance, covered, diffuse = surfaces.features(ray)
+    albedo, normal, distance, covered = surfaces.features(ray)
     x, y, z = mi.Point3f(ray.o) + mi.Vector3f(ray.d) * distance
     weights = [dr.opaque(mi.Float, float(weight)) for weight in z_from_world]
     # Beyond 100 m the light lines of all lenses are parallel.
     height = dr.clip(x * weights[0] + y * weights[1] + z * weights[2] + weights[3], -1e5, 1e5)
     is_first = stream.index < dr.opaque(mi.UInt32, plan.samples // 2)
-    kinds = diffuse, covered & is_first, covered & ~is_first
-    hits = [dr.select(kind, mi.Float(1), mi.Float(0)) for kind in kinds]
+    hits = [dr.select(half, mi.Float(1), mi.Float(0)) for half in (covered & is_first, covered & ~is_first)]
     values = [mi.Float(part) + dr.zeros(mi.Float, lanes) for part in (*albedo, *normal, height, *hits)]
-    # All at once: evaluated one by one, the rays would be traced nine times.
+    # All at once: evaluated one by one, the rays would be traced eight times.
     dr.eval(values)
     if run.count > 1:
         values = [dr.block_sum(part, run.count) for part in values]

@@ -80,16 +80,15 @@ class Surfaces(Protocol):
         """Whether ``ray`` hits a surface, and where; cheaper than :meth:`first_hit`."""
         ...
 
-    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool, Bool]:
+    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool]:
         """Denoising features of the first surface that is not purely specular.
 
         Returns
         -------
-        Color3f, Normal3f, Float, Bool, Bool
+        Color3f, Normal3f, Float, Bool
             Albedo plus emitted radiance, clipped to [0, 1] and tinted by the specular surfaces on the way; the unit
             shading normal, 0 where nothing is hit; the length of the path there in units of the scene,
-            :data:`ENVIRONMENT_DISTANCE` where nothing is hit; whether ``ray`` hits any surface at all; whether that is
-            known to look alike from all sides, and emits no light.
+            :data:`ENVIRONMENT_DISTANCE` where nothing is hit; whether ``ray`` hits any surface at all.
         """
         ...
 
@@ -157,7 +156,7 @@ class PhysicalSurfaces:
         return mi.Ray3f(o, d), pi
 
     @syntax
-    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool, Bool]:
+    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool]:
         """As :meth:`Surfaces.features`."""
         o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)  # current ray
         active = mi.Bool(True)
@@ -167,7 +166,6 @@ class PhysicalSurfaces:
         steps = mi.UInt32(0)  # specular surfaces so far
         pi = self._scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         covered = mi.Bool(pi.is_valid())
-        diffuse = mi.Bool(covered)
         while dr.hint(active, label="to the first rough surface"):
             toward = mi.Ray3f(o, d)
             si = pi.compute_surface_interaction(toward, mi.RayFlags.All)
@@ -178,8 +176,6 @@ class PhysicalSurfaces:
                 emission = dr.select((steps == 0) & ~hit, mi.Color3f(self._background), emission)
             color = dr.clip(tint * (_albedo(si, bsdf, hit) + emission), 0, 1)
 
-            directional = (bsdf.flags() & int(mi.BSDFFlags.Glossy | mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
-            diffuse &= (steps != 0) | (~directional & (dr.max(emission) == 0))
             may_be_specular = _has_specular_lobe(bsdf.flags())
             bs, weight = _central_sample(si, bsdf, hit & may_be_specular)
             specular = _has_specular_lobe(bs.sampled_type)
@@ -193,7 +189,7 @@ class PhysicalSurfaces:
             o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
             active &= continues
             pi = self._scene.ray_intersect_preliminary(onward, coherent=False, active=active)
-        return albedo, normal, distance, covered, diffuse
+        return albedo, normal, distance, covered
 
 
 def _has_specular_lobe(flags: UInt32) -> Bool:
@@ -254,13 +250,13 @@ class WhittedSurfaces:
         closest = self._built.geometry.closest(o, d, mi.Bool(True), coherent=True)
         return closest.is_valid(), mi.Point3f(self._mirror(o + d * closest.t))
 
-    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool, Bool]:
+    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool]:
         """As :meth:`Surfaces.features`, of the first surface whatever it is."""
         o, d = self._mirror(mi.Vector3f(ray.o)), self._mirror(mi.Vector3f(ray.d))
         first = self._first_hit(o, d)
         behind = dr.clip(self._built.background_color(o, d), 0, 1)
         distance = dr.select(first.hit, dr.norm(mi.Point3f(first.p) - mi.Point3f(ray.o)), ENVIRONMENT_DISTANCE)
-        return dr.select(first.hit, first.albedo, behind), first.n, distance, first.hit, mi.Bool(False)
+        return dr.select(first.hit, first.albedo, behind), first.n, distance, first.hit
 
     def _first_hit(self, o: Vector3f, d: Vector3f) -> SurfaceHit:
         built = self._built
