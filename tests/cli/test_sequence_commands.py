@@ -10,6 +10,7 @@ import pytest
 
 from lippmann.image import read_picture
 from lippmann.quilts.quilt_metadata import metadata_of_text
+from lippmann.runtime.atomic_write import temporary_file
 from lippmann.viewing.replay import replay
 
 QUICK = ("--integrator", "direct", "--spp", "1", "--device", "cpu")
@@ -220,6 +221,7 @@ def test_an_output_that_is_a_film_is_made_of_the_frames_beside_it(engine, lippma
 
 
 def test_an_output_that_is_a_film_of_integral_images(engine, lippmann, moving_ball, tmp_path):
+    temporary_file(tmp_path / "ball.v1.mp4").write_bytes(b"what a killed run left")
     done = lippmann("render", moving_ball, "--frames", "0:2", *QUICK, "--fps", "10", "-o", tmp_path / "ball.v1.mp4")
     assert done.code == 0, done.err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["ball-v1-frames", "ball.v1.mp4"]
