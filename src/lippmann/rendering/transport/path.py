@@ -188,7 +188,6 @@ class PathIntegrator:
         Sky that the primary ray sees stays: at outlines samples of both sides belong together.
         """
         scene = self.scene
-        context = mi.BSDFContext()
         techniques = self._techniques_without_specular if without_specular else self._techniques
 
         o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)  # current ray
@@ -208,7 +207,7 @@ class PathIntegrator:
         first_distance = mi.Float(pi.t)
         view_dependent = mi.Bool(False)
 
-        while dr.hint(active, label="paths", exclude=[scene, context, stream]):
+        while dr.hint(active, label="paths", exclude=[scene, stream]):
             toward = mi.Ray3f(o, d)
             si = pi.compute_surface_interaction(toward)
             bsdf = si.bsdf(toward)
@@ -224,6 +223,33 @@ class PathIntegrator:
             continues = si.is_valid() & (depth < self.depth)
             dimension = (depth * 2 + crossings) * DIMENSIONS + 1
             vertex = Vertex(si, bsdf, d, depth, continues, throughput, stream, dimension, states)
+            state = radiance, shadow, eta, crossings, o, d, last, all_specular
+            states, throughput, depth, continues, passes, *rest = self._leave(vertex, techniques, state)
+            radiance, shadow, eta, crossings, o, d, last, all_specular = rest
+
+            # ---- Russian roulette ----
+            survival = roulette_survival(throughput, eta)
+            at_risk = continues & (depth >= TUNING.roulette_depth) & ~passes
+            throughput = dr.select(at_risk, throughput * dr.rcp(survival), throughput)
+            continues &= ~at_risk | (stream.next_1d(dimension + 3) < survival)
+
+            active = continues
+            pi = scene.ray_intersect_preliminary(mi.Ray3f(o, d), coherent=False, active=active)
+            secondary += dr.select(active, mi.UInt32(1), mi.UInt32(0))
+
+        return self.exposed(radiance), RayCounts(secondary, shadow), FirstHit(first_distance, view_dependent)
+
+    @syntax
+    def _leave(self, vertex: Vertex, techniques: Techniques, state: tuple[Any, ...]) -> tuple[Any, ...]:
+        """State of a path after a vertex: with emitter samples and the next ray.
+
+        In a branch, so that the processor skips it for a vector of lanes that have all left the scene.
+        """
+        si, bsdf, stream, dimension = vertex.si, vertex.bsdf, vertex.stream, vertex.dimension
+        states, throughput, depth, continues = vertex.states, vertex.throughput, vertex.depth, vertex.active
+        radiance, shadow, eta, crossings, o, d, last, all_specular = state
+        context, passes = mi.BSDFContext(), mi.Bool(False)
+        if continues:
             radiance, shadow = techniques.arrive(vertex, radiance, shadow)
             samples, number = self._emitter_samples(stream.index, all_specular)
             count, last_number = mi.Float(samples), number + samples - 1
@@ -259,18 +285,8 @@ class PathIntegrator:
             else:
                 crossings += 1
             continues &= (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
-
-            # ---- Russian roulette ----
-            survival = roulette_survival(throughput, eta)
-            at_risk = continues & (depth >= TUNING.roulette_depth) & ~passes
-            throughput = dr.select(at_risk, throughput * dr.rcp(survival), throughput)
-            continues &= ~at_risk | (stream.next_1d(dimension + 3) < survival)
-
-            active = continues
-            pi = scene.ray_intersect_preliminary(onward, coherent=False, active=active)
-            secondary += dr.select(active, mi.UInt32(1), mi.UInt32(0))
-
-        return self.exposed(radiance), RayCounts(secondary, shadow), FirstHit(first_distance, view_dependent)
+        state = radiance, shadow, eta, crossings, o, d, last, all_specular
+        return states, throughput, depth, continues, passes, *state
 
     def exposed(self, radiance: Spectrum) -> Spectrum:
         """``radiance`` times the gain."""
@@ -307,19 +323,30 @@ class PathIntegrator:
         half:
             Of the picture, see :class:`~lippmann.device.sobol.SampleStream`.
         """
-        reference = dr.zeros(mi.Interaction3f)
-        reference.p = last.p
-        ds = mi.DirectionSample3f(self.scene, si=si, ref=reference)
-        emitter_pdf = self.light_sampler.pdf_direction(reference, ds, ~last.is_delta) * mi.Float(last.emitter_samples)
-        weight = mis_weight(last.pdf, emitter_pdf)
-        weight = techniques.weigh_emission(states, half, ds, weight, emitter_pdf, si.is_valid())
-        emission = ds.emitter.eval(si) * weight
+        emission = self._weighted_emission(si, last, techniques, states, half)
         if self.features.background is None:
             return emission
         background = mi.Spectrum(self.features.background)
         if self.light.gain is not None:
             background /= self.light.gain  # the background is not exposed
         return dr.select((depth == 0) & ~si.is_valid(), background, emission)
+
+    @syntax
+    def _weighted_emission(
+        self, si: SurfaceInteraction3f, last: LastVertex, techniques: Techniques, states: list[Any], half: UInt32
+    ) -> Spectrum:
+        """Emission by MIS; in a branch, so that the processor skips it for a vector of lanes of which none emits."""
+        reference = dr.zeros(mi.Interaction3f)
+        reference.p = last.p
+        ds = mi.DirectionSample3f(self.scene, si=si, ref=reference)
+        emission = mi.Spectrum(0)
+        if ds.emitter != dr.zeros(mi.EmitterPtr):
+            samples = mi.Float(last.emitter_samples)
+            emitter_pdf = self.light_sampler.pdf_direction(reference, ds, ~last.is_delta) * samples
+            weight = mis_weight(last.pdf, emitter_pdf)
+            weight = techniques.weigh_emission(states, half, ds, weight, emitter_pdf, si.is_valid())
+            emission = ds.emitter.eval(si) * weight
+        return emission
 
     @property
     def has_surroundings(self) -> bool:

@@ -133,8 +133,6 @@ def _chain(
     Shadow rays are None in scenes without delta emitters.
     """
     scene, techniques = integrator.scene, integrator.absorption
-    context = mi.BSDFContext()
-    context.type_mask |= SHARP_FIRST
     o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
     active = mi.Bool(active)
     light, throughput = mi.Spectrum(0), mi.Spectrum(1)
@@ -148,7 +146,7 @@ def _chain(
 
     pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
     active &= _may_show_light(pi)
-    while dr.hint(active, label="chain", exclude=[integrator, scene, context, stream, at_first]):
+    while dr.hint(active, label="chain", exclude=[integrator, scene, stream, at_first]):
         toward = mi.Ray3f(o, d)
         si = pi.compute_surface_interaction(toward)
         bsdf = si.bsdf(toward)
@@ -159,6 +157,27 @@ def _chain(
         dimension = (depth * 2 + crossings) * DIMENSIONS + 1
         continues = active & si.is_valid() & (depth < integrator.depth)
         vertex = Vertex(si, bsdf, d, depth, continues, throughput, stream, dimension, states)
+        state = light, shadow, crossings, o, d, last, all_specular
+        states, throughput, depth, continues, *rest = _leave(integrator, vertex, at_first, state)
+        light, shadow, crossings, o, d, last, all_specular = rest
+        active = continues & (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
+        # Coherent: neighbours mirror much the same.
+        pi = scene.ray_intersect_preliminary(mi.Ray3f(o, d), coherent=True, active=active)
+        rays += dr.select(active, mi.UInt32(1), mi.UInt32(0))
+        # A chain that leaves the scene counts as sky, but not before its first event.
+        active &= _may_show_light(pi) | (integrator.has_surroundings & ~pi.is_valid() & (depth > 0))
+    return light, rays, shadow
+
+
+@syntax
+def _leave(integrator: PathIntegrator, vertex: Vertex, at_first: UInt32, state: tuple[Any, ...]) -> tuple[Any, ...]:
+    """State of a chain after a vertex, in a branch as in paths."""
+    si, bsdf, stream, dimension = vertex.si, vertex.bsdf, vertex.stream, vertex.dimension
+    states, throughput, depth, continues = vertex.states, vertex.throughput, vertex.depth, vertex.active
+    light, shadow, crossings, o, d, last, all_specular = state
+    context = mi.BSDFContext()
+    context.type_mask |= SHARP_FIRST
+    if continues:
         if dr.hint(len(integrator.without_size) > 0, mode="scalar"):
             point = stream.next_2d(dimension + 2)
             drawn, tests = _without_size(integrator, si, bsdf, vertex.lobe, point, continues)
@@ -167,7 +186,7 @@ def _chain(
         bs, weight = bsdf.sample(context, si, stream.next_1d(dimension), stream.next_2d(dimension + 1), continues)
         scattering = Scattering(vertex, bs, weight)
         passes = scattering.passes
-        states = techniques.scatter(vertex, scattering)
+        states = integrator.absorption.scatter(vertex, scattering)
         continues &= follows_sharply(bs)
         throughput *= weight
         onward = si.spawn_ray(si.to_world(bs.wo))
@@ -180,12 +199,7 @@ def _chain(
             depth += 1
         else:
             crossings += 1
-        active = continues & (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
-        pi = scene.ray_intersect_preliminary(onward, coherent=True, active=active)  # neighbours mirror much the same
-        rays += dr.select(active, mi.UInt32(1), mi.UInt32(0))
-        # A chain that leaves the scene counts as sky, but not before its first event.
-        active &= _may_show_light(pi) | (integrator.has_surroundings & ~pi.is_valid() & (depth > 0))
-    return light, rays, shadow
+    return states, throughput, depth, continues, light, shadow, crossings, o, d, last, all_specular
 
 
 def _without_size(
