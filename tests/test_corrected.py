@@ -63,7 +63,7 @@ def test_one_ray_through_the_middle_of_a_lens_is_not_enough(engine):
 
 @pytest.mark.slow
 def test_four_samples_are_not_called_one(engine, monkeypatch):
-    monkeypatch.setattr(LensCorrection, "step", lambda *parts: CorrectionStep(0.5, GAINS))
+    monkeypatch.setattr(LensCorrection, "step", lambda *parts: CorrectionStep(0.5, GAINS, 0.0))
     image = lippmann.render("teapot", PRINT, correct="lens", spp=4, denoise="none")
     assert image.provenance.spp == 4
     remarks = [note for note in image.provenance.notes if "no estimate" in note]
@@ -73,7 +73,7 @@ def test_four_samples_are_not_called_one(engine, monkeypatch):
 
 @pytest.mark.slow
 def test_a_correction_that_gains_nothing_leaves_the_plain_picture(engine, monkeypatch):
-    monkeypatch.setattr(LensCorrection, "step", lambda *parts: CorrectionStep(0.0, GAINS))
+    monkeypatch.setattr(LensCorrection, "step", lambda *parts: CorrectionStep(0.0, GAINS, 0.0))
     options = {"spp": 4, "integrator": "direct", "method": "full", "denoise": "none"}
     plain = lippmann.render("teapot", PRINT, **options)
     image = lippmann.render("teapot", PRINT, correct="lens", **options)

@@ -14,13 +14,13 @@ Everything else hangs on what they return.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 from lippmann.display import Display, load_display
 from lippmann.display.sheet_layout import with_bleed
-from lippmann.errors import UsageError
 from lippmann.options.choices import Correction
 from lippmann.options.forms import LEFT_OUT
 from lippmann.options.light import LightOptions
@@ -54,6 +54,7 @@ def render(
     placement: PlacementOptions | Placement | Mapping[str, object] | None = None,
     bleed: float = 0.0,
     correct: Correction = "none",
+    headroom: float = 0.0,
     progress: ProgressCallback | None = None,
     **options: Unpack[RenderKeywords],
 ) -> IntegralImage:
@@ -78,6 +79,9 @@ def render(
     correct:
         ``lens``: the pixels whose light through the display's real lenses comes nearest to what rays meet, of which
         there are more than pixels. Default ``none``.
+    headroom:
+        How far above black and below white a corrected picture's light is to keep, as a share of white: 0 to 0.25.
+        The correction needs room to take light away; the picture has less contrast. Default 0.
     progress:
         Called with :class:`~lippmann.progress.Progress` as the work goes on. By default a bar in terminals and
         notebooks, and nothing elsewhere.
@@ -102,12 +106,15 @@ def render(
     >>> image.pixels.shape
     (8, 16, 3)
     """
-    if correct not in get_args(Correction):
-        raise UsageError.unknown("correction", correct, get_args(Correction), parameter="correct")
-    if correct == "lens":
-        from lippmann.corrected import render_corrected as rendered
-    else:
-        from lippmann.rendering.picture import render_picture as rendered
+    from lippmann.rendering.picture import render_picture
+
+    rendered: Callable[..., IntegralImage] = render_picture
+    if correct != "none" or headroom:
+        from lippmann.corrected import render_corrected
+        from lippmann.options.correction import check_correction
+
+        check_correction(correct, headroom)
+        rendered = partial(render_corrected, headroom=headroom)
 
     request = _request(placement, options)
     with show_progress(progress) as report:

@@ -27,7 +27,12 @@ from lippmann.scene.scene import Scene
 
 @exclusive()
 def render_corrected(
-    scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback = silent
+    scene: Scene,
+    display: Display,
+    request: RenderRequest,
+    progress: ProgressCallback = silent,
+    *,
+    headroom: float = 0.0,
 ) -> IntegralImage:
     """Render ``scene`` in one piece, corrected for the lenses of ``display``; as it is where that would gain nothing.
 
@@ -43,7 +48,7 @@ def render_corrected(
         what = "layers" if request.layers else f"integrator {resolved.integrator}"
         rule = "light is corrected for a lens, nothing else"
         raise UsageError(f"beside {what}", parameter="correct", rule=rule, fix="leave one of them out")
-    correction = LensCorrection(display, bool(resolved.subpixels))
+    correction = LensCorrection(display, bool(resolved.subpixels), headroom)
     asked = replace(
         request,
         subpixels=bool(resolved.subpixels),

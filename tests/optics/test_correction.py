@@ -155,3 +155,26 @@ def test_other_displays_are_refused(name, what):
         display = replace(display, panel=replace(display.panel, subpixel_cells=((RGB_STRIPE, RGB_STRIPE),)))
     with pytest.raises(DisplayError, match=what):
         LensCorrection(display)
+
+
+def checks(display):
+    """Black and white fields, which leave a correction no room."""
+    rows, columns = np.indices((ROWS, display.panel.width)) // 10
+    return np.repeat(((rows + columns) % 2).astype(np.float32)[..., None], 3, axis=2)
+
+
+def test_headroom_lets_pixels_take_the_light_of_their_neighbours_away():
+    display = load_display(WIDE)
+    parts = [checks(display)] * len(parts_beside())
+    tight, roomy = LensCorrection(display), LensCorrection(display, headroom=0.1)
+    steps = [correction.step([(0, [parts])]) for correction in (tight, roomy)]
+    assert steps[1].gains["exact"] > steps[0].gains["exact"] + 0.5
+    limited = [np.mean((pixels <= 0.0) | (pixels >= 1.0)) for pixels in (tight.rows(parts), roomy.rows(parts))]
+    assert limited[1] < 0.7 * limited[0]
+    assert "headroom of 0.1" in steps[1].describe(limited[1])[1]
+
+
+def test_light_with_headroom_is_that_without_nearer_to_grey(solved):
+    display, correction, parts, _ = solved
+    roomy = LensCorrection(display, headroom=0.1)
+    np.testing.assert_allclose(roomy.rows(parts, 0, 0.0), 0.1 + 0.8 * correction.rows(parts, 0, 0.0), atol=1e-6)

@@ -74,14 +74,18 @@ class CorrectionStep:
         Decibels over the mean of a pixel's parts, of the light to eyes in the directions solved for: ``exact``, and
         ``radius``, ``thickness`` and ``index``, each the worse of 3 % more and less. Under slanted lenses these are
         upper bounds: a sub-pixel of the picture along true directions is narrower than the mean of its parts.
+    headroom:
+        That of the :class:`LensCorrection`.
     """
 
     share: float
     gains: dict[str, float]
+    headroom: float
 
     def describe(self, limited: float) -> tuple[dict[str, object], str]:
         """Metadata, and a line for people. ``limited`` is the share of values at black or white."""
         options: dict[str, object] = {"correct": "lens", "correction_share": self.share, "correction_limited": limited}
+        options["correction_headroom"] = self.headroom
         options |= {f"correction_gain_{name}": gain for name, gain in self.gains.items()}
         if self.share == 0.0:
             return options, (
@@ -92,13 +96,23 @@ class CorrectionStep:
         return options, (
             f"corrected for its lens: up to {self.gains['exact']:+.1f} dB in the directions solved for, "
             f"{self.gains[worst]:+.1f} dB where the lens's {worst} is {TOLERANCE:.0%} off; "
-            f"{limited:.0%} of the values at black or white"
+            f"{limited:.0%} of the values at black or white with a headroom of {self.headroom:g}"
         )
 
 
 @dataclass(frozen=True, eq=False)
 class LensCorrection:
     """The correction of pictures for a display with cylinders.
+
+    Parameters
+    ----------
+    display:
+        The display, with its lens.
+    subpixels:
+        Whether each colour of a pixel has a place of its own.
+    headroom:
+        How far above black and below white the light that is meant keeps, as a share of white: pixels between black
+        and white take more of their neighbours' light away then.
 
     Raises
     ------
@@ -108,6 +122,7 @@ class LensCorrection:
 
     display: Display
     subpixels: bool = False
+    headroom: float = 0.0
 
     def __post_init__(self) -> None:
         Lens.of(self.display)
@@ -131,7 +146,7 @@ class LensCorrection:
         ``parts`` is the light that is meant, one such array for each part of a pixel. Light is linear, with white at 1.
         ``share`` is that of a :class:`CorrectionStep`; 1 is least squares.
         """
-        meant = _clipped(parts)
+        meant = self._meant(parts)
         plain: Floats = np.asarray(np.mean(meant, axis=0, dtype=np.float32))
         if share == 0.0:
             return plain
@@ -144,7 +159,7 @@ class LensCorrection:
 
         ``first`` is the number of the first row.
         """
-        goal = self._rows.light_meant(_clipped(parts), first)
+        goal = self._rows.light_meant(self._meant(parts), first)
         return [float(np.nanmean((light - goal) ** 2)) for light in self._rows.eyes(self.display)(pictures, first)]
 
     def step(self, bands: Sequence[tuple[int, Sequence[Sequence[Floats]]]]) -> CorrectionStep:
@@ -174,7 +189,7 @@ class LensCorrection:
             plain = [self.rows(half, first, 0.0) for half in halves]
             solved = [self.rows(half, first) for half in halves]
             exchanged = [halves[part % len(halves)][part] for part in range(len(halves[0]))]
-            goals = [self._rows.light_meant(_clipped(half), first) for half in (*halves, exchanged)]
+            goals = [self._rows.light_meant(self._meant(half), first) for half in (*halves, exchanged)]
             inside = np.isfinite(goals[0])
             *goals, goal = (goal[inside] for goal in goals)
             pictures.append((first, [*plain, *solved], inside, goals))
@@ -213,7 +228,12 @@ class LensCorrection:
             return 10.0 * float(np.log10(max(plain, _ROUNDING) / max(error, _ROUNDING)))
 
         gains = {name: min(map(gain, pair)) for name, pair in others.items()}
-        return CorrectionStep(share, {"exact": gain(parabola(own)), **gains})
+        return CorrectionStep(share, {"exact": gain(parabola(own)), **gains}, self.headroom)
+
+    def _meant(self, parts: Sequence[Floats]) -> Floats:
+        """Light that is meant ``(parts, rows, width, 3)``, as far from black and white as the headroom wants."""
+        low = np.float32(self.headroom)
+        return low + (1 - 2 * low) * np.stack([np.clip(part, 0.0, 1.0) for part in parts])
 
     @cached_property
     def _rows(self) -> _UprightRows | SlantedRows:
@@ -226,11 +246,6 @@ class LensCorrection:
 def _crossed(lights: Sequence[Real], goals: Sequence[Real]) -> float:
     """The light of two halves and what is meant by the other one: what cross-fitting takes from ``|W x|^2``."""
     return float(lights[0] @ goals[-1] + lights[-1] @ goals[0] - goals[0] @ goals[-1])
-
-
-def _clipped(parts: Sequence[Floats]) -> Floats:
-    """``(parts, rows, width, 3)`` between black and white."""
-    return np.stack([np.clip(part, 0.0, 1.0) for part in parts])
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,6 +60,7 @@ def write_interlaced(
     lenses: Lenses = "along",
     choice: ViewChoice = "linear",
     correct: Correction = "none",
+    headroom: float = 0.0,
     scene: str = "",
     finish: Finish = NO_FINISH,
     progress: ProgressCallback = silent,
@@ -81,7 +82,7 @@ def write_interlaced(
         ``along``: lens axes upright; ``across``: lying.
     choice:
         ``nearest``: one view per sub-pixel; ``linear``: a mixture of two.
-    correct:
+    correct, headroom:
         As for :func:`~lippmann.quilts.weave.weave`, with lenses along.
     scene:
         Name for the provenance.
@@ -113,7 +114,7 @@ def write_interlaced(
     if across and correct != "none":
         raise UsageError("is for upright lenses", parameter="correct", fix='use lenses="along"')
     whole = replace(display, sheet=None)  # no part of which is cut off: the photographs cover it
-    weaving = Weaving(photos.quilt, whole, choice, correct)
+    weaving = Weaving(photos.quilt, whole, choice, correct, headroom)
     options, notes = weaving.describe_correction()
     finished = replace(finish, profile=Profile(name_of(photos.icc), photos.icc) if photos.icc else None).display(
         display

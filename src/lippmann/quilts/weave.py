@@ -27,6 +27,7 @@ from lippmann.image.metadata import Metadata
 from lippmann.image.stored_values import FloatArray
 from lippmann.image.write import write_rows
 from lippmann.options.choices import Correction
+from lippmann.options.correction import check_correction
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import Quilt
 from lippmann.runtime.engine_lock import cached_property
@@ -50,6 +51,7 @@ def weave(
     *,
     choice: ViewChoice = "linear",
     correct: Correction = "none",
+    headroom: float = 0.0,
     scene: str = "",
     progress: ProgressCallback = silent,
 ) -> IntegralImage:
@@ -66,6 +68,8 @@ def weave(
         views. Within a view, colours are interpolated between pixels in either case.
     correct:
         ``lens``: the pixels whose light through the display's real lenses comes nearest to the views.
+    headroom:
+        How far above black and below white a corrected picture's light is to keep, as a share of white: 0 to 0.25.
     scene:
         Name of the scene, for the provenance.
     progress:
@@ -74,7 +78,7 @@ def weave(
     Raises
     ------
     UsageError
-        If the choice is unknown.
+        If the choice or the correction is unknown, or the headroom out of range or without a correction.
     PictureError
         If the display is not lenticular, or the quilt has another aspect ratio than its panel.
 
@@ -88,7 +92,7 @@ def weave(
     (8, 16, 3)
     """
     check_weave(quilt, display, choice)
-    weaving = Weaving(quilt, display, choice, correct)
+    weaving = Weaving(quilt, display, choice, correct, headroom)
     options, notes = weaving.describe_correction()
     width, height = display.panel.width, display.panel.height
     pixels = np.empty((height, width, 3), dtype=np.float32)
@@ -107,6 +111,7 @@ def weave_to_file(
     *,
     choice: ViewChoice = "linear",
     correct: Correction = "none",
+    headroom: float = 0.0,
     scene: str = "",
     bits: int | None = None,
     finish: Finish = NO_FINISH,
@@ -116,7 +121,7 @@ def weave_to_file(
 
     Parameters
     ----------
-    quilt, display, choice, correct, scene, progress:
+    quilt, display, choice, correct, headroom, scene, progress:
         As for :func:`weave`, with its errors.
     path:
         The TIFF or Zarr file.
@@ -135,7 +140,7 @@ def weave_to_file(
         If the format is not TIFF or Zarr or has no such bits, or the file cannot be written.
     """
     check_weave(quilt, display, choice)
-    weaving = Weaving(quilt, display, choice, correct)
+    weaving = Weaving(quilt, display, choice, correct, headroom)
     options, notes = weaving.describe_correction()
     step = _rows_at_a_time(quilt, display)
 
@@ -163,6 +168,10 @@ class Weaving:
     display: Display
     choice: ViewChoice
     correct: Correction = "none"
+    headroom: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_correction(self.correct, self.headroom)
 
     def rows(self, first: int, last: int) -> FloatArray:
         """Rows ``first`` to before ``last``, ``(rows, width, 3)`` float32 linear RGB."""
@@ -201,7 +210,7 @@ class Weaving:
             return None
         from lippmann.optics.correction import LensCorrection, judged_rows
 
-        correction = LensCorrection(self.display, self._has_subpixels)
+        correction = LensCorrection(self.display, self._has_subpixels, self.headroom)
         bands = judged_rows(self.display.panel.height)
         return correction, correction.step([(rows.start, [self._parts(rows.start, rows.stop)]) for rows in bands])
 

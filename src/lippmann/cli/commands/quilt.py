@@ -246,6 +246,7 @@ def weave(
     ] = "linear",
     fit: FitOption = None,
     correct: options.Correct = "none",
+    headroom: options.Headroom = 0.0,
     layout: Layout = None,
     aspect: Aspect = None,
     bits: options.Bits = None,
@@ -278,7 +279,8 @@ def weave(
         if fit is not None or source.is_dir():  # a quilt of another shape is refused, unless a fit is asked for
             views, cropped = fit_views(views, trim.width / trim.height, fit or "cover")
             console.remark(*fit_note(cropped, fit))
-        asked: dict[str, Any] = {"choice": choice, "correct": correct, "scene": source.stem, "progress": progress}
+        how: dict[str, Any] = {"choice": choice, "correct": correct, "headroom": headroom, "scene": source.stem}
+        asked = {**how, "progress": progress}
         if width * height > LARGE and can_be_banded(name):
             notes = weave_to_file(views, target, output, bits=bits, finish=finish, **asked)
         else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -65,6 +66,7 @@ def render(
     maps: Maps = None,
     resume: Resume = False,
     correct: options.Correct = "none",
+    headroom: options.Headroom = 0.0,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     *,
@@ -99,12 +101,14 @@ def render(
     source = SceneSource(scene, asked, light, access)
     rendered: Callable[..., IntegralImage] = render_picture
     traced = target
-    if correct == "lens":
+    if correct != "none" or headroom:
         from lippmann.corrected import finer_display, render_corrected
+        from lippmann.options.correction import check_correction
 
+        check_correction(correct, headroom)
         if moving or maps is not None:
             _refuse_correction("frames" if moving else "--maps", "leave one of them out")
-        rendered, traced = render_corrected, finer_display(target)
+        rendered, traced = partial(render_corrected, headroom=headroom), finer_display(target)
     on_cluster = bool(on)
     if moving:
         from lippmann.cli.commands.cluster import runner_of

@@ -52,7 +52,7 @@ MANY = 24
 #: Key of a context in which help shows all options.
 ALL = "lippmann.all_options"
 #: Parameters beside the options of :mod:`lippmann.options` that the first help leaves out.
-_RARE = frozenset({"as_json", "correct", "quiet", "bits", "maps", "resume"})
+_RARE = frozenset({"as_json", "correct", "headroom", "quiet", "bits", "maps", "resume"})
 
 #: Commands that may write over what they read: the page of a calibration refines a display's file.
 _MAY_CHANGE = frozenset({"page"})

@@ -29,6 +29,15 @@ Correct = Annotated[
         rich_help_panel="Display",
     ),
 ]
+Headroom = Annotated[
+    float,
+    typer.Option(
+        "--headroom",
+        help="Keep a corrected picture's light so far from black and white, a share of white: 0 to 0.25. Room for the "
+        "correction, at the price of contrast.",
+        rich_help_panel="Display",
+    ),
+]
 Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write; its ending names the format.")]
 OptionalOutput = Annotated[
     Path | None,
