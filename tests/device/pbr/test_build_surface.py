@@ -515,6 +515,16 @@ def test_normal_map_follows_the_picture(build, look, parts, uv, expected):
     np.testing.assert_allclose(seen, [expected] * 2, atol=1e-5)
 
 
+@pytest.mark.parametrize("normal", [(0.0, 0.0, -0.4), (0.3, 0.2, -0.2)])
+def test_normals_of_a_map_never_point_into_the_surface(build, look, parts, normal):
+    """Ringing of a compressed map leaves such texels; light was NaN there."""
+    material = Material(base_color=(0.5, 0.5, 0.5), roughness=0.1, normal_texture=normal_texture(normal))
+    built = build(parts.describe([parts.square()], [material]))
+    seen = look.attribute(built, "normal", [0.1, -0.4], [0.1, 0.3])
+    assert (seen[:, 2] > 0).all()
+    assert np.isfinite(look.picture(built, size=4, samples=16, depth=2)).all()
+
+
 def test_normal_scale(build, look, parts):
     material = Material(normal_texture=normal_texture(TILT), normal_scale=0.5)
     expected = TILT * [0.5, 0.5, 1]

@@ -121,7 +121,8 @@ def mapped_normal(normal_map: NormalMap | None, place: Place, flip: Float) -> Ve
     tx, ty, up = _tangent(place, normal_map.tangents)
     scale = normal_map.scale.eval(place)
     x, y = texel.x * scale * flip, texel.y * scale * up * flip
-    n = dr.normalize(mi.Vector3f(x * tx - y * ty, x * ty + y * tx, texel.z))
+    # No normal points into the surface; blue below the middle is an error of the map, such as one of its compression.
+    n = dr.normalize(mi.Vector3f(x * tx - y * ty, x * ty + y * tx, dr.maximum(texel.z, _GRAZING)))
     # A normal that faces away from the viewer cannot be seen; its mirror image about z can.
     away = n.x * si.wi.x + n.y * si.wi.y + n.z * dr.abs(si.wi.z) <= 0
     return mi.Vector3f(dr.select(away, -n.x, n.x), dr.select(away, -n.y, n.y), n.z)
