@@ -167,7 +167,7 @@ def test_a_time_too_short_for_two_samples_gives_one_and_says_so(lippmann, engine
     assert done.code == 0
     assert (done.json["spp"], done.json["estimate"]) == (1, None)
     assert "there was time for one sample per pixel only" in done.err
-    assert "s instead of --max-time 0.001: 1 sample per pixel and what belongs to it take that long" in done.err
+    assert "s instead of --max-time 0.001: a picture of 1 sample per pixel takes that long" in done.err
     in_time = lippmann("render", "teapot", "--display", small, "--max-time", 600, "--quality", 5, *words[2:])
     assert (in_time.code, "instead of" in in_time.err) == (0, False)
 

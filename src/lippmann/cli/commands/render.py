@@ -224,7 +224,7 @@ def _overtime(image: IntegralImage, max_time: float | None) -> str:
     if max_time is None or seconds <= 1.1 * max_time:
         return ""
     samples = samples_in_words(image.provenance.spp)
-    return f"{seconds:.1f} s instead of --max-time {max_time:g}: {samples} and what belongs to it take that long"
+    return f"{seconds:.1f} s instead of --max-time {max_time:g}: a picture of {samples} takes that long"
 
 
 def _with_seconds(image: IntegralImage, **seconds: float) -> IntegralImage:
