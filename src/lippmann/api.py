@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 
 from lippmann.display import Display, load_display
 from lippmann.display.sheet_layout import with_bleed
+from lippmann.errors import UsageError
 from lippmann.options.choices import Correction
 from lippmann.options.forms import LEFT_OUT
 from lippmann.options.light import LightOptions
@@ -191,20 +192,30 @@ def preview(
     scene: Scene | object,
     size: tuple[int, int] = (512, 512),
     *,
+    display: Display | str | Path | None = None,
+    eye: tuple[float, float, float] | None = None,
+    placement: PlacementOptions | Placement | Mapping[str, object] | None = None,
     camera: str | None = None,
     progress: ProgressCallback | None = None,
     **options: Unpack[RenderKeywords],
 ) -> Preview:
-    """Render the plain picture that a camera of the scene sees. Calls of other threads wait, as of :func:`render`.
+    """Render what a display will show to an eye, or without one the plain picture that a camera of the scene sees.
+
+    Calls of other threads wait, as of :func:`render`.
 
     Parameters
     ----------
     scene, progress:
         As for :func:`render`.
     size:
-        Width and height in pixels. Default 512 x 512.
+        Width and height in pixels, which a display's picture keeps to. Default 512 x 512.
+    display, placement:
+        The display and where it stands in the scene, as for :func:`render`. Default None: no display.
+    eye:
+        The eye's place ``(x, y, z)`` before a display in mm, as for :meth:`IntegralImage.replay`. By default in front
+        of the middle.
     camera:
-        A camera of the scene by name; None takes the first, or one that frames a scene without any.
+        Without a display: a camera of the scene by name; None takes the first, or one that frames a scene without any.
     **options:
         As of :func:`render`.
 
@@ -222,11 +233,29 @@ def preview(
     --------
     >>> lippmann.preview("teapot", (16, 8), integrator="normal").pixels.shape
     (8, 16, 3)
+    >>> lippmann.preview("teapot", (16, 16), display="seed-lenticular", integrator="normal").pixels.shape
+    (16, 16, 3)
     """
-    from lippmann.rendering.preview import render_preview
+    request = _request(placement, options)
+    if display is None:
+        from lippmann.rendering.preview import render_preview
 
+        if eye is not None or placement is not None:
+            what = "eye" if eye is not None else "placement"
+            raise UsageError("there is no display", parameter=what, fix=f"add display=, or leave {what} out")
+        with show_progress(progress) as report:
+            return render_preview(_scene(scene), camera, size, request, report)
+
+    from lippmann.rendering.live.eye_preview import render_eye_preview
+    from lippmann.viewing.replay import checked_eye, checked_size, default_eye
+
+    if camera is not None:
+        fix = f'use placement={{"camera": {camera!r}}}'
+        raise UsageError("a display stands before it", parameter="camera", fix=fix)
+    target, within = _display(display), checked_size(size)
+    at = default_eye(target) if eye is None else checked_eye(eye)
     with show_progress(progress) as report:
-        return render_preview(_scene(scene), camera, size, RenderRequest.of(options), report)
+        return render_eye_preview(_scene(scene), target, at, request, within, report)
 
 
 @takes(QualityOptions, MachineOptions, without=LEFT_OUT["quilt"])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import lippmann
+from lippmann.errors import UsageError
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -21,3 +22,29 @@ def test_noise_is_taken_out_where_that_is_asked_for():
     assert clean.provenance.options["denoise_effort"] == "fast"
     assert clean.provenance.seconds["denoise"] > 0
     assert np.mean((clean.pixels - many) ** 2) < 0.5 * np.mean((noisy.pixels - many) ** 2)
+
+
+def test_a_display_shows_what_its_whole_picture_shows_to_the_eye():
+    small = lippmann.load_display("seed-lenticular").resized(96, 64)
+    exact = {"integrator": "albedo", "spp": 1, "pixel_filter": "point", "placement": {"turn": 20}}
+    eye = (30.0, 0.0, 600.0)
+    shown = lippmann.preview("teapot", (48, 48), display=small, eye=eye, **exact).pixels
+    replayed = lippmann.render("teapot", small, method="full", **exact).replay(eye, size=(48, 32), filter="nearest")
+    assert shown.shape == (32, 48, 3)
+    assert (np.abs(shown - replayed).max(axis=2) > 1e-4).mean() < 0.02
+    assert replayed.std() > 0.05
+    assert np.abs(shown - lippmann.preview("teapot", (48, 48), display=small, **exact).pixels).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("options", "what"),
+    [
+        ({"eye": (0.0, 0.0, 500.0)}, "eye: there is no display"),
+        ({"placement": {"turn": 20}}, "placement: there is no display"),
+        ({"display": "seed-lenticular", "camera": "main"}, "camera: a display stands before it"),
+        ({"display": "seed-lenticular", "eye": (0.0, 0.0, -5.0)}, "in front of the lens plane"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(options, what):
+    with pytest.raises(UsageError, match=what):
+        lippmann.preview("teapot", (16, 16), **options)
