@@ -110,6 +110,7 @@ def test_show_serves_the_picture_until_it_is_ended(tmp_path, number):
             "name": "d",
             "live": None,
             "corner": None,
+            "camera": 500.0,
         }
         assert len(fetch(f"{address}pictures/0/tiles/picture/0_0")) == 3 * 32 * 24
         code, err = interrupted(process, number)

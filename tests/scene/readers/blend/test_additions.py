@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from lippmann.scene.extreme_points import extreme_points_of
 
-from lippmann.scene.extent import bounds_of
+from lippmann.scene.extent import bounds_of, extreme_points_of
 from lippmann.scene.readers.blend.in_blender.additions import (
     add_default_material,
     add_focus,
