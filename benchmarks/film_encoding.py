@@ -148,7 +148,7 @@ before; and what the encoder holds while it waits for the next frame.
             for name, title in (("still", "a still"), ("frames", "frames alone"), ("film", "frames and film"))
         )
         shares = ", ".join(
-            f"{1 + row['waiting'][str(COUNTS[-1])] / most['still']:.2f} with `{codec}`"
+            f"{(most['frames'] + row['waiting'][str(COUNTS[-1])]) / most['still']:.2f} with `{codec}`"
             for codec, row in result["codecs"].items()
         )
         text += f"""
@@ -162,7 +162,7 @@ after the other, medians of {len(measured["film"])}; the film is H.264.
 The film takes {median_ratio(wall["film"], wall["frames"]):.3f} times as long as the frames alone and
 {median_ratio(cpu["film"], cpu["frames"]):.3f} times as much processor time; its largest memory is
 {median_ratio(peak["film"], peak["still"]):.2f} times a still's.
-With what encoders hold while they wait, a still takes, by addition,
+Frames alone and what an encoder holds while it waits are, by addition, so many times a still's:
 {shares}.
 """
     return text
