@@ -423,9 +423,9 @@ WALK = (
 )
 
 #: How large the centre of the program may be. Raised by hand alone, and only where a user is worth it.
-MOST_LINES = 14_400
+MOST_LINES = 14_380
 MOST_CONSTANTS = 119
-MOST_BRANCHES = 185
+MOST_BRANCHES = 184
 #: Files of which a default render calls a function, and calls from a file to one of a part above its own.
 MOST_FILES = 96
 MOST_CLIMBING = 4
