@@ -177,6 +177,8 @@ def test_what_cannot_be_woven_is_refused():
         weave(quilt, Display("mla", Panel(20, 20, 0.1), LensArray("square", 0.5), 1.0))
     with pytest.raises(UsageError, match="unknown choice of views 'cubic'; known are nearest, linear"):
         weave(quilt, SHEETS[0], choice="cubic")
+    with pytest.raises(DisplayError, match="elf-sr takes no native pixels"):
+        weave(quilt, load_display("elf-sr"))
     other = Quilt(quilt.pixels, QuiltLayout(2, 1, 0.75))
     with pytest.raises(PictureError, match=r"the aspect 0\.75; the display straight has 1\.6"):
         weave(other, SHEETS[1])

@@ -344,6 +344,7 @@ def check_weave(quilt: Quilt, display: Display, choice: str) -> None:
     """Raise the errors of :func:`weave`."""
     if choice not in get_args(ViewChoice):
         raise UsageError.unknown("choice of views", choice, get_args(ViewChoice))
+    display.check_native()
     _check_fit(quilt, display)
 
 

@@ -90,7 +90,7 @@ def interlace(
     check_interlaced_path(output)
     across = lenses == "across"
     target, asked_finish = sheet_of(_display(display, printed, turned=across), replace(finishing, icc=icc))
-    target.check_native()
+    target.check_native()  # before the photographs are read
     finish = asked_finish or NO_FINISH
     paths, of_grid = line_of_grid(natural_order(_pictures(photos)), down=across)
     if reverse:

@@ -268,7 +268,7 @@ def weave(
     console, output = Console(quiet, as_json), output_of(output, source, "-native.png")
     name, stored = check_output(output, bits)
     target, asked_finish = sheet_of(load_display(display), finishing)
-    target.check_native()
+    target.check_native()  # before the views are read
     finish = asked_finish or NO_FINISH
     finish.check_stored(stored, output)
     panel, trim = finish.display(target).panel, trim_of(target)
