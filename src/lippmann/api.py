@@ -247,13 +247,13 @@ def preview(
             return render_preview(_scene(scene), camera, size, request, report)
 
     from lippmann.rendering.live.eye_preview import render_eye_preview
-    from lippmann.viewing.replay import checked_eye, checked_size, default_eye
+    from lippmann.viewing.replay import checked_size, eye_before
 
     if camera is not None:
         fix = f'use placement={{"camera": {camera!r}}}'
         raise UsageError("a display stands before it", parameter="camera", fix=fix)
     target, within = _display(display), checked_size(size)
-    at = default_eye(target) if eye is None else checked_eye(eye)
+    at = eye_before(target, eye)
     with show_progress(progress) as report:
         return render_eye_preview(_scene(scene), target, at, request, within, report)
 

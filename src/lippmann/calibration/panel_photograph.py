@@ -40,8 +40,8 @@ _ROWS = 64
 _LONGEST, _LEAST = 1200, 100
 #: Share of the pattern's brightness below which there is no square.
 _DARK = 0.15
-#: Samples of the pattern along each axis, and of a block of them.
-_SAMPLES, _BLOCK = 512, 16
+#: Samples of the pattern along each axis, and of a block of them; share of the pattern beyond them on each side.
+_SAMPLES, _BLOCK, _EDGE = 512, 16, 0.03
 #: Share of full modulation below which no hue is told from grey. Blur and crosstalk of lenses leave more.
 _GREY = 0.12
 #: Bands that a camera which is not quite before the middle may see, and the range of its distance in that asked for.
@@ -132,12 +132,11 @@ def check_photograph(codes: Pixels, display: Display, distance: float) -> PanelC
     _check_lenses(display)
     step = max(1, math.ceil(max(codes.shape[:2]) / _LONGEST))
     light = _reduced(decode_srgb(codes[..., :3].astype(np.float32) / 255.0).astype(np.float64), step)
-    quad = _pattern_corners(light)
-    values = _sampled(light, _homography(quad))
-    black = np.median(_sampled(light, _homography(quad), _ring(display)), axis=(0, 1))
-    colors, first, is_mirrored = _squares_at(
-        light - black, quad, display, float(np.median((values - black).max(axis=-1)))
-    )
+    matrix = _homography(_pattern_corners(light))
+    values = _sampled(light, matrix, _inside())
+    black = np.median(_sampled(light, matrix, _ring(display)), axis=(0, 1))
+    brightness = float(np.median((values - black).max(axis=-1)))
+    colors, first, is_mirrored = _squares_at(light - black, matrix, display, brightness)
     if is_mirrored or first != 0:
         how = "mirrored" if is_mirrored else "upside down" if first == 2 else "turned by 90 degrees"
         return PanelCheck(False, None, None, f"The picture is {how} on the panel: no pixel is in its own place.")
@@ -202,13 +201,16 @@ def _homography(quad: Real) -> Real:
     return np.append(np.linalg.solve(np.array(rows), quad.ravel()), 1.0).reshape(3, 3)
 
 
-def _sampled(light: Real, matrix: Real, points: Real | None = None) -> Real:
-    """Values of the photograph at points ``(n, m, 2)`` of the unit square; without them its inside, all over."""
+def _inside() -> Real:
+    """Points all over the pattern but for its edges."""
+    at = np.linspace(_EDGE, 1 - _EDGE, _SAMPLES)
+    return np.stack(np.meshgrid(at, at), axis=-1)
+
+
+def _sampled(light: Real, matrix: Real, points: Real) -> Real:
+    """Values of the photograph at points ``(n, m, 2)`` of the unit square."""
     from scipy import ndimage
 
-    if points is None:
-        at = np.linspace(0.03, 0.97, _SAMPLES)
-        points = np.stack(np.meshgrid(at, at), axis=-1)
     x, y, w = np.moveaxis(np.concatenate([points, np.ones((*points.shape[:-1], 1))], axis=-1) @ matrix.T, -1, 0)
     place = [y / w, x / w]
     return np.stack(
@@ -232,7 +234,7 @@ def _ring(display: Display) -> Real:
     return np.stack([np.stack(side, axis=-1) for side in sides])
 
 
-def _squares_at(light: Real, quad: Real, display: Display, brightness: float) -> tuple[Real, int, bool]:
+def _squares_at(light: Real, matrix: Real, display: Display, brightness: float) -> tuple[Real, int, bool]:
     """The four squares' colours in the order of :data:`_SQUARES`, the corner of the first, and whether they run back.
 
     ``brightness`` is the pattern's. A picture that is turned by 90 degrees fills the panel, frame and all.
@@ -244,7 +246,7 @@ def _squares_at(light: Real, quad: Real, display: Display, brightness: float) ->
         place, around = (frame - square / 2) / np.array(sides), np.linspace(-0.25, 0.25, 5) * square
         points = np.where(_CORNERS > 0, 1 + place, -place)
         grid = np.stack(np.meshgrid(around / sides[0], around / sides[1]), axis=-1).reshape(1, -1, 2)
-        return np.asarray(np.median(_sampled(light, _homography(quad), points[:, None] + grid), axis=1))
+        return np.asarray(np.median(_sampled(light, matrix, points[:, None] + grid), axis=1))
 
     upright, turned = seen((width, height)), seen((height, width))
     colors = max(upright, turned, key=lambda each: float(each.max(axis=-1).min()))
@@ -277,7 +279,7 @@ def _phasor(values: Real, squares: Real) -> NDArray[np.complex128]:
 def _judge(phasor: NDArray[Any], display: Display, distance: float) -> PanelCheck:
     """The result of the phases all over the pattern."""
     width, height, _ = _margins(display)
-    covered = 0.94 * np.array([width, height]) * display.panel.pixel_pitch
+    covered = (1 - 2 * _EDGE) * np.array([width, height]) * display.panel.pixel_pitch
     angle = math.radians(display.lens_array.slant) if display.lens_array.layout == "lenticular" else 0.0
     lenses = covered * (math.cos(angle), math.sin(angle)) / (display.lens_array.pitch * display.magnification)
     bands, modulation, middle = _largest_component(phasor)

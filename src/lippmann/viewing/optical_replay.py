@@ -17,7 +17,7 @@ from lippmann.image.stored_values import FloatArray
 from lippmann.optics.eye_light import EyeLight, eye_light, panel_frame
 from lippmann.runtime.machine import usable_cores
 from lippmann.runtime.row_threads import Bands
-from lippmann.viewing.replay import Eye, Real, checked_eye, checked_size, default_eye, default_size
+from lippmann.viewing.replay import Eye, Real, checked_size, default_size, eye_before
 
 #: Diameter of an eye's pupil in mm, indoors.
 PUPIL = 4.0
@@ -48,7 +48,7 @@ def replay_optics(
         The eye is not in front of the lens plane, or a number is out of range.
     """
     display = image.display
-    eye = checked_eye(default_eye(display) if eye is None else eye)
+    eye = eye_before(display, eye)
     width, height = checked_size(default_size(display) if size is None else size)
     if not 0.0 <= pupil <= 20.0:
         raise UsageError(f"{pupil:g} mm", parameter="pupil", rule="a pupil is 0 to 20 mm wide")

@@ -17,7 +17,7 @@ from lippmann.display import Display
 from lippmann.errors import PictureError, UsageError
 from lippmann.image.stored_values import FloatArray
 from lippmann.quilts.quilt import Quilt
-from lippmann.viewing.replay import Eye, Real, checked_eye, checked_size, default_eye, eye_of_offset, lens_plane_points
+from lippmann.viewing.replay import Eye, Real, checked_size, eye_before, eye_of_offset, lens_plane_points
 
 #: Default limit on the width of a picture, in pixels.
 _WIDEST = 2048
@@ -67,7 +67,7 @@ def replay_quilt(
     UsageError
         If the eye is not in front of the lens plane, or the size is out of range.
     """
-    eye = checked_eye(default_eye(display) if eye is None else eye)
+    eye = eye_before(display, eye)
     width, height = checked_size(_default_size(quilt, display) if size is None else size)
     lattice, count = display.lattice, quilt.layout.views
     convergence = 1 / display.viewing_distance if math.isfinite(display.viewing_distance) else 0.0

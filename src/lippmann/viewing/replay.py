@@ -78,7 +78,7 @@ def replay(
     UsageError
         If the eye is not in front of the lens plane, the size is out of range, or the filter is unknown.
     """
-    eye = checked_eye(default_eye(image.display) if eye is None else eye)
+    eye = eye_before(image.display, eye)
     width, height = checked_size(default_size(image.display) if size is None else size)
     if filter not in get_args(Filter):
         raise UsageError.unknown("filter", filter, get_args(Filter))
@@ -147,6 +147,11 @@ def default_eye(display: Display) -> Eye:
     across = 0 if display.lens_array.layout == "lenticular" else 1
     extent = max(display.size_mm[: across + 1])
     return 0.0, 0.0, 1.5 * extent / (2 * math.tan(half_field))
+
+
+def eye_before(display: Display, eye: Eye | None) -> Eye:
+    """``eye`` before a display, checked as by :func:`checked_eye`; by default :func:`default_eye`."""
+    return checked_eye(default_eye(display) if eye is None else eye)
 
 
 def eye_of_offset(display: Display, right: float, down: float) -> Eye:
