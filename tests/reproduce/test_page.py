@@ -98,9 +98,11 @@ def test_the_page_fits_a_phone_and_follows_the_readers_light(page):
 
 
 def test_every_picture_is_inside_with_its_size_and_a_text(reader):
-    assert len(reader.pictures) == 2 * 4 + 2 * 2 + 2  # parts, scenes, errors
-    for picture in reader.pictures:
-        assert picture["alt"]
+    assert all(picture["alt"] for picture in reader.pictures)
+    pictures = [picture for picture in reader.pictures if "svg" not in picture["src"][:20]]
+    assert len(pictures) == 2 * 4 + 2 * 2 + 2  # parts, scenes, errors
+    assert len(reader.pictures) == len(pictures) + 2  # charts
+    for picture in pictures:
         data = base64.b64decode(picture["src"].partition(",")[2])
         assert struct.unpack(">II", data[16:24]) == (int(picture["width"]), int(picture["height"]))
 

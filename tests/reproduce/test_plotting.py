@@ -9,22 +9,20 @@ import sys
 import matplotlib
 import pytest
 
-from lippmann.reproduce import charts
-from lippmann.reproduce.charts import Axis, Mark
+from lippmann.reproduce.charts import Series, chart
 
 DRAW = """
 import locale, os, sys
 from pathlib import Path
 here = os.getcwd()
-from lippmann.reproduce import charts
-from lippmann.reproduce.charts import Axis, Mark
+from lippmann.reproduce.charts import Series, chart
 assert "matplotlib" not in sys.modules
-chart = charts.scatter([Mark(1, 2, "square", "a", "m")], Axis([0, 5], "x"), Axis([0, 5], "y"), title="t")
+drawn = chart([Series([(1, 2)], "s", "red", "m")], ("x", "y"), title="t")
 import matplotlib
 assert os.getcwd() == here
 assert locale.setlocale(locale.LC_NUMERIC) == "C"
 assert not matplotlib.rcParams["text.usetex"]
-Path("chart.svg").write_text(chart)
+Path("chart.svg").write_text(drawn)
 """
 
 #: Settings of a working folder: each would change the chart or the process, or end the import.
@@ -34,8 +32,8 @@ HOSTILE = {
 }
 
 
-def chart():
-    return charts.scatter([Mark(1, 2, "square", "a", "m")], Axis([0, 5], "x"), Axis([0, 5], "y"), title="t")
+def drawn():
+    return chart([Series([(1, 2)], "s", "red", "m")], ("x", "y"), title="t")
 
 
 @pytest.mark.long_cases("no text")
@@ -54,11 +52,11 @@ def test_settings_of_the_working_folder_are_not_read(tmp_path, settings):
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / "chart.svg").read_text() == chart()
+    assert (tmp_path / "chart.svg").read_text() == drawn()
 
 
 def test_settings_of_the_program_stay_its_own():
-    plain = chart()
+    plain = drawn()
     with matplotlib.rc_context({"svg.fonttype": "path", "xtick.bottom": False, "lines.linestyle": "--"}):
-        assert chart() == plain
+        assert drawn() == plain
         assert matplotlib.rcParams["svg.fonttype"] == "path"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import io
 import math
 import textwrap
 import warnings
@@ -21,7 +20,7 @@ from lippmann.optics.lens import Lens, Real
 from lippmann.optics.light_table import light_table
 from lippmann.optics.proof import Proof, edge_slope, is_print, zone_of
 from lippmann.runtime.atomic_write import check_writable, replacing
-from lippmann.runtime.plotting import plain_matplotlib
+from lippmann.runtime.plotting import plain_matplotlib, svg_of
 from lippmann.wording import html_table
 
 if TYPE_CHECKING:
@@ -77,14 +76,11 @@ def write_proof_page(proof: Proof, display: Display, path: Path) -> None:
 
 
 def _page(proof: Proof, figure: Figure) -> str:
-    drawing = io.StringIO()
-    figure.savefig(drawing, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
-    svg = drawing.getvalue()
     title = html.escape(f"Proof of {proof.display}")
     style = "body{font-family:sans-serif;max-width:60em;margin:2em auto}th,td{padding:.2em .8em;vertical-align:top}"
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title><style>{style}</style>'
-        f"<h1>{title}</h1>{html_table('', proof.in_words())}{svg[svg.index('<svg') :]}"
+        f"<h1>{title}</h1>{html_table('', proof.in_words())}{svg_of(figure)}"
         f"<p>Lippmann {VERSION}</p></html>\n"
     )
 

@@ -19,9 +19,9 @@ TITLE = "The paper's system, measured again"
 #: The manners whose figures stand at the top.
 _AT_THE_TOP = (Manner.PAPER, Manner.GLOSS)
 
-#: How a mark of the chart tells the manner by its shape and the method by its colour.
-_SHAPES = {Manner.PAPER: "circle", Manner.DEFAULT: "square", Manner.GLOSS: "triangle"}
-_COLORS = {"lens-view": "a", "interpolated": "b"}
+#: How a mark of a chart tells the manner by its shape and the method by its colour, in Matplotlib's words.
+_MARKS = {Manner.PAPER: "o", Manner.DEFAULT: "s", Manner.GLOSS: "^"}
+_COLORS = {"lens-view": "#2266b3", "interpolated": "#b8590a"}
 
 
 def report_page(results: Results) -> str:
@@ -197,47 +197,36 @@ def _quality(results: Results, scene: str) -> list[Markup]:
 
 
 def _lens_chart(results: Results, scene: str) -> Markup:
-    drawn, entries = [], []
-    level = printed.TEAPOT_PSNR if scene == printed.TEAPOT else None
-    values = [] if level is None else [level]
-    for manner, class_ in zip(_AT_THE_TOP, "ab", strict=True):
+    series = []
+    for manner, color in zip(_AT_THE_TOP, _COLORS.values(), strict=True):
         row = tables.comparison(results.of(scene, Variant("interpolated", manner).key)).paper.psnr[0].tolist()
-        values += row
-        drawn.append(charts.Line(list(enumerate(row)), class_, manner.value))
-        entries.append(("line", class_, manner.value))
-    columns = results.experiment.display.lens_grid.columns
-    x = charts.Axis([columns * k / 8 for k in range(9)], "Lens")
-    y = charts.Axis.around(values, "PSNR of the micro-image, dB")
-    chart = charts.lines(drawn, x, y, title=f"PSNR of every micro-image of the {scene}", level=level)
-    dashed = "" if level is None else f"Dashed: the paper's mean, {level:g} dB. "
-    note = f"{dashed}Gaps are micro-images without any error."
-    return joined(chart, charts.key(entries), paragraph(note, class_="soft"))
+        series.append(charts.Series(list(enumerate(row)), ".-", color, manner.value))
+    level = printed.TEAPOT_PSNR if scene == printed.TEAPOT else None
+    last = results.experiment.display.lens_grid.columns - 1
+    chart = charts.chart(
+        series,
+        ("lens", "PSNR of the micro-image, dB"),
+        title=f"PSNR of every micro-image of the {scene}",
+        dashed=() if level is None else [(0, level), (last, level)],
+    )
+    said = "" if level is None else f"Dashed: the paper's mean, {level:g} dB. "
+    return joined(chart, paragraph(f"{said}Gaps are micro-images without any error.", class_="soft"))
 
 
 def _ray_chart(results: Results) -> list[Markup]:
-    marks = []
-    for scene in results.runs:
-        for variant in COMPARED:
-            run = results.of(scene, variant.key)
-            said = (
-                f"{scene}, {variant.title}: {tables.percent(run.ray_share)} of the rays, "
-                f"{tables.percent(run.time_share)} of the time"
-            )
-            marks.append(charts.Mark(100 * run.ray_share, 100 * run.time_share, *_mark_style(variant), said))
-    x = charts.Axis.around([*(mark.x for mark in marks), 100], "Rays, share of full tracing's", " %", low=0)
-    y = charts.Axis.around([*(mark.y for mark in marks), 100], "Seconds, share of full tracing's", " %", low=0)
+    series = []
+    for variant in COMPARED:
+        assert variant.manner is not None
+        runs = [results.of(scene, variant.key) for scene in results.runs]
+        points = [(100 * run.ray_share, 100 * run.time_share) for run in runs]
+        series.append(charts.Series(points, _MARKS[variant.manner], _COLORS[variant.method], variant.title))
     text = (
         "Each mark is a scene rendered in one way. On the dashed line a ray saved is its time saved; above it, looking "
         "after points costs more than the rays they spare."
     )
-    chart = charts.scatter(marks, x, y, title="Share of rays against share of time")
-    return [paragraph(text), chart, charts.key([(*_mark_style(variant), variant.title) for variant in COMPARED])]
-
-
-def _mark_style(variant: Variant) -> tuple[str, str]:
-    """Shape and colour of a variant's marks."""
-    assert variant.manner is not None
-    return _SHAPES[variant.manner], _COLORS[variant.method]
+    titles = "rays, % of full tracing's", "seconds, % of full tracing's"
+    title = "Share of rays against share of time"
+    return [paragraph(text), charts.chart(series, titles, title=title, dashed=[(0, 0), (100, 100)])]
 
 
 def _gloss(results: Results) -> list[Markup]:

@@ -4,12 +4,12 @@ STYLE = """
 :root {
   color-scheme: light dark;
   --ground: #fbfaf8; --card: #ffffff; --ink: #1d2126; --soft: #5d656f; --rule: #dfdcd6;
-  --a: #2266b3; --b: #b8590a; --accent: #2266b3;
+  --accent: #2266b3;
 }
 @media (prefers-color-scheme: dark) {
   :root {
     --ground: #14171b; --card: #1b1f25; --ink: #e6e4df; --soft: #9aa3ad; --rule: #323841;
-    --a: #74b0f4; --b: #f0a35c; --accent: #74b0f4;
+    --accent: #74b0f4;
   }
 }
 * { box-sizing: border-box; }
@@ -48,19 +48,7 @@ colgroup + colgroup { border-left: 1px solid var(--rule); }
 thead .over th { border-bottom: 0; padding-bottom: 0; color: var(--ink); text-align: center; }
 thead th:first-child, tbody th { position: sticky; left: 0; background: var(--ground); }
 tbody th { font-weight: 400; }
-.chart { width: 100%; height: auto; max-width: 44rem; display: block; margin: 1rem 0 .5rem; }
-.chart text { fill: var(--soft); font-size: 13px; font-family: inherit; }
-.grid { stroke: var(--rule); }
-.diagonal { stroke: var(--soft); stroke-dasharray: 5 5; }
-.mark { stroke: var(--ground); stroke-width: 1.5; }
-.mark.a { fill: var(--a); } .mark.b { fill: var(--b); }
-.series { fill: none; stroke-width: 2; stroke-linecap: round; stroke-linejoin: round; }
-.series.a { stroke: var(--a); } .series.b { stroke: var(--b); }
-.key {
-  list-style: none; padding: 0; margin: .3rem 0 1rem; font-size: .9rem;
-  display: flex; flex-wrap: wrap; gap: .3rem 1.2rem;
-}
-.key li { display: flex; align-items: center; gap: .45rem; }
+.chart { max-width: 44rem; margin: 1rem 0 .5rem; }
 .figures {
   display: grid; grid-template-columns: repeat(auto-fill, minmax(min(24rem, 100%), 1fr)); gap: 1.2rem; margin: 1rem 0;
 }
@@ -74,7 +62,6 @@ summary { cursor: pointer; font-weight: 600; }
   h1 { font-size: 1.5rem; }
   .facts { grid-template-columns: 1fr 1fr; }
   .facts dd { font-size: 1.2rem; }
-  .chart text { font-size: 20px; }
 }
 @media print { body { max-width: none; } details { display: block; } }
 """

@@ -8,11 +8,16 @@ Matplotlib is imported from another folder.
 from __future__ import annotations
 
 import importlib.util
+import io
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: The file that Matplotlib reads its settings from.
 _SETTINGS = "matplotlibrc"
@@ -32,6 +37,14 @@ def plain_matplotlib(*, salt: str = "") -> Iterator[None]:
 
     with matplotlib.style.context(["default", {"svg.fonttype": "none", "svg.hashsalt": salt, "path.simplify": False}]):
         yield
+
+
+def svg_of(figure: Figure) -> str:
+    """The ``<svg>`` element of a figure, the same in every run."""
+    drawing = io.StringIO()
+    figure.savefig(drawing, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    text = drawing.getvalue()
+    return text[text.index("<svg") :]
 
 
 def import_matplotlib() -> None:
