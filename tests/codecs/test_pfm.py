@@ -57,5 +57,5 @@ def test_what_is_no_whole_pfm_is_refused_by_name(tmp_path, content, what):
 
 
 def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(PictureError, match=r"x\.pfm: not found"):
+    with pytest.raises(PictureError, match=r"x\.pfm: no such file"):
         read_pfm(tmp_path / "x.pfm")

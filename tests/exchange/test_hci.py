@@ -186,13 +186,13 @@ def resize(name):
 @pytest.mark.parametrize(
     ("change", "what"),
     [
-        (damage("parameters.cfg"), "parameters.cfg: not found"),
-        (damage("input_Cam004.png"), "input_Cam004.png: not found"),
+        (damage("parameters.cfg"), "parameters.cfg: no such file"),
+        (damage("input_Cam004.png"), "input_Cam004.png: no such file"),
         (damage("input_Cam004.png", b""), "input_Cam004.png: is empty"),
         (damage("input_Cam004.png", b"\x89PNG\r\n\x1a\n123"), "input_Cam004.png: this PNG is damaged"),
         (resize("input_Cam004.png"), "input_Cam004.png: has 9 x 9 pixels; the first view, input_Cam000.png, has 4 x 3"),
         (resize("input_Cam009.png"), "input_Cam009.png: is one view too many; parameters.cfg says 3 x 3 views"),
-        (damage("gt_depth_lowres_Cam007.pfm"), "gt_depth_lowres_Cam007.pfm: not found"),
+        (damage("gt_depth_lowres_Cam007.pfm"), "gt_depth_lowres_Cam007.pfm: no such file"),
         (damage("gt_disp_lowres.pfm", b"Pf\n4 3\n-1\n12"), "gt_disp_lowres.pfm: is cut short"),
         (
             lambda f: write_pfm(f / "gt_depth_lowres.pfm", np.zeros((2, 2), np.float32)),

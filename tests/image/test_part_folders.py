@@ -161,7 +161,7 @@ def change(folder, **changes):
 
 def test_a_missing_file_is_named(views):
     (views / "view_1_2.png").unlink()
-    with pytest.raises(PictureError, match=r"view_1_2.png: not found"):
+    with pytest.raises(PictureError, match=r"view_1_2.png: no such file"):
         compose(views)
 
 
@@ -223,9 +223,9 @@ def test_a_manifest_that_makes_no_sense_is_named(views, changes, message):
 
 
 def test_a_folder_without_a_manifest(tmp_path, views):
-    with pytest.raises(PictureError, match=r"lippmann.json: not found; give a folder written by"):
+    with pytest.raises(PictureError, match=r"lippmann.json: no such file; give a folder written by"):
         compose(tmp_path)
-    with pytest.raises(PictureError, match=r"lippmann.json: not found; give a folder written by"):
+    with pytest.raises(PictureError, match=r"lippmann.json: no such file; give a folder written by"):
         compose(views / MANIFEST)
     for content in (b"", b"{}", b"\xff\xfe", b"[]"):
         (views / MANIFEST).write_bytes(content)

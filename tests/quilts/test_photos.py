@@ -150,7 +150,7 @@ def test_what_is_no_photograph_is_named(tmp_path):
     first = save(tmp_path / "1.jpg", ramp(80, 40))
     with pytest.raises(PictureError, match=r"2\.jpg: is no picture"):
         read_photos([first, tmp_path / "2.jpg"], (20, 10), PAPER)
-    with pytest.raises(PictureError, match=r"3\.jpg: not found"):
+    with pytest.raises(PictureError, match=r"3\.jpg: no such file"):
         read_photos([first, tmp_path / "3.jpg"], (20, 10), PAPER)
     with pytest.raises(UsageError, match="at least 2"):
         read_photos([first], (20, 10), PAPER)

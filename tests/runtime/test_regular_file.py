@@ -5,8 +5,8 @@ import socket
 
 import pytest
 
-from lippmann.errors import SceneError
-from lippmann.runtime.regular_file import check_kind, other_kind
+from lippmann.errors import PictureError, SceneError
+from lippmann.runtime.regular_file import check_kind, other_kind, unreadable
 
 
 def test_files_and_nothing_are_no_other_kind(tmp_path):
@@ -38,3 +38,21 @@ def test_pointers_of_git_lfs_are_refused(tmp_path):
         check_kind(tmp_path / "model.glb", SceneError)
     (tmp_path / "long.obj").write_text(text + "#" * 1024)
     check_kind(tmp_path / "long.obj", SceneError)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("Pictur.png", "no such file; a picture; is 'picture.png' meant?"),
+        ("other.tif", "no such file; a picture"),
+        ("none/picture.png", "no such file; a picture; there is no folder '{folder}{sep}none'"),
+        ("picture.png/a.png", "no such file; a picture; there is no folder '{folder}{sep}picture.png'"),
+    ],
+)
+def test_a_missing_file_is_told_in_one_way(tmp_path, name, said):
+    (tmp_path / "picture.png").write_bytes(b"x")
+    path = tmp_path / name
+    with pytest.raises(OSError) as caught:
+        path.open()
+    line = str(unreadable(path, caught.value, PictureError, "a picture"))
+    assert line == f"{path}: {said.format(folder=tmp_path, sep=os.sep)}"

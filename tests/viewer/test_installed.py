@@ -131,4 +131,4 @@ def test_a_file_that_went_bad_is_said_on_the_page(installed, shot, open_tab, fat
         tab = open_tab().open(address)
         line = alert(tab)
         assert "shot.png" in line
-        assert {"damaged": "check sum", "gone": "not found", "foreign": "no picture"}[fate] in line
+        assert {"damaged": "check sum", "gone": "no such file", "foreign": "no picture"}[fate] in line

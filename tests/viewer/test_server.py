@@ -120,7 +120,7 @@ def test_a_file_that_is_gone_or_damaged_is_said(file):
     site = ViewerSite([PictureFile(file)])
     content = file.read_bytes()
     file.unlink()
-    with pytest.raises(PictureError, match=r"picture\.exr: not found"):
+    with pytest.raises(PictureError, match=r"picture\.exr: no such file"):
         get(site, "/pictures/0/manifest.json")
     file.write_bytes(content[: len(content) // 2])
     with pytest.raises(PictureError, match=r"picture\.exr"):

@@ -19,7 +19,7 @@ from lippmann.codecs.types import Pixels
 from lippmann.color.primaries import REC709, xyz_from_rgb
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import PictureError
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.regular_file import check_kind, unreadable
 
 if TYPE_CHECKING:
     from PIL import Image, ImageCms
@@ -101,7 +101,7 @@ def read_profile(path: Path) -> Profile:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise PictureError(f"cannot be read: {error.strerror}", where=str(path)) from None
+        raise unreadable(path, error, PictureError) from None
     try:
         colors = _opened(data).profile.xcolor_space.strip()
     except OSError:

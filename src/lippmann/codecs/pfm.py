@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import PictureError
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.regular_file import check_kind, unreadable
 
 _HEADER = re.compile(rb"(P[Ff])\s+(\d{1,9})\s+(\d{1,9})\s+(-?\d{1,9}(?:\.\d{1,9})?(?:[eE][-+]?\d{1,2})?)[ \t\r]*\n")
 
@@ -35,10 +35,8 @@ def read_pfm(path: Path) -> NDArray[np.float32]:
     try:
         check_kind(path, PictureError)
         content = path.read_bytes()
-    except FileNotFoundError:
-        raise PictureError("not found", where=str(path)) from None
     except OSError as error:
-        raise PictureError(f"cannot be read: {error.strerror}", where=str(path)) from error
+        raise unreadable(path, error, PictureError) from error
     header = _HEADER.match(content)
     if header is None:
         raise PictureError("is no PFM", where=str(path), rule="it begins with Pf, width and height, and a scale")

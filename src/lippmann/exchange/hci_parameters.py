@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import PictureError
 from lippmann.exchange.cameras import Cameras
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.regular_file import check_kind, unreadable
 
 NAME = "parameters.cfg"
 
@@ -107,10 +107,8 @@ def read_parameters(path: Path) -> Parameters:
         if len(text) > _LONGEST or max(map(len, text.splitlines()), default=0) > _LONGEST_LINE:
             raise PictureError("is no list of parameters", where=str(path), rule="it and its lines are short")
         parser.read_string(text)
-    except FileNotFoundError:
-        raise PictureError("not found", where=str(path)) from None
     except OSError as error:
-        raise PictureError(f"cannot be read: {error.strerror}", where=str(path)) from error
+        raise unreadable(path, error, PictureError) from error
     except (configparser.Error, UnicodeDecodeError):
         raise PictureError("is no list of parameters", where=str(path), rule="it is an INI file") from None
     counts = {key: _count(parser, section, key, path) for section, keys in _COUNTS.items() for key in keys}

@@ -19,6 +19,7 @@ from lippmann.image import IntegralImage, compose
 from lippmann.image.stored_values import Stored
 from lippmann.progress import ProgressCallback, silent
 from lippmann.runtime.plugins import Plugin, function_of
+from lippmann.runtime.regular_file import unreadable
 
 #: Raw files of Lytro's cameras: micro-images before demosaicing and calibration.
 _LYTRO = (".lfp", ".lfr", ".lfx")
@@ -224,7 +225,7 @@ def recognize(path: Path) -> str:
             return "hci"
         return "views"
     if not path.exists():
-        raise PictureError("not found", where=str(path))
+        raise unreadable(path, FileNotFoundError(), PictureError)
     ending = path.suffix.lower() or None  # of folders none
     own = [name for name in LAYOUTS if _layout(name).ending == ending]
     if matches := own or [name for name in _names() if _layout(name).ending == ending]:

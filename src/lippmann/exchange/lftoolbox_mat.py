@@ -29,7 +29,7 @@ from lippmann.exchange.metadata_text import TEXT_KEY, from_note, to_note
 from lippmann.exchange.optional_import import optional
 from lippmann.runtime.atomic_write import replacing
 from lippmann.runtime.machine import check_input
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.regular_file import check_kind, unreadable
 
 LAYOUT = "lftoolbox"
 
@@ -111,10 +111,8 @@ def read_matlab(path: Path) -> LightField:
     try:
         with path.open("rb") as file:
             head = file.read(128)
-    except FileNotFoundError:
-        raise PictureError("not found", where=str(path)) from None
     except OSError as error:
-        raise PictureError(f"cannot be read: {error.strerror}", where=str(path)) from error
+        raise unreadable(path, error, PictureError) from error
     version = head[124:128]
     if version in (b"\x00\x02IM", b"\x02\x00MI"):
         values, note = _read_hdf5(path)

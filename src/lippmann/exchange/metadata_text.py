@@ -12,7 +12,7 @@ from typing import Any
 
 from lippmann.errors import PictureError
 from lippmann.image.metadata import KEY, Metadata, from_dict, parse_json
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.regular_file import check_kind, unreadable
 
 #: Keyword of the PNG text and name of the MATLAB variable that hold the JSON.
 TEXT_KEY = "lippmann_light_field"
@@ -68,7 +68,7 @@ def read_note_file(folder: Path, layout: str) -> Metadata | None:
     except FileNotFoundError:
         return None
     except OSError as error:
-        raise PictureError(f"cannot be read: {error.strerror}", where=str(path)) from error
+        raise unreadable(path, error, PictureError) from error
     except UnicodeDecodeError:
         text = "\0"
     return from_note(text.strip() or "\0", layout, str(path))

@@ -39,7 +39,7 @@ from lippmann.image.views import (
 from lippmann.image.write import stored_as
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.atomic_write import replacing_folder
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.regular_file import check_kind, unreadable
 
 MANIFEST = "lippmann.json"
 
@@ -334,11 +334,9 @@ def _read_manifest(folder: Path) -> _Manifest:
     try:
         check_kind(path, PictureError)
         values = parse_json(path.read_text(encoding="utf-8"))
-    except (FileNotFoundError, NotADirectoryError):
-        fix = "give a folder written by 'lippmann views' or 'lippmann micro-images'"
-        raise PictureError("not found", where=str(path), fix=fix) from None
     except OSError as error:
-        raise PictureError(f"cannot be read: {error.strerror}", where=str(path)) from error
+        rule = "give a folder written by 'lippmann views' or 'lippmann micro-images'"
+        raise unreadable(path, error, PictureError, rule) from error
     except UnicodeDecodeError:
         values = None
     if not isinstance(values, dict) or KEY not in values:

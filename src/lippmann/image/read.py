@@ -25,7 +25,7 @@ from lippmann.image.picture import Provenance
 from lippmann.image.stored_values import Layer, Stored, Values
 from lippmann.runtime.engine_lock import cached_property
 from lippmann.runtime.machine import check_input
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.regular_file import check_kind, unreadable
 
 #: Largest number of pixels decoded at once; a file that claims more is damaged, or meant to fill the memory.
 MOST_PIXELS = 1 << 29
@@ -214,12 +214,10 @@ def open_file(path: str | Path) -> PictureFile:
     try:
         file = path.open("rb")
         start = file.peek(8)[:8]
-    except FileNotFoundError:
-        raise PictureError("not found", where=str(path)) from None
     except ValueError:
         raise PictureError("is no name of a file", where=repr(str(path))) from None
     except OSError as error:
-        raise PictureError(f"cannot be read: {error.strerror}", where=str(path)) from error
+        raise unreadable(path, error, PictureError) from error
     with contextlib.ExitStack() as stack:
         stack.callback(file.close)
         opened = _plausible(_opened(path, file, start), path.stat().st_size)

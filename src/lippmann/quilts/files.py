@@ -36,7 +36,7 @@ from lippmann.quilts.quilt import (
 from lippmann.quilts.quilt_metadata import metadata_of_text, quilt_text
 from lippmann.quilts.view_names import list_views, middle_row, places_of_views
 from lippmann.runtime.atomic_write import replacing_folder
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.regular_file import check_kind, unreadable
 
 #: Formats by Pillow's names, with their endings, that are read and not written.
 _KINDS = ("JPEG", "WEBP", "AVIF", "BMP", "PPM", "GIF", "TGA")
@@ -271,7 +271,7 @@ def _check_ending(path: Path) -> None:
         fix = "take a quilt out of it: ffmpeg -i in.mp4 -frames:v 1 out_qs8x6a0.75.png"
         raise PictureError("is a film", where=str(path), rule="pictures are read", fix=fix)
     if not path.suffix and not path.exists():
-        raise PictureError("not found", where=str(path))
+        raise unreadable(path, FileNotFoundError(), PictureError)
     if path.suffix.lower() not in READ:
         raise PictureError.unknown("ending", path.suffix, READ, where=str(path))
 
@@ -306,5 +306,7 @@ def open_view(path: Path) -> Iterator[OpenView]:
                 return opaque_colors(photograph.srgb_codes(), path, on_black=True)
 
             yield OpenView(photograph.size, lambda: "uint8", codes, photograph.notes)
-    except (OSError, SyntaxError) as error:
-        raise PictureError(f"cannot be read: {error}", where=str(path)) from None
+    except OSError as error:
+        raise unreadable(path, error, PictureError) from None
+    except SyntaxError as error:
+        raise PictureError(f"cannot be read ({error})", where=str(path)) from None

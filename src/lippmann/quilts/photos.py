@@ -26,7 +26,7 @@ from lippmann.errors import PictureError, UsageError
 from lippmann.image.read import MOST_PIXELS
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import Quilt, QuiltLayout
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.regular_file import check_kind, unreadable
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -274,12 +274,12 @@ def _reported(path: Path) -> Iterator[None]:
 
     try:
         yield
-    except FileNotFoundError:
-        raise PictureError("not found", where=str(path)) from None
     except UnidentifiedImageError:
         raise PictureError("is no picture that is read here", where=str(path), rule=RULE) from None
-    except (OSError, SyntaxError, ValueError) as error:
-        raise PictureError(f"cannot be read: {error}", where=str(path)) from None
+    except OSError as error:
+        raise unreadable(path, error, PictureError) from None
+    except (SyntaxError, ValueError) as error:
+        raise PictureError(f"cannot be read ({error})", where=str(path)) from None
 
 
 def _header(source: _Source) -> _Header:

@@ -19,6 +19,7 @@ import numpy as np
 
 from lippmann.errors import PictureError
 from lippmann.quilts.quilt import QUILT_NAME
+from lippmann.runtime.regular_file import unreadable
 
 #: Row and column of a view, counted from the top left camera, or its number alone.
 Place = tuple[int, ...]
@@ -40,7 +41,7 @@ def list_views(folder: Path, endings: Collection[str]) -> list[Path]:
     try:
         paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in endings and path.name[0] != ".")
     except OSError as error:
-        raise PictureError(f"cannot be read: {error.strerror}", where=str(folder)) from None
+        raise unreadable(folder, error, PictureError) from None
     if not (views := [path for path in paths if not QUILT_NAME.search(path.stem)]):
         raise PictureError("there are no views", where=str(folder), rule=f"they end in {', '.join(endings)}")
     return views

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 import stat
+from collections.abc import Collection
 from pathlib import Path
 
 from lippmann.errors import LippmannError
@@ -41,6 +43,28 @@ def check_kind(path: Path, error: type[LippmannError]) -> None:
         raise error("is only a pointer of Git LFS", where=str(path), fix="fetch the file itself: git lfs pull")
 
 
+def unreadable(path: Path, reason: OSError, error: type[LippmannError], rule: str = "") -> LippmannError:
+    """The ``error`` of a file that ``reason`` kept from being opened; of a missing one, with the likely one."""
+    if isinstance(reason, (FileNotFoundError, NotADirectoryError)):
+        return error("no such file", where=str(path), rule=rule, fix=near_miss(path))
+    return error(f"cannot be read ({reason.strerror or reason})", where=str(path), rule=rule)
+
+
+def near_miss(path: Path, foreign: Collection[str] = (), folder: str = "") -> str:
+    """A hint at the file that was meant, in another case or with a slip of the pen; empty if there is none.
+
+    Files with endings among ``foreign`` are not meant. ``folder`` is what a folder that does not exist is called.
+    """
+    try:
+        entries = [Path(entry.name) for entry in path.parent.iterdir() if entry.is_file()]
+        names = sorted(entry.name for entry in entries if entry.suffix.lower() not in foreign)
+    except OSError:
+        return f"there is no folder '{folder or path.parent}'"
+    folded = {name.casefold(): name for name in names}
+    close = difflib.get_close_matches(path.name.casefold(), folded, n=1, cutoff=0.75)
+    return f"is '{folded[close[0]]}' meant?" if close else ""
+
+
 def read_small_text(path: Path, most: int, error: type[LippmannError], rule: str) -> str:
     """The UTF-8 text of a file of at most ``most`` bytes; raises ``error`` with ``rule`` for any other."""
     check_kind(path, error)
@@ -53,7 +77,7 @@ def read_small_text(path: Path, most: int, error: type[LippmannError], rule: str
     except UnicodeDecodeError:
         raise error("this is not a text file", where=str(path), rule=rule) from None
     except OSError as reason:
-        raise error(f"cannot be read: {reason.strerror}", where=str(path), rule=rule) from None
+        raise unreadable(path, reason, error, rule) from None
 
 
 def _is_lfs_pointer(path: Path) -> bool:

@@ -10,6 +10,7 @@ from lippmann.display import Display
 from lippmann.errors import PictureError
 from lippmann.image import read
 from lippmann.image.streamed import picture_of_file
+from lippmann.runtime.regular_file import unreadable
 from lippmann.viewer.manifest import TileFormat, manifest, tile_size
 from lippmann.viewer.tiles import Tiles
 
@@ -80,6 +81,5 @@ class PictureFile:
         try:
             state = self.path.stat()
         except OSError as error:
-            reason = "not found" if isinstance(error, FileNotFoundError) else f"cannot be read: {error.strerror}"
-            raise PictureError(reason, where=str(self.path)) from None
+            raise unreadable(self.path, error, PictureError) from None
         return f"{state.st_ino:x}-{state.st_size:x}-{state.st_mtime_ns:x}"

@@ -21,7 +21,7 @@ from lippmann.errors import UsageError
 from lippmann.image.picture import Picture
 from lippmann.image.stored_values import FloatArray
 from lippmann.runtime.atomic_write import replacing
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.regular_file import check_kind, unreadable
 from lippmann.viewing.replay import Eye, Filter, checked_eye, default_eye, replay
 
 #: How a pair becomes one picture: side by side at full or half width, or for red-cyan glasses.
@@ -180,9 +180,10 @@ def head_path(file: Path) -> list[Eye]:
                 places.append(_position(text, f"{file}:{number}"))
                 if len(places) > MOST_POSITIONS:
                     raise UsageError("too many positions", where=str(file), rule=f"at most {MOST_POSITIONS}")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror or str(error) if isinstance(error, OSError) else "not a text"
-        raise UsageError(f"cannot be read: {reason}", where=str(file)) from None
+    except UnicodeDecodeError:
+        raise UsageError("is no text", where=str(file), rule="X,Y,Z in mm on each line") from None
+    except OSError as error:
+        raise unreadable(Path(file), error, UsageError, rule="X,Y,Z in mm on each line") from None
     if not places:
         raise UsageError("there is no position in it", where=str(file), rule="X,Y,Z in mm on each line")
     return places

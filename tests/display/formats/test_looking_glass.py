@@ -249,5 +249,5 @@ def test_what_is_no_json_is_refused(text, load):
 
 
 def test_a_missing_file_is_said(tmp_path):
-    with pytest.raises(DisplayError, match="cannot be read: No such file"):
+    with pytest.raises(DisplayError, match="no such file"):
         load_display(tmp_path / "visual.json")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import difflib
 import io
 import os
 import re
@@ -20,7 +19,7 @@ from lippmann.codecs.orientation import as_stored, of_picture
 from lippmann.codecs.pillow_formats import RULE, codes_of, is_allowed, open_picture
 from lippmann.errors import MemoryLimitError, PictureError, SceneError
 from lippmann.runtime.machine import check_input
-from lippmann.runtime.regular_file import check_kind
+from lippmann.runtime.regular_file import check_kind, near_miss, unreadable
 from lippmann.scene.values.description import Image
 
 if TYPE_CHECKING:
@@ -66,10 +65,8 @@ def read_bytes(path: Path, most: int = -1) -> bytes:
         check_input(path.stat().st_size if most < 0 else most, "the file", where=where)
         with path.open("rb") as file:
             data = file.read(most)
-    except FileNotFoundError:
-        raise SceneError("no such file", where=str(path), fix=_near_miss(path)) from None
     except OSError as error:
-        raise SceneError(f"cannot be read ({error.strerror or error})", where=str(path)) from None
+        raise unreadable(path, error, SceneError) from None
     if not data:
         raise SceneError("the file is empty", where=where)
     return data
@@ -153,9 +150,7 @@ class NamedFiles:
                 return meant
         if not allowed and any(_lies_in(candidate, self.folder) is False for candidate in candidates):
             raise _outside(name, where, what)
-        raise MissingFileError(
-            f"{what} '{name}' not found", where=where, fix=_near_miss(allowed[0], asset=True) if allowed else ""
-        )
+        raise MissingFileError(f"{what} '{name}' not found", where=where, fix=_similar(allowed[0]) if allowed else "")
 
     def find_on_line(self, body: str, *, where: str, what: str) -> Path:
         """The file that the rest of a line names: all of it, spaces and all, or what stands before a comment."""
@@ -254,21 +249,9 @@ def _entries(folder: Path, name: str | None = None) -> list[Path]:
         return []
 
 
-def _near_miss(path: Path, *, asset: bool = False) -> str:
-    """A hint at the file that was meant: other case, or a slip of the pen.
-
-    An ``asset`` is named by a scene file: another file that names files is not what was meant, unless its ending is
-    the same.
-    """
-    foreign = _NAMING_FILES - {path.suffix.lower()} if asset else frozenset()
-    try:
-        entries = [Path(entry.name) for entry in path.parent.iterdir() if entry.is_file()]
-        names = sorted(entry.name for entry in entries if entry.suffix.lower() not in foreign)
-    except OSError:
-        return f"there is no folder '{path.parent.name if asset else path.parent}'"
-    folded = {name.casefold(): name for name in names}
-    close = difflib.get_close_matches(path.name.casefold(), folded, n=1, cutoff=0.75)
-    return f"is '{folded[close[0]]}' meant?" if close else ""
+def _similar(path: Path) -> str:
+    """A hint at the file that a scene file meant: none that names files itself, unless its ending is the same."""
+    return near_miss(path, _NAMING_FILES - {path.suffix.lower()}, path.parent.name)
 
 
 def read_image(path: Path, *, where: str) -> Image:
