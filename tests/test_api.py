@@ -12,8 +12,6 @@ from lippmann.display import load_display
 from lippmann.errors import UsageError
 from lippmann.sequences.frames import render_sequence
 
-QUICK = {"integrator": "direct", "spp": 1}
-
 
 @pytest.fixture(scope="module")
 def small():

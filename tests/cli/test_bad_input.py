@@ -176,32 +176,6 @@ def test_an_output_folder_that_cannot_be_written(lippmann, tmp_path):
     refuse(lippmann("render", "teapot", *FAST, "-o", folder / "out.png"), "out.png")
 
 
-@pytest.mark.long
-def test_a_full_disk(lippmann, picture, tmp_path):
-    if not Path("/dev/full").exists():
-        pytest.skip("there is no /dev/full on this system")
-    code = (
-        "import errno, os, sys\n"
-        "import lippmann.image.write as formats\n"
-        "from lippmann.cli import run\n"
-        "real = formats.encode_values\n"
-        "def full(path, *args, **options):\n"
-        "    real(path, *args, **options)\n"
-        "    with open('/dev/full', 'wb') as file:\n"
-        "        file.write(b'x'); file.flush()\n"
-        "formats.encode_values = full\n"
-        "sys.exit(run(sys.argv[1:]))\n"
-    )
-    out = tmp_path / "out.png"
-    out.write_bytes(b"older")
-    words = ["replay", str(picture), "--size", "8x8", "-o", str(out)]
-    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False)
-    assert done.returncode == 2, done.stderr
-    assert "no space is left" in done.stderr
-    assert out.read_bytes() == b"older"
-    assert [entry.name for entry in tmp_path.iterdir()] == ["out.png"]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("delay", [2.0, pytest.param(4.0, marks=pytest.mark.long)])
 def test_ctrl_c_in_the_middle(tmp_path, delay):

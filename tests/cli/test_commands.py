@@ -4,7 +4,6 @@ import re
 
 import numpy as np
 import pytest
-import trimesh
 from PIL import Image
 
 from lippmann.display import load_display
@@ -40,39 +39,6 @@ def test_render_prints_the_depth_range_beside_what_the_display_resolves(lippmann
     assert done.code == 0
     assert "mm behind" in done.err
     assert "display resolves" in done.err
-
-
-@pytest.mark.long
-def test_the_same_seed_gives_the_same_bytes_of_pixels(lippmann, tmp_path, engine):
-    for name in ("a", "b"):
-        assert lippmann("render", "teapot", "--spp", 2, "-q", "-o", tmp_path / f"{name}.exr").code == 0
-    a, b = (read_picture(tmp_path / f"{name}.exr").pixels for name in ("a", "b"))
-    assert np.array_equal(a, b)
-
-
-@pytest.mark.long
-def test_memory_does_not_change_the_picture(lippmann, tmp_path, engine):
-    for name, memory in (("a", "4G"), ("b", "32M")):
-        words = ("render", "teapot", "--spp", 2, "-q", "--memory", memory, "-o", tmp_path / f"{name}.exr")
-        assert lippmann(*words).code == 0
-    a, b = (read_picture(tmp_path / f"{name}.exr").pixels for name in ("a", "b"))
-    assert np.array_equal(a, b)
-
-
-@pytest.mark.long
-def test_single_scattering_darkens_rough_metal_and_is_told(lippmann, tmp_path, engine):
-    ball = trimesh.creation.icosphere(3)
-    rough = trimesh.visual.material.PBRMaterial(metallicFactor=1.0, roughnessFactor=1.0, baseColorFactor=[255] * 4)
-    ball.visual = trimesh.visual.TextureVisuals(material=rough)
-    ball.export(tmp_path / "ball.glb")
-    means = []
-    for name, words in (("both", ()), ("single", ("--single-scattering",))):
-        out = tmp_path / f"{name}.exr"
-        assert lippmann("render", tmp_path / "ball.glb", "--spp", 4, "-o", out, *words).code == 0
-        picture = read_picture(out)
-        means.append(picture.pixels.mean())
-        assert any("single scattering" in note for note in picture.provenance.notes) == (name == "single")
-    assert means[1] < 0.95 * means[0]
 
 
 @pytest.mark.long

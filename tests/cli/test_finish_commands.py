@@ -2,27 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-
-from lippmann.image import read_picture
-
-
-@pytest.mark.long
-def test_layers_go_into_the_file_with_the_picture(lippmann, engine, tmp_path):
-    plain, layered = tmp_path / "plain.exr", tmp_path / "layered.exr"
-    words = ("render", "teapot", "--integrator", "direct", "--spp", 1, "-q")
-    assert lippmann(*words, "-o", plain).code == 0
-    done = lippmann(*words, "--layers", "--json", "-o", layered)
-    assert done.code == 0
-    image = read_picture(layered)
-    assert set(image.maps) - {"error", "samples"} == {"depth", "position", "normal", "albedo", "shape"}
-    assert np.array_equal(image.pixels, read_picture(plain).pixels)
-    back, front = image.provenance.options["depth_range"]
-    depth = image.maps["depth"][np.isfinite(image.maps["depth"])]
-    assert depth.size > 0.2 * image.maps["depth"].size
-    assert back - 1e-3 <= depth.min() < depth.max() <= front + 1e-3
-    assert done.json["seconds"]["layers"] > 0
 
 
 def test_layers_need_a_file_that_holds_them(lippmann, tmp_path):
@@ -30,27 +10,6 @@ def test_layers_need_a_file_that_holds_them(lippmann, tmp_path):
     assert done.code == 2
     assert "--layers: a.png cannot hold layers" in done.err
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.long
-def test_denoising_brings_a_picture_nearer_to_a_long_one(lippmann, engine, tmp_path):
-    for name, words in {"noisy": ("--denoise", "none"), "denoised": ("--denoise", "oidn")}.items():
-        done = lippmann("render", "teapot", "--spp", 2, *words, "--json", "-o", tmp_path / f"{name}.exr")
-        assert done.code == 0, done.err
-    assert done.json["options"]["denoise"] == "oidn"
-    assert done.json["options"]["denoise_effort"] == "fast"
-    assert done.json["seconds"]["denoise"] > 0
-    assert (
-        lippmann(
-            "render", "teapot", "--method", "full", "--spp", 32, "--seed", 5, "-q", "-o", tmp_path / "long.exr"
-        ).code
-        == 0
-    )
-    found = {
-        name: lippmann("compare", tmp_path / "long.exr", tmp_path / f"{name}.exr", "--json").json["psnr"]
-        for name in ("noisy", "denoised")
-    }
-    assert found["denoised"] > found["noisy"] + 5
 
 
 @pytest.mark.parametrize(

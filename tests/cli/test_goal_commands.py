@@ -143,24 +143,6 @@ def test_auto_is_the_default_and_says_what_it_took(lippmann, engine, tmp_path, s
     assert np.array_equal(read_picture(out).pixels, read_picture(plain).pixels)
 
 
-@pytest.mark.long
-def test_a_quality_is_reached_by_the_denoised_picture(lippmann, engine, tmp_path, small):
-    words = ("render", "teapot", "--display", small, "--quality", 38, "--json", "-o")
-    done = lippmann(*words, tmp_path / "a.png")
-    assert done.code == 0, done.err
-    options, plain = done.json["options"], lippmann(*words, tmp_path / "b.png", "--denoise", "none").json
-    assert options["denoise"] == "oidn"
-    assert options["denoise_effort"] in ("fast", "high")
-    assert "auto: pooled: " in done.err
-    assert done.json["method"] == "pooled"
-    assert done.json["estimate"]["psnr"] >= 38
-    assert done.json["spp"] < plain["spp"]
-    assert "as asked for" in plain["options"]["auto"]
-    again = lippmann(*words, tmp_path / "c.png")
-    assert again.json["options"]["auto"] == options["auto"]
-    assert np.array_equal(read_picture(tmp_path / "a.png").pixels, read_picture(tmp_path / "c.png").pixels)
-
-
 def test_a_time_too_short_for_two_samples_gives_one_and_says_so(lippmann, engine, tmp_path, small):
     words = ("--max-time", 0.001, "--denoise", "none", "--json", "-o", tmp_path / "a.png")
     done = lippmann("render", "teapot", "--display", small, *words)

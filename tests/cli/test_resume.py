@@ -119,34 +119,12 @@ def harness(display, unbroken, tmp_path):
 
 
 @pytest.mark.long
-def test_killed_runs_are_resumed_to_the_same_file(harness):
-    for _ in range(2):
-        harness.run_and_kill()
-    harness.finish()
-
-
-@pytest.mark.long
 def test_two_hundred_random_kills_harm_nothing(harness):
     while harness.kills < 100:  # for each of two formats
         harness.run_and_kill()
     harness.finish()
     assert harness.finished > 3
     assert len(set(harness.tiles)) > 10
-
-
-@pytest.mark.long
-def test_tiles_that_overlap_are_resumed_to_the_same_file(display, tmp_path):
-    one, two = tmp_path / "one.tif", tmp_path / "two.tif"
-    asked = ("--method", "pooled", "--denoise", "oidn-fast")
-    subprocess.run(command(display, one, *asked), check=True)
-    process = subprocess.Popen(command(display, two, *asked, "--memory", "1G"))
-    while process.poll() is None and len(list(journal_of(two).glob("r*.tile"))) < 2:
-        time.sleep(0.02)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    assert not two.exists()
-    subprocess.run(command(display, two, *asked, "--memory", "300M"), check=True)
-    assert one.read_bytes() == two.read_bytes()
 
 
 @pytest.mark.long
@@ -260,17 +238,6 @@ def begun(lippmann, engine, small, tmp_path, monkeypatch):
         assert lippmann(*small, output).code == 130
     assert sorted(os.listdir(journal_of(output))) == ["job.json", "lock", "r0000_c0000.tile"]
     return output
-
-
-@pytest.mark.long
-def test_a_tile_is_not_written_through_a_link(lippmann, begun, small, tmp_path):
-    (tmp_path / "precious.txt").write_text("mine")
-    (journal_of(begun) / "r0000_c0001.tile").symlink_to(tmp_path / "precious.txt")
-    assert lippmann(*small, begun).code == 0
-    assert (tmp_path / "precious.txt").read_text() == "mine"
-    assert lippmann(*small, tmp_path / "unbroken.png").code == 0
-    assert begun.read_bytes() == (tmp_path / "unbroken.png").read_bytes()
-    assert os.listdir(begun.parent) == ["a.png"]
 
 
 @pytest.mark.slow

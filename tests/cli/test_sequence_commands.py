@@ -14,36 +14,12 @@ from lippmann.runtime.atomic_write import temporary_file
 from lippmann.viewing.replay import replay
 
 QUICK = ("--integrator", "direct", "--spp", "1", "--device", "cpu")
-#: The same byte by byte, in one piece and in tiles.
-EXACT = (*QUICK, "--method", "full", "--denoise", "none")
 
 
 def frames_of(path):
     with av.open(str(path)) as container:
         rate = container.streams.video[0].average_rate  # a single picture has none
         return rate and float(rate), [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
-
-
-@pytest.mark.long
-def test_frames_into_a_folder_with_a_film(engine, lippmann, moving_ball, tmp_path):
-    film = tmp_path / "film.mp4"
-    call = (moving_ball, "--frames", "0:24:12", "--fps", "24", "-o", tmp_path / "out", "--video", film, "--json")
-    done = lippmann("render", *call, *QUICK)
-    assert done.code == 0, done.err
-    names = [f"frame_{number:04}.png" for number in (0, 12)]
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == names
-    assert [frame["frame"] for frame in done.json["frames"]] == [0, 12]
-    assert done.json["video"] == str(film)
-    rate, shown = frames_of(film)
-    assert (rate, len(shown)) == (24, 2)
-    for name, frame in zip(names, shown, strict=True):
-        image = read_picture(tmp_path / "out" / name)
-        seen = replay(image)
-        from lippmann.color.transfer import quantize
-
-        error = np.mean((quantize(seen, 8, "srgb").astype(float) - frame) ** 2)
-        assert 10 * np.log10(255**2 / error) > 30
-    assert read_picture(tmp_path / "out" / names[1]).provenance.options["frame"] == 12
 
 
 @pytest.mark.long
@@ -144,17 +120,6 @@ def test_frames_on_a_cluster_are_the_same(engine, lippmann, moving_ball, tmp_pat
 SMALL_QUILT = ("--views", "3x2", "--size", "384x288", *QUICK)
 
 
-@pytest.mark.long
-def test_a_turntable_with_a_film(engine, lippmann, moving_ball, tmp_path):
-    film = tmp_path / "turn.mp4"
-    call = (moving_ball, "--turntable", "5", "-o", tmp_path / "out", "--video", film, "--fps", "10", "--json")
-    done = lippmann("render", *call, *QUICK)
-    assert done.code == 0, done.err
-    assert [frame["frame"] for frame in done.json["frames"]] == [0, 1, 2, 3, 4]
-    rate, shown = frames_of(film)
-    assert (rate, len(shown)) == (10, 5)
-
-
 @pytest.mark.slow
 def test_a_part_of_a_swing(engine, lippmann, tmp_path):
     call = ("--turntable", "8", "--swing", "40", "--frames", "2:4", "-o", tmp_path / "out_%d.png")
@@ -192,21 +157,6 @@ def test_quilts_of_a_turn_and_their_film(engine, lippmann, tmp_path, film, eye, 
         assert 10 * np.log10(255**2 / max(np.mean((expected.astype(float) - even) ** 2), 1e-9)) > 30
     assert not np.array_equal(first.view(0), first.view(5))
     assert shape is None or shown[0].shape[:2] == shape
-
-
-@pytest.mark.long
-def test_a_film_of_quilts_beside_integral_images_is_rendered_by_their_cameras(engine, lippmann, tmp_path):
-    from lippmann.color.transfer import quantize
-
-    film, still = tmp_path / "film_qs2x1a1.png", tmp_path / "still_qs2x1a1.png"
-    options = ("--turntable", "2", "--frames", "0:1", *QUICK)
-    assert lippmann("render", "teapot", *options, "-o", tmp_path / "out.png", "--video", film).code == 0
-    quilt = ("--display", "seed-lenticular", "--views", "2x1", "--size", "1024x512", "-o", still)
-    assert lippmann("quilt", "render", "teapot", *options, *quilt).code == 0
-    from lippmann.quilts.files import read_quilt
-
-    _, shown = frames_of(film)
-    assert np.array_equal(shown[0], quantize(read_quilt(still).pixels, 8, "srgb"))
 
 
 @pytest.mark.parametrize(("eye", "film"), [((), "turn_qs3x2a0.75.mp4"), (("--eye", "sweep"), "turn.mp4")])

@@ -74,18 +74,6 @@ def test_without_certificates_dasks_own_configuration_counts(tmp_path):
     assert not TlsFiles().security().require_encryption
 
 
-@pytest.mark.long
-def test_no_scheduler(monkeypatch):
-    from lippmann.cluster import connect, connection
-
-    monkeypatch.setattr(connection, "CONNECT_SECONDS", 1)
-    with (
-        pytest.raises(ClusterError, match=r"no scheduler answers at tcp://127\.0\.0\.1:1 "),
-        connect(Target(address="tcp://127.0.0.1:1")),
-    ):
-        pass
-
-
 def test_without_dask_it_is_said_how_to_get_it(monkeypatch):
     from lippmann.cluster import address
 

@@ -91,16 +91,6 @@ def test_all_workers_gone_and_new_ones_come(lab, render, here, until):
 
 
 @pytest.mark.long
-def test_workers_that_come_late_take_part(lab, render, here, until):
-    lab.start_scheduler()
-    begun = render(lab.address)
-    until(lambda: any("waiting" in line for line in begun.remarks))
-    lab.start_worker()
-    assert begun.finish().error is None
-    assert begun.output.read_bytes() == here
-
-
-@pytest.mark.long
 def test_a_restarted_scheduler_is_told_and_resumed_from(lab, render, here, until):
     scheduler = lab.start_scheduler()
     lab.start_worker()

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import OutputError, PictureError
-from lippmann.image import compose, open_file, part_folders, read_picture, write_micro_images, write_views
-from lippmann.image.micro_images import Permutation, micro_images_as_views
+from lippmann.image import compose, read_picture, write_micro_images, write_views
 from lippmann.image.part_folders import MANIFEST
 from lippmann.image.write import write_plain_picture
 
@@ -76,38 +75,6 @@ def test_any_display_there_and_back(tmp_path, random_displays, picture, data):
         assert json.loads((parts / MANIFEST).read_text())["exact"] is False
         with pytest.raises(PictureError, match="do not cover whole pixels; its views are resampled"):
             compose(parts)
-
-
-@pytest.mark.long
-@settings(
-    deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
-)
-@given(data=st.data(), lot=st.integers(1, 4000))
-def test_files_hold_the_parts_of_the_picture_and_zeros_elsewhere(tmp_path, random_displays, picture, data, lot):
-    display = data.draw(random_displays())
-    shape = (display.panel.height, display.panel.width)
-    image = picture(display, maps={"depth": 1 + np.random.default_rng(1).random(shape, dtype=np.float32)})
-    permutation = Permutation(display)
-    depth = permutation.split(image.maps["depth"])
-    views, view_mask = image.views_and_mask()
-    expected = {
-        write_micro_images: (image.micro_images(), permutation.mask, depth),
-        write_views: (views, view_mask, micro_images_as_views(depth, display) if image.views_are_exact else None),
-    }
-    for write, (values, mask, maps) in expected.items():
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(part_folders, "LOT_BYTES", lot)
-            count = write(image, tmp_path / "parts", format="exr")
-        assert count == mask.any(axis=(2, 3)).sum()
-        for row, names in enumerate(json.loads((tmp_path / "parts" / MANIFEST).read_text())["files"]):
-            for column, name in enumerate(names):
-                assert (name is not None) == mask[row, column].any()
-                if name is not None:
-                    pixels, layers = open_file(tmp_path / "parts" / name).decode()
-                    np.testing.assert_array_equal(pixels, values[row, column])
-                    assert set(layers) == (set() if maps is None else {"depth"})
-                    if maps is not None:
-                        np.testing.assert_array_equal(layers["depth"], maps[row, column])
 
 
 def test_files_and_names(tmp_path, display, picture):

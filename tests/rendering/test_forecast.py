@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import math
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -49,15 +48,6 @@ def test_a_pair_has_the_rays_of_both_eyes(width, size):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("spp", [2, 64])
-def test_later_samples_take_fewer_shadow_rays(monkeypatch, spp):
-    monkeypatch.setattr(forecast, "PROBE_SECONDS", 0.0)
-    foreseen = lippmann.plan("teapot", SHEET, spp=spp)
-    rays = lippmann.render("teapot", SHEET, method="full", spp=spp).stats["rays"]
-    assert foreseen.rays["shadow"] == pytest.approx(rays["shadow"], rel=0.1)
-
-
-@pytest.mark.long
 def test_depth_is_that_of_the_picture():
     foreseen = lippmann.plan("teapot", SHEET, spp=1)
     image = lippmann.render("teapot", SHEET, spp=1, layers=True)
@@ -82,12 +72,6 @@ def test_a_notebook_shows_a_table():
     ElementTree.fromstring(page)  # well-formed
     for text in (*foreseen.in_words().values(), *foreseen.notes):
         assert f">{html.escape(text)}</td>" in page
-
-
-@pytest.mark.long
-def test_nothing_beyond_what_is_resolved_is_blurred():
-    deep = replace(SHEET, gap=300.0, viewing_distance=math.inf)
-    assert lippmann.plan("teapot", deep, spp=1).blurred_share == 0.0
 
 
 @pytest.mark.long

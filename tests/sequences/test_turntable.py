@@ -17,7 +17,7 @@ from lippmann.scene.matrices import inverse, transform_points
 from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
 from lippmann.sequences.files import saved_sequence
 from lippmann.sequences.forms import QuiltForm
-from lippmann.sequences.frames import find_stand, render_quilt_sequence, render_sequence
+from lippmann.sequences.frames import find_stand, render_sequence
 from lippmann.sequences.turntable import Turntable, open_turntable
 
 QUICK = {"integrator": "direct", "spp": 4, "device": "cpu", "tone_map": "none"}
@@ -167,16 +167,6 @@ def test_exposure_is_held(engine, display):
     fixed = dict(render_sequence(motion, display, [1, 2], exposure=exposure, **QUICK))
     assert exposure != 0.0
     assert all(np.array_equal(images[frame].pixels, fixed[frame].pixels) for frame in (1, 2))
-
-
-@pytest.mark.long
-def test_quilts_of_a_turn(engine, display):
-    motion = open_turntable(scene_of(block(), lights=[SIDE_LIGHT]), 4)
-    quilts = dict(render_quilt_sequence(motion, display, [0, 1], views=(3, 1), size=(300, 256), **QUICK))
-    assert [quilt.provenance.options["frame"] for quilt in quilts.values()] == [0, 1]
-    # The long side, then the short one.
-    widths = [np.count_nonzero(quilt.view(1).max(axis=(0, 2)) > 0.01) for quilt in quilts.values()]
-    assert widths[1] / widths[0] == pytest.approx(0.5, abs=0.1)
 
 
 @pytest.mark.slow

@@ -13,13 +13,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lippmann.cli import run
 from lippmann.errors import LippmannError, UsageError
 from lippmann.options.light import LightOptions
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.quality import QualityOptions
 from lippmann.options.scene import SceneOptions
-from lippmann.studio_app.command_line import render_command, words_of_state
+from lippmann.studio_app.command_line import words_of_state
 from lippmann.studio_app.state import StudioState
 from lippmann.studio_app.state_toml import read_state, state_of_text, text_of_state
 
@@ -99,41 +98,6 @@ def test_a_draft_is_kept_and_said():
     with pytest.raises(UsageError) as caught:
         state_of_text('effort = "draft"\nspp = 4\n')
     assert str(caught.value).startswith("state:2: spp: 4 beside a draft; a draft has one sample a pixel; leave it out")
-
-
-@pytest.mark.long
-def test_a_file_and_its_command_line_make_the_same_bytes(engine, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "small.toml").write_text(
-        "gap = 3.0\nviewing_distance = 300\naperture_distance = 20\n[panel]\nwidth = 48\nheight = 32\n"
-        'pixel_pitch = 1.0\n[lens_array]\nlayout = "lenticular"\npitch = 4.0\n'
-    )
-    state = StudioState(
-        scene="gears",
-        display="small.toml",
-        turn=(20.0, -5.5, 0.0),
-        shift=(1.0, 0.0, -2.25),
-        scale=0.9,
-        light_turn=(-30.0, 12.0),
-        light_strength=1.5,
-        environment_strength=0.5,
-        exposure=0.25,
-        method="full",
-        spp=2,
-    )
-    (tmp_path / "state.toml").write_text(text_of_state(state, tmp_path))
-    assert (
-        read_state(tmp_path / "state.toml") == dataclasses.replace(state, display=str(tmp_path / "small.toml"))
-        or read_state(tmp_path / "state.toml") == state
-    )
-    assert run(["render", "--state", "state.toml", "-o", "a.png", "--quiet"]) == 0
-    assert run([*render_command(state, "b.png")[1:], "--quiet"]) == 0
-    assert run(["render", "--state", "state.toml", "--turn", "0", "-o", "c.png", "--quiet"]) == 0
-    assert run(["render", "gears", "--display", "small.toml", "-o", "d.png", "--quiet"]) == 0
-    first, second, turned, plain = ((tmp_path / f"{name}.png").read_bytes() for name in "abcd")
-    assert first == second
-    assert first != turned
-    assert turned != plain
 
 
 def test_files_that_a_state_names_lie_beside_it(tmp_path, monkeypatch):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -68,29 +66,6 @@ def test_a_tile_is_the_same_in_any_order_and_after_pickling(engine):
     forwards = rendered(made)
     backwards = rendered(pickle.loads(pickle.dumps(made)), reversed(range(len(made.grid))))
     assert all(encode(forwards[index]) == encode(backwards[index]) for index in forwards)
-
-
-@pytest.mark.long
-def test_threads_do_not_matter(engine):
-    code = """if True:
-    import hashlib, sys
-    from lippmann import api
-    from lippmann.display import Display, LensArray, Panel, load_display
-    from lippmann.rendering.request.render_request import RenderRequest
-    from lippmann.tiles.tile_render import prepare, render_tile
-    from lippmann.tiles.job import make_job
-    from lippmann.journal import TileGrid, content_hash, encode
-    settings = RenderRequest(integrator="direct", spp=2, threads=int(sys.argv[1]))
-    display = load_display("seed-lenticular").resized(64, 64)
-    job = make_job(api.load_scene("small-balls"), display, settings, stored="float32", side=64)
-    prepared = prepare(job)
-    print(hashlib.sha256(b"".join(encode(render_tile(prepared, index)) for index in range(len(job.grid)))).hexdigest())
-    """
-    sums = {
-        subprocess.run([sys.executable, "-c", code, str(threads)], capture_output=True, text=True, check=True).stdout
-        for threads in (1, 3)
-    }
-    assert len(sums) == 1
 
 
 def test_tiles_hold_what_the_file_will(engine):

@@ -191,28 +191,6 @@ def test_a_runner_that_forgets_tiles_makes_no_file(render, tmp_path):
     assert not (tmp_path / "a.tif").exists()
 
 
-@pytest.mark.long
-def test_a_full_disk_ends_the_run_and_resuming_mends_it(render, unbroken, tmp_path, monkeypatch):
-    output = tmp_path / "a.tif"
-    write, written = Path.write_bytes, []
-
-    def full(path, data):
-        if path.suffix == ".tile":
-            written.append(path)
-            if len(written) > 4:
-                write(path, data[:10])
-                raise OSError(errno.ENOSPC, "No space left on device", str(path))
-        return write(path, data)
-
-    monkeypatch.setattr(Path, "write_bytes", full)
-    with pytest.raises(OutputError, match="no space is left"):
-        render(output, resume=True)
-    monkeypatch.undo()
-    assert not output.exists()
-    assert render(output, resume=True).resumed == 4
-    assert output.read_bytes() == unbroken
-
-
 def test_a_disk_that_fills_while_the_file_is_written_harms_nothing(render, unbroken, tmp_path, monkeypatch):
     output = tmp_path / "a.tif"
 

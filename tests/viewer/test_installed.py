@@ -80,13 +80,6 @@ def middle(tab, eye):
     return tab.evaluate(code, eye)
 
 
-def alert(tab):
-    tab.wait_for(
-        "(() => { const a = document.querySelector('[role=alert]'); return a && !a.hidden && a.innerText; })()"
-    )
-    return tab.page.inner_text("[role=alert]")
-
-
 @pytest.mark.long
 def test_page_of_the_installed_package_works(installed, shot, open_tab):
     with serving(installed, shot) as (process, address):
@@ -99,36 +92,3 @@ def test_page_of_the_installed_package_works(installed, shot, open_tab):
         tab.page.close()
         process.send_signal(signal.SIGINT)
         assert process.wait(20) == 130
-
-
-@pytest.mark.long
-def test_a_stopped_server_is_said_on_the_page(installed, shot, open_tab):
-    with serving(installed, shot) as (process, address):
-        tab = open_tab().open(address)
-        tab.wait_for("window.lippmann?.viewer?.ready.then(() => true)")
-        assert middle(tab, (20.0, 0.0, 500.0)) == [0, 0, 255]
-
-        def stop(route):
-            process.kill()
-            process.wait(20)
-            route.continue_()
-
-        tab.page.route("**/manifest.json", stop)
-        tab.page.reload()
-        assert "does not answer" in alert(tab)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("fate", ["damaged", "gone", "foreign"])
-def test_a_file_that_went_bad_is_said_on_the_page(installed, shot, open_tab, fate):
-    with serving(installed, shot) as (_, address):
-        content = bytearray(shot.read_bytes())
-        content[-40] ^= 0xFF
-        if fate == "gone":
-            shot.unlink()
-        else:
-            shot.write_bytes(content if fate == "damaged" else b"no picture")
-        tab = open_tab().open(address)
-        line = alert(tab)
-        assert "shot.png" in line
-        assert {"damaged": "check sum", "gone": "no such file", "foreign": "no picture"}[fate] in line

@@ -370,24 +370,3 @@ def test_file_that_is_gone_or_cut_is_named_on_the_page(open_tab, tmp_path, damag
         assert "teapot.png" in words(tab, ".message")
     finally:
         server.close()
-
-
-@pytest.mark.long
-def test_served_page_shows_the_picture(open_tab, tmp_path):
-    from lippmann.viewer.http_server import WebServer
-    from lippmann.viewer.served_picture import PictureFile
-    from lippmann.viewer.server import ViewerSite
-
-    image = noise(DISPLAYS["hexagonal"])
-    path = tmp_path / "picture.png"
-    write_picture(image, path)
-    server = WebServer(ViewerSite([PictureFile(path)]))
-    try:
-        tab = open_tab().open(server.address)
-        tab.evaluate(f"{VIEWER}.ready")
-        put_eye(tab, (9.0, 3.0, 140.0))
-        codes = shown(tab)
-        assert np.mean(np.any(codes != seen(image, (9.0, 3.0, 140.0), codes.shape[1::-1]), axis=2)) < 1e-4
-        tab.assert_clean()
-    finally:
-        server.close()

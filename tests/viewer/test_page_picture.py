@@ -26,7 +26,7 @@ from PIL import Image
 
 from lippmann.color.transfer import encode_srgb
 from lippmann.display import NUMPY
-from lippmann.image import IntegralImage, Provenance
+from lippmann.image import IntegralImage
 from lippmann.viewing.refocus import refocus
 from lippmann.viewing.replay import default_eye
 
@@ -135,18 +135,6 @@ def test_picture_beyond_the_memory_is_shown_in_parts(open_tab, tmp_path):
         expected = seen_part(image, (20.0, 5.0, 300.0), frame, codes.shape)
         assert np.mean(np.any(codes != expected, axis=2)) < 1e-4, pan
     tab.assert_clean()
-
-
-@pytest.mark.long
-def test_views_of_one_colour_each_are_shown_as_exactly_these(open_tab, tmp_path):
-    display = DISPLAYS["lenticular"]
-    colors = np.random.default_rng(3).integers(0, 256, (8, 3))
-    views = np.broadcast_to(colors[None, :, None, None, :] / 255, (1, 8, 64, 12, 3))
-    image = IntegralImage.from_views(views.astype(np.float32), display, provenance=Provenance(transfer="linear"))
-    tab = opened(open_tab, page_of(tmp_path / "page.html", image))
-    for kx, color in enumerate(colors):
-        put_eye(tab, eye_of_view(display, 0, kx))
-        assert np.array_equal(np.unique(shown(tab).reshape(-1, 3), axis=0), color[None])
 
 
 @pytest.mark.slow

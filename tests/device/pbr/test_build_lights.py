@@ -9,7 +9,6 @@ from lippmann.errors import SceneError
 from lippmann.scene.values.description import Environment, Image, Instance, Light, Material, Mesh, Texture
 
 MATTE = Material(base_color=(0.6, 0.6, 0.6), specular=0.0)
-DARK = Material(base_color=(0, 0, 0), specular=0.0)
 
 
 def aimed(direction, position=(0.0, 0.0, 0.0)):

@@ -12,9 +12,7 @@ from lippmann.errors import UsageError
 from lippmann.rendering.denoise import oidn
 from lippmann.rendering.denoise.oidn import denoise
 
-STRAIGHT = Display("straight", Panel(8 * 64, 96, 0.25), LensArray("lenticular", 2.0), 6.8)
 SQUARE = Display("square", Panel(8 * 20, 8 * 12, 0.25), LensArray("square", 2.0), 6.8)
-SLANTED = Display("slanted", Panel(120, 90, 0.25), LensArray("lenticular", 1.83, slant=9.5), 6.8)
 
 
 def known(height=120, width=160):

@@ -5,7 +5,6 @@ One small scene for each way in which light moves over a surface from lens to le
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -244,39 +243,3 @@ def test_sharing_is_worth_it_where_lenses_have_many_pixels(fine, as_denoised, sa
     """Over six seeds it leaves 0.75 to 0.80 of the error with 4 samples, and 0.71 to 0.77 with 16."""
     alone, shared = (fine.render(method=method, denoise="oidn", spp=samples) for method in ("full", "pooled"))
     assert fine.errors(shared)[0] < left * fine.errors(alone)[0]
-
-
-@pytest.fixture
-def small(cut_display):
-    return cut_display(64, 32)
-
-
-def command(*words):
-    from lippmann.cli import run
-
-    return run([str(word) for word in words])
-
-
-@pytest.mark.long
-def test_a_promised_quality_is_reached_by_the_whole_command(tmp_path, small, capfd):
-    words = ("render", "teapot", "--display", small, "--json")
-    assert command(*words, "--method", "pooled", "--quality-worst", 34, "-o", tmp_path / "pooled.exr") == 0
-    told = json.loads(capfd.readouterr().out)
-    assert told["method"] == "pooled"
-    assert told["estimate"]["worst"] >= 34
-    assert command(*words, "--method", "full", "--spp", 512, "--seed", 5, "-o", tmp_path / "long.exr") == 0
-    capfd.readouterr()
-    assert command("compare", tmp_path / "long.exr", tmp_path / "pooled.exr", "--json") == 0
-    assert json.loads(capfd.readouterr().out)["micro_images"]["worst"]["psnr"] >= 33
-
-
-@pytest.mark.long
-def test_a_quality_is_reached_by_pooled_light_however_few_samples_it_takes(tmp_path, small, capfd):
-    words = ("render", "tree", "--integrator", "path", "--display", small, "--json", "-o", tmp_path / "a.exr")
-    assert command(*words, "--quality", 30) == 0
-    told = json.loads(capfd.readouterr().out)
-    assert (told["method"], told["options"]["denoise"]) == ("pooled", "oidn")
-    assert told["options"]["auto"].startswith("pooled: ")
-    assert told["estimate"]["psnr"] >= 30
-    assert command(*words, "--method", "pooled", "--denoise", "oidn-fast", "--quality", 30) == 0
-    assert json.loads(capfd.readouterr().out)["options"]["denoise_effort"] == "fast"

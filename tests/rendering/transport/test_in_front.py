@@ -14,7 +14,6 @@ from lippmann.scene.values.splats import Splats, real_harmonics
 SHEET = Display("sheet", Panel(48, 36, 0.25), LensArray("lenticular", 2.0), gap=6.0)
 SLANTED = Display("slanted", Panel(48, 36, 0.25), LensArray("lenticular", 1.9, slant=9.5), gap=6.0)
 HEXAGONS = Display("hexagons", Panel(48, 36, 0.25), LensArray("hexagonal", 2.0), gap=6.0)
-CASES = [(SHEET, 0), (SHEET, 1), (SLANTED, 2), (SLANTED, 3), (HEXAGONS, 3)]
 #: The display's millimetres are the scene's.
 IN_PLACE = PlacementOptions(place="display")
 

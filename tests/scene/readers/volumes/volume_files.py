@@ -2,8 +2,6 @@
 
 import numpy as np
 
-SYNTAX = "1.2.840.10008.1.2.1"
-
 
 def save_nifti(path, grid, affine=None, **header):
     import nibabel
