@@ -1,17 +1,18 @@
 """What a film takes beside its frames: memory of encoders by its length, and whole commands with and without it.
 
-Time on two cores: about six minutes for the encoders, and 50 for two turns of 48 rendered frames.
+Time on two cores: about six minutes for the encoders, and an estimated 20 for 48 rendered frames.
 
-python benchmarks/film_encoding.py [--codecs [NAME...]] [--rendered FRAMES] [--turns N]
+python benchmarks/film_encoding.py [--codecs [NAME...]] [--rendered FRAMES] [--blocks N]
 
 Each codec writes a film of ``COUNTS[-1]`` pictures of a Portrait's quilt, made without rendering, in a process of its
 own. Its resident memory is sampled, without what it was before the first picture: the largest of the first so many
 pictures, and what is left while the encoder waits, as it does while a frame is rendered.
-``--rendered``: so many frames of a turntable as quilts of a Portrait, as they are by default: the command for files
-alone, the one for files and their film in H.264, and one for a still, one after the other, ``--turns`` times. Every
-other turn runs backwards, so that a machine that grows slower favours none. Encoders are threads of the command: its
-processor time and memory hold theirs.
-``--codecs --rendered 48`` measures no encoder alone.
+``--rendered``: so many frames of a turntable as quilts of a Portrait, as they are by default, in ``--blocks`` runs of
+consecutive frames. Each block is rendered by the command for files alone (A) and by the one for files and their film in
+H.264 (B), in the order ABBA ABBA: a machine that drifts evenly favours none. Each run pays its own start and its film's
+opening and end, which one long film pays once. A still is rendered before and after. Encoders are threads of the
+command: its processor time and memory hold theirs.
+``--codecs --rendered 48`` measures 48 frames in four blocks, and no encoder alone.
 Writes ``benchmarks/results/film_encoding.json``, where rows of other codecs stay.
 """
 
@@ -34,7 +35,7 @@ import psutil
 from numpy.typing import NDArray
 
 from defaults import HERE, Checkout
-from harness import median_ratio, save, saved
+from harness import save, saved
 
 COUNTS = (8, 16, 32, 48)
 CODECS = ("h264", "hevc", "vp9", "av1")
@@ -108,19 +109,24 @@ def _wait_until_idle() -> None:
         time.sleep(0.5)
 
 
-def rendered(count: int, turns: int) -> dict[str, Any]:
-    """Seconds of the clock and of processors, and peaks in bytes, of whole commands in turn; one list each, by turn."""
+def rendered(count: int, blocks: int) -> dict[str, Any]:
+    """Seconds of the clock and of processors, and peaks in bytes, of whole commands; one list each, by block."""
     checkout, words = Checkout(HERE), ["quilt", "render", "teapot", "-d", "portrait", "-q"]
-    moving = [*words, "--turntable", "48", "--frames", f"0:{count}"]
-    measured: dict[str, list[dict[str, float]]] = {"still": [], "frames": [], "film": []}
-    for turn in range(turns):
-        for name in list(measured)[:: -1 if turn % 2 else 1]:
-            with tempfile.TemporaryDirectory() as folder:
-                output = {"still": "still.png", "frames": "frames", "film": "film.mp4"}[name]
-                command = [*(words if name == "still" else moving), "-o", f"{folder}/{output}"]
-                measured[name].append(checkout.run(_PROGRAM, command))
-            print(name, json.dumps(measured[name][-1]), flush=True)
-    return {"count": count, **measured}
+    outputs = {"still": "still.png", "frames": "frames", "film": "film.mp4"}
+    measured: dict[str, list[dict[str, float]]] = {name: [] for name in outputs}
+
+    def run(name: str, *more: str) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            measured[name].append(checkout.run(_PROGRAM, [*words, *more, "-o", f"{folder}/{outputs[name]}"]))
+        print(name, *more, json.dumps(measured[name][-1]), flush=True)
+
+    run("still")
+    ranges = [f"{count * block // blocks}:{count * (block + 1) // blocks}" for block in range(blocks)]
+    for block, frames in enumerate(ranges):
+        for name in ("film", "frames") if block % 2 else ("frames", "film"):
+            run(name, "--turntable", "48", "--frames", frames)
+    run("still")
+    return {"blocks": ranges, **measured}
 
 
 def describe(result: dict[str, Any]) -> str:
@@ -143,36 +149,46 @@ before; and what the encoder holds while it waits for the next frame.
         )
         most = {name: statistics.median(values) for name, values in peak.items()}
         table = "\n".join(
-            f"| {title} | {statistics.median(wall[name]):.0f} s | {statistics.median(cpu[name]):.0f} s "
-            f"| {most[name] / 1e6:.0f} MB |"
-            for name, title in (("still", "a still"), ("frames", "frames alone"), ("film", "frames and film"))
+            f"| {title} | {sum(wall[name]) / runs:.0f} s | {sum(cpu[name]) / runs:.0f} s | {most[name] / 1e6:.0f} MB |"
+            for name, title, runs in (
+                ("still", "a still", len(wall["still"])),
+                ("frames", "frames alone", 1),
+                ("film", "frames and film", 1),
+            )
         )
         shares = ", ".join(
             f"{(most['frames'] + row['waiting'][str(COUNTS[-1])]) / most['still']:.2f} with `{codec}`"
             for codec, row in result["codecs"].items()
         )
         text += f"""
-Whole commands for {measured["count"]} frames of a turntable as quilts of a Portrait, as they are by default, one
-after the other, medians of {len(measured["film"])}; the film is H.264.
+Whole commands for the frames {", ".join(measured["blocks"])} of a turntable as quilts of a Portrait, as they are by
+default. Frames alone and film render these blocks in turn (ABBA); the film is H.264. Seconds are sums of all blocks,
+memory is their median.
 
 | command | by the clock | processor time | largest memory |
 |---|---|---|---|
 {table}
 
-The film takes {median_ratio(wall["film"], wall["frames"]):.3f} times as long as the frames alone and
-{median_ratio(cpu["film"], cpu["frames"]):.3f} times as much processor time; its largest memory is
-{median_ratio(peak["film"], peak["still"]):.2f} times a still's.
+The film takes {_ratio(wall)} times as long as the frames alone,
+and {_ratio(cpu)} times as much processor time;
+its largest memory is {most["film"] / most["still"]:.2f} times a still's.
 Frames alone and what an encoder holds while it waits are, by addition, so many times a still's:
 {shares}.
 """
     return text
 
 
+def _ratio(values: dict[str, list[float]]) -> str:
+    """A film's sum over that of its frames alone, and the range of single blocks, in words."""
+    blocks = [film / frames for film, frames in zip(values["film"], values["frames"], strict=True)]
+    return f"{sum(values['film']) / sum(values['frames']):.3f} ({min(blocks):.3f} to {max(blocks):.3f} by block)"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--codecs", nargs="*", default=CODECS)
     parser.add_argument("--rendered", type=int)
-    parser.add_argument("--turns", type=int, default=2)
+    parser.add_argument("--blocks", type=int, default=4)
     parser.add_argument("--one", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
@@ -187,7 +203,7 @@ def main() -> None:
         print(codec, codecs[codec], flush=True)
     found = {"codecs": codecs, "rendered": result.get("rendered")}
     if options.rendered:
-        found["rendered"] = rendered(options.rendered, options.turns)
+        found["rendered"] = rendered(options.rendered, options.blocks)
     save("film_encoding", found)
 
 

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image, ImageSequence
 
 from lippmann.color.transfer import quantize
-from lippmann.errors import OutputError, PictureError, UsageError
+from lippmann.errors import OutputError, UsageError
 from lippmann.quilts.quilt import QuiltLayout
 from lippmann.quilts.quilt_metadata import metadata_of_text
 from lippmann.viewing import mp4_film, video_file
@@ -137,29 +137,6 @@ def test_a_codec_that_cannot_be(tmp_path, monkeypatch):
     with pytest.raises(OutputError, match=r"no libnone; write an animation \(\.png\)"):
         write_animation(frames(), tmp_path / "a.mp4")
     assert os.listdir(tmp_path) == []
-
-
-@pytest.mark.parametrize("name", ["a.png", "a.mp4"])
-def test_frames_are_read_while_the_next_are_made(tmp_path, name):
-    made, threads = [quantize(frame, 8, "srgb") for frame in frames()], set()
-
-    def read(number):
-        threads.add(threading.get_ident())
-        if number == len(made):
-            raise PictureError("is not what it was", where="frame_0005.png")
-        return made[number]
-
-    write_codes(range(5), tmp_path / name, codes_of=read)
-    write_codes(made, tmp_path / f"as_they_are_{name}")
-    pictures = []
-    for path in (tmp_path / name, tmp_path / f"as_they_are_{name}"):
-        with av.open(str(path)) as film:
-            pictures.append([frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)])
-    np.testing.assert_array_equal(*pictures)
-    assert threading.get_ident() not in threads
-    with pytest.raises(PictureError, match=r"frame_0005\.png: is not what it was"):
-        write_codes(range(6), tmp_path / f"broken_{name}", codes_of=read)
-    assert sorted(os.listdir(tmp_path)) == sorted([name, f"as_they_are_{name}"])
 
 
 def test_one_frame_is_enough(tmp_path):

@@ -165,7 +165,7 @@ def _linear_quilt(quilt: Quilt, views: int) -> Quilt:
     return linear
 
 
-def write_quilt(quilt: Quilt, path: Path, *, bits: int | None = None) -> None:
+def write_quilt(quilt: Quilt, path: Path, *, bits: int | None = None) -> Quilt:
     """Write a quilt to a file.
 
     Parameters
@@ -176,6 +176,10 @@ def write_quilt(quilt: Quilt, path: Path, *, bits: int | None = None) -> None:
         The file, ``.png``, ``.exr`` or ``.tif``; its name states the quilt's columns and rows.
     bits:
         Bits per value: 8 or 16 for PNG, 16 or 32 for OpenEXR, 8, 16 or 32 for TIFF. None: as the quilt is stored.
+
+    Returns
+    -------
+    The quilt with the values that the file holds, as :func:`read_quilt` gives them.
 
     Raises
     ------
@@ -193,9 +197,10 @@ def write_quilt(quilt: Quilt, path: Path, *, bits: int | None = None) -> None:
     if quilt.values.dtype.kind == "f" and not np.isfinite(quilt.values).all():
         raise PictureError("the quilt holds values that are not finite", where=str(path))
     transfer = quilt.provenance.transfer
-    layers = {"": converted_values(quilt.values, stored, transfer)}
+    values = converted_values(quilt.values, stored, transfer)
     with replacing_output(path, name) as temporary:
-        encode_values(temporary, name, layers, transfer=transfer, text=quilt_text(quilt))
+        encode_values(temporary, name, {"": values}, transfer=transfer, text=quilt_text(quilt))
+    return replace(quilt, values=values, layout=layout, stored=stored)
 
 
 def write_views(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from lippmann.display import Display
 from lippmann.image.picture import Provenance
@@ -23,10 +23,8 @@ from lippmann.sequences.frames import Stand, find_stand, render_frames, render_t
 from lippmann.sequences.motion import Motion
 
 if TYPE_CHECKING:
+    from lippmann.quilts.quilt import Quilt
     from lippmann.tiles.tiled_render import Runner
-
-#: A frame's number, and how it was made.
-_Made: TypeAlias = "tuple[int, Provenance]"
 
 #: What of a request changes nothing in the pictures, or is told apart.
 _IMMATERIAL = ("device", "threads", "plan", "placement")
@@ -44,12 +42,15 @@ class SavedFrame:
         How it was made; without seconds where it was ``found``.
     found:
         Whether an earlier run had rendered it.
+    quilt:
+        A quilt with the values of its file; None where they have to be read.
     """
 
     number: int
     path: Path
     provenance: Provenance
     found: bool = False
+    quilt: Quilt | None = None
 
 
 def journal_of(output: Path, first: Path) -> Path:
@@ -137,7 +138,7 @@ def saved_sequence(
             made = _whole(motion, display, missing, where, path_of, bits, progress, request, form)
         else:
             files = render_tiled_frames(motion, display, missing, where, path_of, request, runner, bits, progress)
-            made = ((number, written.provenance) for number, written in files)
+            made = (SavedFrame(number, path_of(number), written.provenance) for number, written in files)
         yield _in_order(frames, missing, path_of, made, journal, form)
         if all(number in journal for number in frames):
             journal.finish()
@@ -147,7 +148,7 @@ def _in_order(
     frames: Sequence[int],
     missing: Sequence[int],
     path_of: Callable[[int], Path],
-    made: Iterator[_Made],
+    made: Iterator[SavedFrame],
     journal: FrameJournal,
     form: Form[Any],
 ) -> Iterator[SavedFrame]:
@@ -158,9 +159,10 @@ def _in_order(
         if number not in absent:
             yield SavedFrame(number, path, form.provenance(path), found=True)
             continue
-        _, provenance = next(made)
+        frame = next(made)
         journal.add(number, path)
-        yield SavedFrame(number, path, provenance)
+        yield frame
+        del frame  # while the next is rendered
 
 
 def _whole(
@@ -173,10 +175,11 @@ def _whole(
     progress: ProgressCallback,
     request: RenderRequest,
     form: Form[Any],
-) -> Iterator[_Made]:
+) -> Iterator[SavedFrame]:
     """Frames rendered in one piece, and saved."""
     for number, image in render_frames(motion, display, frames, where, request, form, progress):
-        form.write(image, path_of(number), bits)
-        provenance = image.provenance
+        path = path_of(number)
+        frame = SavedFrame(number, path, image.provenance, quilt=form.write(image, path, bits))
         del image  # while the next is rendered
-        yield number, provenance
+        yield frame
+        del frame  # likewise

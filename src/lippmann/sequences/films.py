@@ -16,14 +16,16 @@ from lippmann.color.transfer import quantize
 from lippmann.display import Display
 from lippmann.errors import OutputError, UsageError
 from lippmann.image.encoding import mirrored_in_file
+from lippmann.image.read import read_picture
 from lippmann.options.choices import REUSING
 from lippmann.options.outputs import Shows
 from lippmann.progress import silent
+from lippmann.quilts.files import read_quilt
 from lippmann.quilts.quilt import DeviceQuilt, Quilt, QuiltLayout, ending_of_name, layout_of_name, names_layout
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import options_of_sequence
 from lippmann.sequences.files import SavedFrame
-from lippmann.sequences.forms import INTEGRAL, QuiltForm
+from lippmann.sequences.forms import QuiltForm
 from lippmann.sequences.frames import Stand, find_stand, hold_exposure, of_frame
 from lippmann.sequences.kept_scene import KeptScene
 from lippmann.sequences.motion import Motion
@@ -55,7 +57,7 @@ class Filming(NamedTuple):
     Attributes
     ----------
     codes:
-        Codes ``(H, W, 3)`` of 8 bits of a frame in its file.
+        Codes ``(H, W, 3)`` of 8 bits of a frame as its file holds it.
     codec:
         Of the film; None where its format has none.
     quilt:
@@ -64,8 +66,6 @@ class Filming(NamedTuple):
         What the film does not show as it is in the files, in one line.
     has_depth:
         Whether depth lies beside colour.
-    reads_only:
-        Whether ``codes`` does nothing but read the file, so that another thread may do it while the next is rendered.
     """
 
     codes: Callable[[SavedFrame], Pixels]
@@ -73,7 +73,6 @@ class Filming(NamedTuple):
     quilt: QuiltLayout | None = None
     note: str | None = None
     has_depth: bool = False
-    reads_only: bool = False
 
 
 def film_of_pictures(
@@ -135,7 +134,7 @@ def film_of_pictures(
         back, front = (min(edge, 0.9 * z) for edge in place.depth_range)
         chosen = codec_of_film(video, (size[0] * (1 if form.half else 2), size[1]), codec)
         return Filming(
-            lambda frame: rgbd_codes(INTEGRAL.read(frame.path), form, eye, between=(z - front, z - back)),
+            lambda frame: rgbd_codes(read_picture(frame.path), form, eye, between=(z - front, z - back)),
             chosen,
             has_depth=True,
         )
@@ -143,7 +142,7 @@ def film_of_pictures(
 
     def see(frame: SavedFrame) -> Pixels:
         # The film shows what the files hold, whether they were rendered now or before an interruption.
-        image = INTEGRAL.read(frame.path)
+        image = read_picture(frame.path)
         return quantize(projection(image), 8, image.provenance.transfer)
 
     return _film_of(video, see, size if layout is None else (WIDEST_QUILT, WIDEST_QUILT), shows, codec, layout)
@@ -200,9 +199,7 @@ def film_of_quilts(
         if (width, height) != size:
             rule = f"{chosen} takes sides of at most {widest}" if smaller != view else f"{chosen} takes even sides"
             note = f"the film's pictures are {width}x{height} pixels, smaller than {size[0]}x{size[1]}: {rule}"
-        return Filming(
-            lambda frame: quilt_of_video(form.read(frame.path), widest), chosen, layout, note, reads_only=True
-        )
+        return Filming(lambda frame: quilt_of_video(_quilt(frame), widest), chosen, layout, note)
     if shows not in ("eye", "hololuminescent"):
         rule = "quilts have neither native pixels nor depth"
         raise UsageError(f"'{shows}' of quilts", parameter="shows", rule=rule, fix="use lippmann render")
@@ -216,7 +213,7 @@ def film_of_quilts(
             number = math.floor((1.0 + math.sin(2.0 * math.pi * position / count)) / 2.0 * views)
             number = min(number, views - 1)
         position += 1
-        quilt = form.read(frame.path)
+        quilt = _quilt(frame)
         return quantize(view_of_quilt(quilt, number), 8, quilt.provenance.transfer)
 
     return _film_of(video, see, default_size(display), shows, codec)
@@ -237,8 +234,12 @@ def _film_of(
     return Filming(see, codec_of_film(video, size, codec), layout)
 
 
+def _quilt(frame: SavedFrame) -> Quilt:
+    return read_quilt(frame.path) if frame.quilt is None else frame.quilt
+
+
 def _native(path: Path, display: Display) -> Pixels:
-    image = INTEGRAL.read(path)
+    image = read_picture(path)
     return np.ascontiguousarray(mirrored_in_file(image.srgb(), display))
 
 

@@ -11,9 +11,9 @@ from typing import Generic, TypeVar
 from lippmann.display import Display
 from lippmann.image import IntegralImage
 from lippmann.image.picture import Provenance
-from lippmann.image.read import read_metadata, read_picture
+from lippmann.image.read import read_metadata
 from lippmann.progress import ProgressCallback
-from lippmann.quilts.files import read_quilt, write_quilt
+from lippmann.quilts.files import write_quilt
 from lippmann.quilts.quilt import DeviceQuilt, Quilt
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Build
@@ -24,7 +24,7 @@ Shown = TypeVar("Shown", IntegralImage, Quilt)
 
 
 class Form(ABC, Generic[Shown]):
-    """How a frame is rendered, written and read."""
+    """How a frame is rendered and written."""
 
     @property
     @abstractmethod
@@ -38,12 +38,8 @@ class Form(ABC, Generic[Shown]):
         """Render a frame of a scene that ``build`` builds; errors as of the renderer."""
 
     @abstractmethod
-    def write(self, frame: Shown, path: Path, bits: int | None) -> None:
-        """Write a frame to a file, with so many bits per value."""
-
-    @abstractmethod
-    def read(self, path: Path) -> Shown:
-        """Read a frame that was written."""
+    def write(self, frame: Shown, path: Path, bits: int | None) -> Shown | None:
+        """Write a frame with so many bits per value; the frame with the file's values, None where they are read."""
 
     @abstractmethod
     def provenance(self, path: Path) -> Provenance:
@@ -66,9 +62,6 @@ class IntegralForm(Form[IntegralImage]):
 
     def write(self, frame: IntegralImage, path: Path, bits: int | None) -> None:
         frame.save(path, bits=bits)
-
-    def read(self, path: Path) -> IntegralImage:
-        return read_picture(path)
 
     def provenance(self, path: Path) -> Provenance:
         return read_metadata(path).provenance
@@ -101,11 +94,8 @@ class QuiltForm(Form[Quilt]):
         frame = render_quilt(scene, display, grid, size, request, progress, build)
         return Quilt(frame.pixels, layout, provenance=frame.provenance)
 
-    def write(self, frame: Quilt, path: Path, bits: int | None) -> None:
-        write_quilt(frame, path, bits=bits)
-
-    def read(self, path: Path) -> Quilt:
-        return read_quilt(path)
+    def write(self, frame: Quilt, path: Path, bits: int | None) -> Quilt:
+        return write_quilt(frame, path, bits=bits)
 
     def provenance(self, path: Path) -> Provenance:
         # A quilt's file holds nothing but its pixels.

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from queue import Full, Queue
-from typing import TypeVar, cast
+from typing import cast
 
 from lippmann.codecs.types import Pixels
 from lippmann.color.transfer import Transfer, quantize
@@ -24,9 +24,6 @@ from lippmann.runtime.atomic_write import replacing
 from lippmann.runtime.plugins import Plugin, function_of
 from lippmann.runtime.thread_policy import run_behind
 from lippmann.viewing.mp4_film import Codec, check_film, codec_for
-
-#: What the frames of a film are made of.
-Source = TypeVar("Source")
 
 #: Seconds after which a thread that waits for the film's writer looks whether it has failed.
 _PLAYBACK = 0.1
@@ -112,10 +109,9 @@ def write_animation(
 
 
 def write_codes(
-    frames: Iterable[Source],
+    frames: Iterable[Pixels],
     path: Path,
     *,
-    codes_of: Callable[[Source], Pixels] = lambda frame: cast("Pixels", frame),
     frames_per_second: float = 24.0,
     codec: Codec | None = None,
     quilt: QuiltLayout | None = None,
@@ -123,9 +119,8 @@ def write_codes(
 ) -> None:
     """Write frames ``(H, W, 3)`` of 8-bit codes as an animation; parameters and errors as of :func:`write_animation`.
 
-    ``codes_of`` makes the codes of a frame in the thread that writes, such as from its file; without it frames are
-    codes. The next frame is made while one is coded and written; no more are held. With ``has_depth`` a lossy codec
-    loses next to nothing, about two codes at most.
+    The next frame is made while one is coded and written; no more are held. With ``has_depth`` a lossy codec loses next
+    to nothing, about two codes at most.
     """
     check_animation_path(path, codec)
     film = _film_of(path)
@@ -133,15 +128,15 @@ def write_codes(
     chosen = {name: values[name] for name in film.value.options}
     write = function_of(film.value.write)
     with replacing(path) as temporary, film.guarded(OutputError, str(path)):
-        _beside(lambda taken: write(map(codes_of, taken), temporary, frames_per_second, **chosen), frames)
+        _beside(lambda taken: write(taken, temporary, frames_per_second, **chosen), frames)
 
 
-def _beside(write: Callable[[Iterator[Source]], None], frames: Iterable[Source]) -> None:
+def _beside(write: Callable[[Iterator[Pixels]], None], frames: Iterable[Pixels]) -> None:
     """Make ``frames`` in this thread, whose engine they may need, and ``write`` them in another."""
-    waiting: Queue[Source | None] = Queue(maxsize=1)
+    waiting: Queue[Pixels | None] = Queue(maxsize=1)
     stopped = threading.Event()
 
-    def taken() -> Iterator[Source]:
+    def taken() -> Iterator[Pixels]:
         while (frame := waiting.get()) is not None:
             yield frame
             del frame  # not held while waiting for the next
@@ -151,7 +146,7 @@ def _beside(write: Callable[[Iterator[Source]], None], frames: Iterable[Source])
     with ThreadPoolExecutor(1, "film", run_behind) as pool:
         writing = pool.submit(write, taken())
 
-        def hand_over(frame: Source | None) -> None:
+        def hand_over(frame: Pixels | None) -> None:
             while not writing.done():
                 with suppress(Full):
                     waiting.put(frame, timeout=_PLAYBACK)

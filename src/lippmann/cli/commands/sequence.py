@@ -7,7 +7,6 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -143,18 +142,14 @@ def render_frames(
             deque(noted_frames, maxlen=0)
         else:
             sweep_beside(spec.video)
-            write = partial(
-                write_codes,
-                path=spec.video,
+            write_codes(
+                map(filming.codes, noted_frames),
+                spec.video,
                 frames_per_second=spec.fps or FRAMES_PER_SECOND,
                 codec=filming.codec,
                 quilt=filming.quilt,
                 has_depth=filming.has_depth,
             )
-            if filming.reads_only:
-                write(noted_frames, codes_of=filming.codes)
-            else:
-                write(map(filming.codes, noted_frames))
     for alike in notes.values():
         where = next(iter(alike))
         only = f" ({len(alike)} of {len(done)} frames, the first is {where})" if len(alike) < len(done) else ""
