@@ -8,8 +8,9 @@ import struct
 import numpy as np
 import pytest
 
-from lippmann.scene.parsing.far_origin import near_origin
+from lippmann.scene.parsing.far_origin import moved_near_origin, near_origin
 from lippmann.scene.readers.load import load_scene
+from lippmann.scene.values.description import Camera, Instance, Light, Material, Mesh, SceneDescription
 
 UTM = np.array([450_000.0, 5_400_000.0, 312.0])
 CORNERS = np.array([(0, 0, 0), (0.1, 0, 0), (0, 0.2, 0), (0, 0, 0.3)])
@@ -154,3 +155,41 @@ def test_an_animation_far_away_is_moved_by_the_same_at_all_times(tmp_path):
     assert np.abs(first).max() < 1
     assert last - first == pytest.approx(np.array([[2.0, 0.0, 0.0]] * 2), abs=1e-5)
     assert any("its shape would be rounded" in note for note in motion.scene(0).notes)
+
+
+def lit_corner(unit):
+    """A corner 6 units wide with a camera and lights; the same light in every unit of length."""
+
+    def pose(*place):
+        matrix = np.eye(4)
+        matrix[:3, 3] = np.array(place) * unit
+        return matrix
+
+    return SceneDescription(
+        "corner",
+        [Mesh("corner", (np.array(CORNERS) / 0.3 * 6 * unit).astype(np.float32), np.array(FACES, np.uint32), 0)],
+        [Material(attenuation_distance=3 * unit), Material()],
+        [Instance(0, np.eye(4))],
+        [
+            Light("point", (1.0 * unit**2, 2.0 * unit**2, 3.0 * unit**2), pose(0, 4, 0), radius=0.5 * unit),
+            Light("directional", (5.0, 5.0, 5.0), pose(0, 0, 1)),
+        ],
+        [Camera("eye", pose(1, 2, 6), height=3 * unit, focus_distance=6 * unit)],
+    )
+
+
+@pytest.mark.parametrize("unit", [1e-12, 1e-3, 1e12])
+def test_a_scene_of_a_unit_that_cannot_be_traced_is_scaled_with_its_light_and_cameras(unit):
+    plain, scaled = lit_corner(1.0), moved_near_origin(lit_corner(unit))
+    assert moved_near_origin(plain) is plain
+    (camera,) = scaled.cameras
+    point, sun = scaled.lights
+    world = scaled.instances[0].world_from_mesh[:3, :3] @ scaled.meshes[0].positions.T.astype(np.float64)
+    assert np.ptp(world, axis=1) == pytest.approx(np.ptp(plain.meshes[0].positions, axis=0), rel=1e-5)
+    assert camera.world_from_camera == pytest.approx(plain.cameras[0].world_from_camera)
+    assert (camera.height, camera.focus_distance) == pytest.approx((3, 6))
+    assert point.world_from_light == pytest.approx(plain.lights[0].world_from_light)
+    assert (*point.color, point.radius) == pytest.approx((1, 2, 3, 0.5))
+    assert sun.color == (5, 5, 5)
+    assert [each.attenuation_distance for each in scaled.materials] == pytest.approx([3, np.inf])
+    assert scaled.notes[-1] == f"scaled by {1 / unit:g}: single precision does not trace a scene of its size"

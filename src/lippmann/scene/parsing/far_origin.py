@@ -1,19 +1,25 @@
-"""Coordinates far from the origin, as surveys have them (UTM): single precision, that of scenes, rounds them.
+"""Coordinates that single precision, that of scenes, rounds: far from the origin, as surveys have them (UTM), or tiny.
 
-At five million metres it tells half a metre.
+At five million metres it tells half a metre. Rays leave a surface by 9e-5 units (Mitsuba's ``spawn_ray``), however
+small the scene is.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.scene.values.description import SceneDescription
+from lippmann.scene.values.description import Matrix, SceneDescription
 
 #: So many times its extent from the origin, a scene is moved there: single precision tells 6e-5 of the extent.
 FAR = 1000.0
+
+#: Half the longest side of scenes that are traced as they are: below, rays leave surfaces by more than a pixel of large
+#: displays; above, products of lengths overflow.
+_SMALLEST, _LARGEST = 0.1, 1e8
 
 #: Points that are looked at.
 _SAMPLE = 1 << 16
@@ -38,15 +44,15 @@ def near_origin(positions: NDArray[np.float64], notes: list[str]) -> NDArray[np.
 
 
 def moved_near_origin(description: SceneDescription) -> SceneDescription:
-    """A scene of meshes with its cameras and lights, moved to the origin where placements put it far away; with a note.
+    """A scene of meshes with its cameras and lights, brought to coordinates that single precision traces; with a note.
 
-    As buildings and terrains have it, whose meshes lie about their own origin.
+    Placements put buildings and terrains far away, whose meshes lie about their own origin; units make scenes tiny.
     """
-    return moved_back(description, placed_offset(description))
+    return moved_back(description, traceable_from_world(description))
 
 
-def placed_offset(description: SceneDescription) -> NDArray[np.float64] | None:
-    """Where a scene of meshes lies that its placements put far from the origin; None of others."""
+def traceable_from_world(description: SceneDescription) -> Matrix | None:
+    """The similarity (4x4) of a scene of meshes that is far from the origin, tiny or huge; None of others."""
     if description.splats is not None or description.volume is not None:
         return None
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -58,21 +64,62 @@ def placed_offset(description: SceneDescription) -> NDArray[np.float64] | None:
             halves = np.abs(worlds[:, :3, :3]) @ ((most - least) / 2.0)
             low = np.minimum(low, (middles - halves).min(axis=0))
             high = np.maximum(high, (middles + halves).max(axis=0))
-    return _far_offset((low + high) / 2, (high - low).max() / 2)
+    extent = float((high - low).max() / 2)
+    offset = _far_offset((low + high) / 2, extent)
+    is_sound = not 0 < extent < np.inf or _SMALLEST <= extent <= _LARGEST
+    if offset is None and is_sound:
+        return None
+    scale = 1.0 if is_sound else 10.0 ** math.ceil(-math.log10(extent))
+    matrix = np.diag([scale, scale, scale, 1.0])
+    matrix[:3, 3] = 0.0 if offset is None else -scale * offset
+    return matrix
 
 
-def moved_back(description: SceneDescription, offset: NDArray[np.float64] | None) -> SceneDescription:
-    """A scene with its cameras and lights, moved by an offset the other way, with a note; as it is without one."""
-    if offset is None:
+def moved_back(description: SceneDescription, matrix: Matrix | None) -> SceneDescription:
+    """A scene with its cameras and lights, moved and scaled by a matrix (4x4), with notes; as it is without one.
+
+    Lengths and the power of light sources follow, so that the picture stays.
+    """
+    if matrix is None:
         return description
-    move = np.eye(4)
-    move[:3, 3] = -offset
+    scale = matrix[0, 0]
+
+    def moved(pose: Matrix) -> Matrix:
+        move = matrix @ np.asarray(pose, np.float64)
+        move[:3, :3] /= scale
+        return move
+
+    def scaled(length: float | None) -> float | None:
+        return None if length is None else length * scale
+
+    notes = [_note(matrix[:3, 3] / -scale)] if matrix[:3, 3].any() else []
+    if scale != 1:
+        notes.append(f"scaled by {scale:g}: single precision does not trace a scene of its size")
     return replace(
         description,
-        instances=[replace(each, world_from_mesh=move @ each.world_from_mesh) for each in description.instances],
-        cameras=[replace(each, world_from_camera=move @ each.world_from_camera) for each in description.cameras],
-        lights=[replace(each, world_from_light=move @ each.world_from_light) for each in description.lights],
-        notes=[*description.notes, _note(offset)],
+        materials=[
+            replace(each, attenuation_distance=each.attenuation_distance * scale) for each in description.materials
+        ],
+        instances=[replace(each, world_from_mesh=matrix @ each.world_from_mesh) for each in description.instances],
+        cameras=[
+            replace(
+                each,
+                world_from_camera=moved(each.world_from_camera),
+                height=scaled(each.height),
+                focus_distance=scaled(each.focus_distance),
+            )
+            for each in description.cameras
+        ],
+        lights=[
+            replace(
+                each,
+                world_from_light=moved(each.world_from_light),
+                radius=each.radius * scale,
+                color=each.color if each.kind == "directional" else tuple(scale**2 * value for value in each.color),
+            )
+            for each in description.lights
+        ],
+        notes=[*description.notes, *notes],
     )
 
 
