@@ -57,6 +57,7 @@ from lippmann.scene.readers.environment_map import read_environment
 from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.readers.tachyon.reader import read_cam
+from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.volumes.transfer_file import read_transfer_function
 from lippmann.tiles.job import make_job
 from lippmann.viewer.calibrate.site import CalibrationSite
@@ -128,9 +129,29 @@ def found(name: str) -> list[Path]:
 def _scene(name: str) -> Read:
     def read(data: bytes, folder: Path) -> object:
         (folder / name).write_bytes(data)
-        return load_scene(folder / name).bounds
+        scene = load_scene(folder / name)
+        if isinstance(scene.description, SceneDescription):
+            _check_whole(scene.description)
+        return scene.bounds
 
     return read
+
+
+def _check_whole(scene: SceneDescription) -> None:
+    """A scene that comes of a damaged file holds together."""
+    for mesh in scene.meshes:
+        count = len(mesh.positions)
+        assert mesh.faces.shape[1] == 3
+        assert (mesh.faces < count).all()
+        assert np.isfinite(mesh.positions).all()
+        assert 0 <= mesh.material < len(scene.materials)
+        for values in (mesh.normals, mesh.colors, *mesh.uvs):
+            assert values is None or (len(values) == count and np.isfinite(values).all())
+    assert all(0 <= instance.mesh < len(scene.meshes) for instance in scene.instances)
+    for places in scene.placements.values():
+        assert np.isfinite(np.linalg.inv(places)).all()
+    for matrix in (*(c.world_from_camera for c in scene.cameras), *(x.world_from_light for x in scene.lights)):
+        np.testing.assert_allclose(np.linalg.det(matrix), 1.0)
 
 
 def _depth_map(data: bytes, folder: Path) -> object:

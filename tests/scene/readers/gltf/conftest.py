@@ -100,11 +100,6 @@ class Writer:
         return path
 
 
-@pytest.fixture(scope="session")
-def writer_class() -> type[Writer]:
-    return Writer
-
-
 @pytest.fixture
 def writer() -> Writer:
     return Writer()
