@@ -71,9 +71,9 @@ GROUPS: Mapping[str, Mapping[str, tuple[str, str, str]]] = {
             "show",
             "Show a picture on the display itself: a window to put full screen there, native pixels one to one.",
         ),
-        "replay": ("picture", "replay", "Simulate what an eye in front of the display sees."),
+        "replay": ("replay", "replay", "Simulate what an eye in front of the display sees."),
         "refocus": (
-            "picture",
+            "replay",
             "refocus",
             "Refocus on a plane, or on several, as a camera whose aperture is as wide as the field of view.",
         ),

@@ -1,43 +1,26 @@
-"""Commands on existing pictures: ``info``, ``views``, ``micro-images``, ``compose``, ``replay``, ``refocus``."""
+"""Commands on existing pictures: ``info``, ``views``, ``micro-images`` and ``compose``."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from lippmann.cli.commands.quilt import Aspect, Layout, layout_of
+from lippmann.cli.commands.quilt import Aspect, Layout, quilt_of
 from lippmann.cli.shared import options, parse
-from lippmann.cli.shared.command_options import only, with_options
 from lippmann.cli.shared.console import Console, estimate_in_words
 from lippmann.cli.shared.outputs import output_of
-from lippmann.errors import UsageError
-from lippmann.options.outputs import SequenceOptions
-from lippmann.options.texts import triple
-from lippmann.progress import Progress
 from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
-    from lippmann.display import Display
     from lippmann.image import PictureFile
     from lippmann.image.picture import Provenance
-    from lippmann.image.stored_values import FloatArray
     from lippmann.quilts.quilt import Quilt
-    from lippmann.viewing.stereo import Stereo
 
 Format = Annotated[
     Literal["png", "exr", "tiff"] | None,
     typer.Option("--format", help="Picture format. Default: as the picture is stored."),
-]
-Filter = Annotated[
-    Literal["nearest", "linear"], typer.Option("--filter", help="Pixel filter: nearest, or linear within one lens.")
-]
-Size = Annotated[
-    str | None,
-    typer.Option("--size", help="Size of the result, WIDTHxHEIGHT in pixels. Default: as the panel, reduced."),
 ]
 
 
@@ -125,295 +108,6 @@ def compose(
     console.result(result, f"{output}: {width}x{height} pixels for {image.display.name}")
 
 
-@with_options
-def replay(
-    picture: options.Picture,
-    output: options.OptionalOutput = None,
-    eye: Annotated[
-        str | None,
-        typer.Option(
-            "--eye",
-            help="Position of the eye, X,Y,Z in mm, z toward the viewer. Default: central.",
-        ),
-    ] = None,
-    sweep: Annotated[
-        bool, typer.Option("--sweep", help="Write an animation from left to right: .mp4 or .png (APNG).")
-    ] = False,
-    frames: Annotated[int, typer.Option("--frames", help="Number of frames of the sweep.")] = 48,
-    width: Annotated[
-        float | None, typer.Option("--sweep-width", help="Width of the sweep in mm. Default: the field of view.")
-    ] = None,
-    path: Annotated[
-        Path | None,
-        typer.Option(
-            "--path", help="Write an animation along this head path: a text file with X,Y,Z in mm on each line."
-        ),
-    ] = None,
-    sbs: Annotated[
-        Literal["full", "half"] | None,
-        typer.Option("--sbs", help="Two eyes side by side, the left one's picture on the left: full or half width."),
-    ] = None,
-    anaglyph: Annotated[bool, typer.Option("--anaglyph", help="Two eyes in one picture for red-cyan glasses.")] = False,
-    eyes: Annotated[float | None, typer.Option("--eyes", help="Distance between the two eyes in mm; 63.")] = None,
-    rgbd: Annotated[
-        Literal["full", "half", "depth"] | None,
-        typer.Option(
-            "--rgbd",
-            help="Colour with its depth on the right, at full or half width, or the depth alone, of a picture with "
-            "--layers.",
-        ),
-    ] = None,
-    white: Annotated[
-        Literal["near", "far"], typer.Option("--white", help="Whether near or far is white beside the colours.")
-    ] = "near",
-    optics: Annotated[
-        bool,
-        typer.Option(
-            "--optics",
-            help="As the real lens shows it: crosstalk, blur, strips, moire, the zone's edges. The display must give a "
-            "lens.",
-        ),
-    ] = False,
-    size: Size = None,
-    filter: Filter = "nearest",
-    layout: Layout = None,
-    aspect: Aspect = None,
-    bits: options.Bits = None,
-    display: options.PictureDisplay = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    *,
-    film: Annotated[SequenceOptions, only("codec")],
-) -> None:
-    """Simulate what an eye in front of the display sees."""
-    from lippmann.codecs.stereo_pairs import PAIRS
-    from lippmann.image.streamed import open_picture
-    from lippmann.image.write import check_output, write_plain_picture
-    from lippmann.runtime.atomic_write import check_writable
-    from lippmann.viewing.quilt_views import quilt_display, replay_quilt
-    from lippmann.viewing.replay import default_eye, path_of_eye
-    from lippmann.viewing.stereo import head_path, stereo_pair, write_pair
-    from lippmann.viewing.video_file import check_animation_path, write_animation
-
-    console = Console(quiet, as_json)
-    if rgbd is not None:
-        others = {"sweep": sweep, "path": path, "sbs": sbs, "anaglyph": anaglyph, "optics": optics, "codec": film.codec}
-        for name, value in others.items():
-            if value:
-                raise UsageError("does not apply to --rgbd", where=f"--{name}", fix="leave one of them out")
-        _replay_depth(picture, output, eye, rgbd, white, size, bits, parse.display(display), console)
-        return
-    if white != "near":
-        raise UsageError("applies to --rgbd only", where="--white", fix="add --rgbd full")
-    stereo = _stereo(sbs, anaglyph, eyes)
-    if path is not None and (sweep or eye is not None):
-        raise UsageError("the path says where the eye is", where="--path", fix="leave out --sweep and --eye")
-    moves = sweep or path is not None
-    output = output_of(output, picture, "-sweep.mp4" if moves else "-seen.png")
-    if moves:
-        check_animation_path(output, film.codec)
-        check_writable(output)
-    else:
-        if film.codec is not None:
-            raise UsageError("applies to an animation only", where="--codec", fix="add --sweep, or leave it out")
-        if output.suffix.lower() in PAIRS:
-            if stereo is None or bits not in (None, 8):
-                raise UsageError("is for two eyes", where=str(output), rule="of 8 bits", fix="add --sbs full")
-            check_writable(output)
-        else:
-            check_output(output, bits)
-    if width is not None and not sweep:
-        raise UsageError("applies to a sweep only", where="--sweep-width", fix="add --sweep")
-    places = None if path is None else head_path(path)
-    quilt = quilt_of(picture, layout, aspect)
-    if quilt is None:
-        image = open_picture(picture, display=parse.display(display))
-        target, transfer = image.display, image.provenance.transfer
-    else:
-        target, transfer = quilt_display(quilt, parse.display(display), str(picture)), quilt.provenance.transfer
-    position = default_eye(target) if eye is None else triple(eye, "--eye")
-    pixels, framed = _size_of(size, target, console)
-
-    if optics and quilt is not None:
-        rule = "a quilt is seen without lenses"
-        raise UsageError("this is a quilt", where="--optics", rule=rule, fix="weave it for its display first")
-
-    def replay_from(place: tuple[float, float, float]) -> FloatArray:
-        if quilt is not None:
-            return framed(replay_quilt(quilt, target, place, size=pixels, linear=filter == "linear"))
-        return framed(image.replay(place, size=pixels, filter=filter, optics=optics))
-
-    def picture_from(place: tuple[float, float, float]) -> FloatArray:
-        return replay_from(place) if stereo is None else stereo_pair(replay_from, place, *stereo)
-
-    result: dict[str, Any] = {"output": str(output), "eye": list(position), "filter": filter, "optics": optics}
-    if stereo is not None:
-        result |= {"stereo": stereo[0], "eyes": stereo[1]}
-    by = "" if stereo is None else f" by two eyes {stereo[1]:g} mm apart"
-    if not moves:
-        if stereo is not None and output.suffix.lower() in PAIRS:
-            write_pair(picture_from(position), output, stereo[0], transfer)
-        else:
-            write_plain_picture(picture_from(position), output, bits=bits, transfer=transfer)
-        console.result(result, f"{output}: seen{by} from {_position(position)}")
-        return
-    if places is None:
-        reach = _field_width(target, position[2]) if width is None else width
-        start, stop = ((position[0] + side * reach / 2, *position[1:]) for side in (-1, 1))
-        places = path_of_eye(start, stop, frames)
-    with console.progress() as progress:
-
-        def frames_in_turn() -> Iterator[FloatArray]:
-            for number, place in enumerate(places, 1):
-                yield picture_from(place)
-                progress(Progress("draw", number, len(places)))
-
-        write_animation(frames_in_turn(), output, transfer=transfer, codec=film.codec)
-    start, stop = places[0], places[-1]
-    result |= {"frames": len(places), "start": list(start), "stop": list(stop)}
-    console.result(result, f"{output}: {len(places)} frames, seen{by} from {_position(start)} to {_position(stop)}")
-
-
-def _replay_depth(
-    picture: Path,
-    output: Path | None,
-    eye: str | None,
-    form: Literal["full", "half", "depth"],
-    white: Literal["near", "far"],
-    size: str | None,
-    bits: int | None,
-    display: Display | None,
-    console: Console,
-) -> None:
-    """``lippmann replay --rgbd``."""
-    from lippmann.codecs.rgbd_names import RgbdForm
-    from lippmann.image.read import read_picture
-    from lippmann.viewing import color_and_depth as rgbd
-
-    how = RgbdForm(half=form == "half", white=white)
-    path = output_of(output, picture, "_depth.exr" if form == "depth" else ".png")
-    path = path if form == "depth" else rgbd.named(path, how)
-    rgbd.check_depth_path(path, rgbd.DEPTH_FILES if form == "depth" else rgbd.RGBD_FILES)
-    if bits not in (None, 8, 16) or (form == "depth" and (bits or white != "near")):
-        what = "--white" if form == "depth" and not bits else "--bits"
-        rule = "depth alone is distance, of the bits that its file has; beside colours codes have 8 or 16"
-        raise UsageError("cannot be", where=what, rule=rule)
-    image = read_picture(picture, display=display)
-    position = None if eye is None else triple(eye, "--eye")
-    pixels = None if size is None else parse.size(size, "--size")
-    distance = rgbd.visible_distance(image, position, pixels)
-    near, far = rgbd.range_of(distance)
-    if form == "depth":
-        rgbd.write_depth(distance, path)
-    else:
-        codes = rgbd.rgbd_codes(image, how, position, between=(near, far), bits=bits or 8, size=pixels)
-        rgbd.write_rgbd(codes, path)
-    result = {"output": str(path), "rgbd": form, "white": white, "near": near, "far": far}
-    console.result(result, f"{path}: depth from {near:.1f} to {far:.1f} mm before the eye")
-
-
-def refocus(
-    picture: options.Picture,
-    output: options.OptionalOutput = None,
-    plane: Annotated[
-        float | None,
-        typer.Option("--plane", help="Height of the focus plane in mm, positive toward the viewer."),
-    ] = None,
-    planes: Annotated[
-        str | None,
-        typer.Option(
-            "--planes",
-            help="Focal stack: FIRST:LAST:COUNT, such as -40:40:9. The output is a folder, a .tif of pages, or an "
-            "animation (.png, .mp4).",
-        ),
-    ] = None,
-    size: Size = None,
-    layout: Layout = None,
-    aspect: Aspect = None,
-    bits: options.Bits = None,
-    display: options.PictureDisplay = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
-    """Refocus on a plane, or on several, as a camera whose aperture is as wide as the field of view."""
-    from lippmann.image.streamed import open_picture
-    from lippmann.image.write import check_output, write_plain_picture
-    from lippmann.viewing.focal_stack import check_stack_path, write_planes
-    from lippmann.viewing.quilt_views import quilt_display, refocus_quilt
-    from lippmann.viewing.refocus import focal_planes
-
-    console = Console(quiet, as_json)
-    if (plane is None) == (planes is None):
-        raise UsageError("say --plane or --planes", rule="mm before the lens plane, which is 0, or FIRST:LAST:COUNT")
-    heights = [] if planes is None else parse.steps(planes, "--planes")
-    output = output_of(output, picture, "-planes" if plane is None else "-refocused.png")
-    if plane is None:
-        check_stack_path(output, bits)
-    else:
-        check_output(output, bits)
-    planes_asked = heights if plane is None else [plane]
-    quilt = quilt_of(picture, layout, aspect)
-    if quilt is None:
-        image = open_picture(picture, display=parse.display(display))
-        pixels, framed = _size_of(size, image.display, console)
-        focused, transfer = focal_planes(image, planes_asked, size=pixels), image.provenance.transfer
-    else:
-        target, transfer = quilt_display(quilt, parse.display(display), str(picture)), quilt.provenance.transfer
-        pixels, framed = _size_of(size, target, console)
-        focused = refocus_quilt(quilt, target, planes_asked, size=pixels)
-    focused = (framed(each) for each in focused)
-    if plane is not None:
-        write_plain_picture(next(focused), output, bits=bits, transfer=transfer)
-        console.result({"output": str(output), "plane": plane}, f"{output}: focused at {plane:g} mm")
-        return
-    with console.progress() as progress:
-        write_planes(focused, heights, output, bits=bits, transfer=transfer, progress=progress)
-    line = f"{output}: {len(heights)} planes, focused at {heights[0]:g} to {heights[-1]:g} mm"
-    console.result({"output": str(output), "planes": heights}, line)
-
-
-def _size_of(
-    size: str | None, display: Display, console: Console
-) -> tuple[tuple[int, int] | None, Callable[[FloatArray], FloatArray]]:
-    """Pixels of the panel in a picture of ``--size``, None where it is not given, and what frames it to that size."""
-    from lippmann.viewing.replay import checked_size, in_middle
-
-    if size is None:
-        return None, lambda picture: picture
-    whole = checked_size(parse.size(size, "--size"))
-    inside = display.panel.size_inside(*whole)
-    if inside != whole:
-        console.remark(f"the panel has another shape than {size}: it fills {inside[0]}x{inside[1]} in the middle")
-    return inside, lambda picture: in_middle(picture, whole)
-
-
-def quilt_of(picture: Path, layout: str | None, aspect: float | None) -> Quilt | None:
-    """The quilt of a file: by ``--layout``, its metadata or its name; None for a picture of a panel."""
-    from lippmann.quilts.files import is_quilt, read_quilt
-
-    asked = layout_of(layout, aspect)
-    if asked is None and not is_quilt(picture):
-        return None
-    return read_quilt(picture, asked)
-
-
-def _stereo(sbs: Literal["full", "half"] | None, anaglyph: bool, eyes: float | None) -> tuple[Stereo, float] | None:
-    """How two eyes become one picture, and their distance in mm; None for one eye."""
-    from lippmann.display.stereo import EYE_DISTANCE
-    from lippmann.viewing.stereo import eyes_of
-
-    if sbs is not None and anaglyph:
-        raise UsageError("a picture is one or the other", where="--anaglyph", fix="leave out --sbs or --anaglyph")
-    stereo: Stereo | None = "anaglyph" if anaglyph else sbs
-    if stereo is None:
-        if eyes is not None:
-            raise UsageError("there is one eye", where="--eyes", fix="add --sbs full, --sbs half or --anaglyph")
-        return None
-    distance = EYE_DISTANCE if eyes is None else eyes
-    eyes_of((0.0, 0.0, 1.0), distance)
-    return stereo, distance
-
-
 def _quilt_values(path: Path, quilt: Quilt) -> dict[str, Any]:
     values: dict[str, Any] = {"file": str(path), "size": list(quilt.size), "stored": quilt.stored}
     values["quilt"] = quilt.layout._asdict()
@@ -431,15 +125,6 @@ def _quilt_lines(path: Path, quilt: Quilt) -> list[str]:
     if quilt.display is not None:
         lines.append(f"display     {quilt.display.name}")
     return lines + (_provenance_lines(quilt.provenance) if quilt.provenance != Provenance() else [])
-
-
-def _position(eye: tuple[float, float, float]) -> str:
-    return f"({eye[0]:.0f}, {eye[1]:.0f}, {eye[2]:.0f}) mm"
-
-
-def _field_width(display: Display, distance: float) -> float:
-    """Width in mm of the display's field of view at ``distance`` mm, from one flip of the views to the next."""
-    return 2 * distance * math.tan(math.radians(display.field_of_view / 2))
 
 
 def _info_values(path: Path, file: PictureFile) -> dict[str, Any]:

@@ -322,6 +322,16 @@ def _sentence(path: Path, made: Quilt, seconds: float) -> str:
     )
 
 
+def quilt_of(picture: Path, layout: str | None, aspect: float | None) -> Quilt | None:
+    """The quilt of a file: by ``--layout``, its metadata or its name; None for a picture of a panel."""
+    from lippmann.quilts.files import is_quilt, read_quilt
+
+    asked = layout_of(layout, aspect)
+    if asked is None and not is_quilt(picture):
+        return None
+    return read_quilt(picture, asked)
+
+
 def layout_of(layout: str | None, aspect: float | None) -> QuiltLayout | None:
     """The layout of ``--layout`` and ``--aspect``; None without them.
 
