@@ -237,10 +237,6 @@ class Display:
         )
         return across, along
 
-    def depth_spread(self, z: float) -> float:
-        """Size in millimetres over which one pixel's light spreads at height ``z``: ``|z| d / g = |z| p / (N g)``."""
-        return abs(z) * self.panel.pixel_pitch / self.gap
-
     @property
     def resolved_size(self) -> float:
         """Millimetres of the lens plane below which the display's viewers tell nothing apart."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import html
 import json
 from functools import lru_cache
 from importlib.resources import files
@@ -96,7 +97,7 @@ def single_file_page(title: str, data: str, pictures: int) -> str:
     )
     head = (
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
-        f"<title>{_escaped(title)}</title>\n"
+        f"<title>{html.escape(title, quote=False)}</title>\n"
         f'<link rel="icon" href="{_data_url(assets()["icon.svg"], "image/svg+xml")}">\n'
         f"<style>{rules}</style>\n"
         f'<script type="importmap">{import_map}</script>'
@@ -116,7 +117,3 @@ def _data_url(text: str, media_type: str) -> str:
 def _csp_hash(text: str) -> str:
     digest = hashlib.sha256(text.encode()).digest()
     return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
-
-
-def _escaped(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

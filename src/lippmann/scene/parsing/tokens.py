@@ -98,7 +98,7 @@ class Words:
         """File and line of the next word, or of the one read ``back`` words ago."""
         return f"{self.where}:{self.line(back)}"
 
-    def wrong(self, expected: str, *, back: int = 0, fix: str = "") -> SceneError:
+    def wrong(self, expected: str, *, back: int = 0) -> SceneError:
         """The error that the next word (or the one ``back`` words ago) is not what was expected."""
         index = self._at - back
         word = self._words[index] if index < self._count else ""
@@ -106,7 +106,7 @@ class Words:
             word = word[:_LONGEST_QUOTED] + "..."
         text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in word)
         what = f"found '{text}'" if word else "the file ends too early"
-        return SceneError(what, where=self.place(back), rule=f"expected {expected}", fix=fix)
+        return SceneError(what, where=self.place(back), rule=f"expected {expected}")
 
     def keyword(self, name: str) -> None:
         """Read ``name`` (given in capitals, found in any case)."""

@@ -184,7 +184,6 @@ class ClassicSceneBuilder:
         *,
         normals: ArrayLike | None = None,
         colors: ArrayLike | None = None,
-        clip_group: ArrayLike = -1,
     ) -> None:
         """Triangles from shared ``vertices (v, 3)`` and ``faces (n, 3)``; ``normals`` and ``colors`` per vertex."""
         corners = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
@@ -193,7 +192,6 @@ class ClassicSceneBuilder:
             material,
             normals=None if normals is None else np.asarray(normals, dtype=np.float64)[corners],
             colors=None if colors is None else np.asarray(colors, dtype=np.float64)[corners],
-            clip_group=clip_group,
         )
 
     def build(
