@@ -14,8 +14,10 @@ from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 from lippmann.rendering.preview import Preview
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.scene.values.whitted_scene import CameraPose
 from lippmann.sequences.frames import find_stand, render_frames, render_sequence
-from lippmann.sequences.key_frames import estimate_of_next, key_of
+from lippmann.sequences.key_frames import estimate_of_next, frame_before
+from lippmann.sequences.motion import Flight
 from lippmann.sequences.turntable import open_turntable
 
 ESTIMATE = {"psnr": 40.0, "psnr_low": 38.0, "psnr_high": 43.0, "by_chance": 46.0}
@@ -46,8 +48,9 @@ def asked_of(motion, display, frames, estimate=ESTIMATE, **options):
     return asked
 
 
-def test_every_fourth_frame_is_a_key_frame():
-    assert [key_of(frame) for frame in range(9)] == [0, 0, 0, 0, 4, 4, 4, 4, 8]
+def test_every_fourth_frame_is_followed_and_follows_another_where_light_is_passed_on():
+    assert [frame_before(frame, False) for frame in range(9)] == [None, 0, 0, 0, None, 4, 4, 4, None]
+    assert [frame_before(frame, True) for frame in range(3, 18)] == [0, 0, *[4] * 4, *[8] * 4, *[12] * 3, None, 16]
 
 
 def test_frames_after_a_key_frame_take_three_quarters_of_its_samples_in_one_stream(motion, display):
@@ -66,6 +69,18 @@ def test_no_key_frame_is_rendered_for_a_frame_after_a_cut(motion, display, monke
     monkeypatch.setattr("lippmann.sequences.key_frames.is_cut", lambda before, after, display: before.number == 4)
     asked = asked_of(motion, display, [3, 6, 7])
     assert [has_halves for *_, has_halves in asked] == [True, False, True, True]  # 0 and 3, 6, 7
+
+
+@pytest.mark.parametrize(("jump", "halves"), [(0, [0]), (400, [0, 4])])
+def test_frames_along_a_camera_path_follow_the_first_up_to_a_cut(display, jump, halves):
+    scene = lippmann.load_scene("room")
+    camera = scene.classic.camera
+    places = [(camera.center[0] + x, *camera.center[1:]) for x in (0, 1, 2, 3, 4 + jump, 5 + jump)]
+    motion = Flight(scene, [CameraPose(view=camera.view, up=camera.up, center=place) for place in places])
+    every = asked_of(motion, display, range(6))
+    assert [frame for frame, (*_, has_halves) in enumerate(every) if has_halves] == halves
+    before = [4] if jump else [0, 4]
+    assert asked_of(motion, display, [5]) == [every[number] for number in [*before, 5]]
 
 
 @pytest.mark.parametrize(

@@ -66,6 +66,15 @@ def test_a_frame_is_the_same_alone_and_after_others(frames, display):
     np.testing.assert_array_equal(alone.pixels, frames[2].pixels)
 
 
+def test_every_fourth_frame_passes_on_the_light_that_it_took(display):
+    motion = flight(*np.arange(0.0, 3.0, 0.5))
+    small = display.resized(96, 56)
+    frames = dict(render_sequence(motion, small, FrameRange(4, 6), **PATHS))
+    assert all(image.provenance.pixel_shares["reprojected"] > 0.2 for image in frames.values())
+    alone = dict(render_sequence(motion, small, FrameRange(5, 6), **PATHS))[5]
+    np.testing.assert_array_equal(alone.pixels, frames[5].pixels)
+
+
 def test_no_light_is_kept_across_a_cut(display):
     after = dict(render_sequence(flight(0.0, 400.0, 402.0), display, **PATHS))
     assert after[1].provenance.pixel_shares == after[2].provenance.pixel_shares == {}

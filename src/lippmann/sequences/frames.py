@@ -328,8 +328,8 @@ def render_frames(
         own = keys.request_of(of_frame(request, frame), now, key)
         image = trace(now, own, _report_of_frame(progress, position, len(frames)))
         made = image.provenance
-        keys.add(now, made)
-        estimate = made.estimate if key is None or key.estimate is None else estimate_of_next(key.estimate)
+        keys.add(now, made, key)
+        estimate = made.estimate if key is None or key.made.estimate is None else estimate_of_next(key.made.estimate)
         # Noise that stands still has no flicker that the frames' own errors would tell.
         if not request.fixed_noise:
             estimate = with_flicker(estimate)

@@ -4,6 +4,9 @@ The halves of a frame are denoised one by one, as each judges the other. Their m
 are of one stream and are denoised together: 0.3 to 0.7 dB (``docs/research/films.md``). So the frames after a key frame
 have no halves. They take three quarters of its samples, and the estimate of their error follows from the key frame's.
 
+Where nothing but a camera moves, frames take a key frame's light (:mod:`lippmann.sequences.key_light`). Then every
+fourth frame passes on the light that it took, without halves, and only every sixteenth has them.
+
 Which frames are key frames follows from their numbers, so that a frame is the same whether it is rendered alone or with
 all others. A frame that shows another scene than its key frame, as after a cut, has halves itself.
 """
@@ -13,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import cast
+from typing import NamedTuple, cast
 
 from lippmann.display import Display
 from lippmann.image.picture import Provenance
@@ -23,10 +26,19 @@ from lippmann.sequences.flicker import Figures
 from lippmann.sequences.kept_light import KeptLight
 from lippmann.sequences.key_light import KeyLight
 
-#: A key frame and the frames that follow it, together.
+#: Every so many frames one has half-buffers, or passes on the light that it took.
 FRAMES_OF_KEY = 4
+#: Every so many frames one has half-buffers where light is passed on.
+FRAMES_OF_LIGHT = 16
 #: Samples of a frame after a key frame, as a share of the key frame's.
 _SHARE = 0.75
+
+
+class Key(NamedTuple):
+    """A key frame, and how it was made."""
+
+    moment: Moment
+    made: Provenance
 
 
 class KeyFrames:
@@ -55,55 +67,64 @@ class KeyFrames:
         self._moment = moment
         self._render = render
         self._follows_camera = follows_camera
-        self._last: tuple[Moment, Provenance] | None = None
+        self._last: tuple[Moment, Key] | None = None  # the last frame that others follow, and its key frame
         self._light = KeptLight()
         self._shared = KeyLight()
 
-    def request_of(self, request: RenderRequest, moment: Moment, key: Provenance | None) -> RenderRequest:
+    def request_of(self, request: RenderRequest, moment: Moment, key: Key | None) -> RenderRequest:
         """The request of a frame, which follows a ``key`` frame or, None, has halves of its own."""
-        frame = moment.number
+        has_next = moment.number % FRAMES_OF_KEY == 0
         if key is not None:
-            assert key.spp is not None
+            assert key.made.spp is not None
             assert self._last is not None
-            told = f"the estimate of the error follows from frame {key_of(frame)}'s, with three quarters of its samples"
-            samples = math.ceil(_SHARE * key.spp)
+            of_key = f"the estimate of the error follows from frame {key.moment.number}'s"
+            told = f"{of_key}, with three quarters of its samples"
+            samples = math.ceil(_SHARE * key.made.spp)
             own = replace(request, spp=samples, judged_by=told, keep_light=self._light.of_next)
             is_shared = self._follows_camera and is_light_at_rest(self._last[0], moment)
-            return replace(own, trace_through=self._shared.trace_next) if is_shared else own
-        is_key = key_of(frame) == frame and _is_open(request)
-        if not is_key:
+            trace = self._shared.pass_on if has_next else self._shared.trace_next
+            return replace(own, trace_through=trace) if is_shared else own
+        if not (has_next and _is_open(request)):
             return request
         own = replace(request, keep_light=self._light.of_key)
         return replace(own, trace_through=self._shared.trace_key) if self._follows_camera else own
 
-    def add(self, moment: Moment, made: Provenance) -> None:
-        """Remember how a frame was made, if it is a key frame."""
-        if key_of(moment.number) == moment.number:
-            self._last = moment, made
+    def add(self, moment: Moment, made: Provenance, key: Key | None) -> Key:
+        """Remember how a frame was made, which followed a ``key`` frame or, None, had halves; its key frame."""
+        key = key or Key(moment, made)
+        if moment.number % FRAMES_OF_KEY == 0:
+            self._last = moment, key
+        return key
 
-    def before(self, moment: Moment, request: RenderRequest) -> Provenance | None:
-        """How the key frame was made that stands for the error of a frame; None where the frame tells its own.
+    def before(self, moment: Moment, request: RenderRequest) -> Key | None:
+        """The key frame that stands for the error of a frame; None where the frame tells its own.
 
         Frames tell their own error where the samples, a quality or a time were asked for, where noise stands still,
-        where the key frame's picture is no denoised one, and after a cut. A key frame that is missing is rendered.
+        where the key frame's picture is no denoised one, and after a cut. A frame to follow that is missing is
+        rendered.
         """
-        key = key_of(moment.number)
-        if key == moment.number or not _is_open(request):
+        number = frame_before(moment.number, self._follows_camera)
+        if number is None or not _is_open(request):
             return None
-        last, made = self._last or (None, None)
-        if last is None or last.number != key:
-            last, made = self._moment(key), None
-        if is_cut(last, moment, self._display):
+        kept = self._last if self._last is not None and self._last[0].number == number else None
+        last = self._moment(number) if kept is None else kept[0]
+        is_link = moment.number % FRAMES_OF_KEY == 0
+        if is_cut(last, moment, self._display) or (is_link and not is_light_at_rest(last, moment)):
             return None
-        if made is None:
-            made = self._render(last, self.request_of(request, last, None))
-            self.add(last, made)
-        return made if made.estimate is not None and "by_chance" in made.estimate else None
+        if kept is None:
+            before = self.before(last, request)
+            key = self.add(last, self._render(last, self.request_of(request, last, before)), before)
+        else:
+            key = kept[1]
+        is_told = key.made.estimate is not None and "by_chance" in key.made.estimate
+        return key if is_told and not is_cut(key.moment, moment, self._display) else None
 
 
-def key_of(frame: int) -> int:
-    """The key frame of a frame, by their numbers."""
-    return frame - frame % FRAMES_OF_KEY
+def frame_before(frame: int, follows_camera: bool) -> int | None:
+    """The frame that a frame follows, by their numbers; None of those that always have halves."""
+    if frame % FRAMES_OF_KEY:
+        return frame - frame % FRAMES_OF_KEY
+    return frame - FRAMES_OF_KEY if follows_camera and frame % FRAMES_OF_LIGHT else None
 
 
 def estimate_of_next(key: Figures) -> Figures:

@@ -25,10 +25,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-#: Samples of a pixel that is traced, as a multiple of those of a frame that is traced whole: few pixels among clean
-#: ones keep more of their noise in the denoiser.
-_SAMPLES = 2
-
 
 class KeyLight:
     """Keeps the picture of a key frame, and traces the frames after it with its light."""
@@ -40,14 +36,9 @@ class KeyLight:
         """Trace a key frame; parameters as of ``trace_through`` in
         :class:`~lippmann.rendering.request.render_request.RenderRequest`.
         """
-        from lippmann.device.pbr.diffuse_pixels import KeyPicture
-
         self._key = None  # the pictures of two key frames may not fit the memory
         traced = trace(job)
-        light, views = _light_of(job), _views_of(job)
-        if light is not None and views is not None:
-            colors = _each_column(job, traced.frame.pixels)
-            self._key = light, KeyPicture(_pixels_of(job), colors, views, _columns(job))
+        self._keep(job, traced)
         return traced
 
     def trace_next(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
@@ -55,8 +46,23 @@ class KeyLight:
         if self._key is None or self._key[0] is not _light_of(job):
             return trace(job)
         pixels, is_known = _known_light(self._key[1], job)
-        # Else it is less work to trace all of them.
-        return _trace_others(job, pixels, is_known) if _SAMPLES * (1 - is_known.mean()) < 1 else trace(job)
+        return _trace_others(job, pixels, is_known) if is_known.any() else trace(job)
+
+    def pass_on(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
+        """Trace a frame as :meth:`trace_next`; it is the key frame of those after it."""
+        traced = self.trace_next(job, trace)
+        self._key = None
+        self._keep(job, traced)
+        return traced
+
+    def _keep(self, job: Job, traced: Traced) -> None:
+        """Keep the picture of a job."""
+        from lippmann.device.pbr.diffuse_pixels import KeyPicture
+
+        light, views = _light_of(job), _views_of(job)
+        if light is not None and views is not None:
+            colors = _each_column(job, traced.frame.pixels)
+            self._key = light, KeyPicture(_pixels_of(job), colors, views, _columns(job))
 
 
 def _light_of(job: Job) -> PreparedLight | None:
@@ -144,10 +150,11 @@ def _trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
     rows, columns = np.nonzero(~np.repeat(is_known, _columns(job), axis=1))
     order = np.lexsort((rows % STRIP_ROWS, columns, rows // STRIP_ROWS))  # neighbours take much the same paths
     rows, columns = rows[order], columns[order]
-    request = replace(job.request, spp=_SAMPLES * job.request.samples)
+    share = float(is_known.mean())
+    # Few noisy pixels among clean ones keep more of their noise in the denoiser: up to twice as many samples.
+    request = replace(job.request, spp=round((1 + share) * job.request.samples))
     session = replace(job.session, request=request)
     few = SinglePixelRays(source, columns, rows, np.zeros_like(rows))
-    share = float(is_known.mean())
     note = f"{100 * share:.0f} % of the pixels have the key frame's light, the others {request.spp} samples"
     traced = one_stream(Job(session, job.integrator, few, job.display_from_world), request.judged_by, note)
     frame = traced.frame

@@ -64,10 +64,10 @@ class DiffusePixels:
         albedo: Floats,
     ) -> None:
         self._scene, self._rays = scene, rays
-        self.frame_from_world, self.shape = frame_from_world, albedo.shape
+        self.frame_from_world = frame_from_world
         self.color = mi.Color3f if albedo.shape[2] == 3 else mi.Color1f
         self._width = dr.opaque(mi.UInt32, albedo.shape[1])
-        self._height, self._normal, self._albedo = (upload(part) for part in (height, normal, albedo))
+        self._height, self._normal, self.all_albedo = (upload(part) for part in (height, normal, albedo))
         self._rotation = rotation_of(inverse(frame_from_world))[:3]
 
     def place(self, pixel: UInt32) -> tuple[UInt32, UInt32]:
@@ -89,9 +89,9 @@ class DiffusePixels:
         """Mean normals of pixels in world space, at most of length 1."""
         return mi.Normal3f(*_turned(self._rotation[:, :3], dr.gather(mi.Normal3f, self._normal, pixel)))
 
-    def albedo(self, pixel: UInt32, active: Bool = True) -> Array:
+    def albedo(self, pixel: UInt32) -> Array:
         """Albedo of pixels."""
-        return dr.gather(self.color, self._albedo, pixel, active)
+        return dr.gather(self.color, self.all_albedo, pixel)
 
     def is_diffuse(self, ray: Ray3f, normal: Normal3f) -> Bool:
         """Whether pixels show one surface that looks alike from all sides, and emits no light."""
@@ -118,15 +118,16 @@ class KeyPicture:
     """
 
     def __init__(self, pixels: DiffusePixels, colors: Floats, views: NearbyViews, step: int) -> None:
-        self._pixels, self._colors = pixels, upload(colors)
+        self._color, self._albedo, self._colors = pixels.color, pixels.all_albedo, upload(colors)
+        self._to_frame, self._width = pixels.frame_from_world, colors.shape[1]
         self._views, self._step = views, step
-        self._mm = float(1 / np.linalg.norm(inverse(pixels.frame_from_world)[:3, 0]))
+        self._mm = float(1 / np.linalg.norm(inverse(self._to_frame)[:3, 0]))
         pixel = dr.arange(mi.UInt32, colors.shape[0] * colors.shape[1])
         ray, normal = pixels.ray(pixel), pixels.normal(pixel)
-        point = pixels.point(pixel, ray)
-        self._points = dr.ravel(mi.Vector4f(*point, dr.select(pixels.is_diffuse(ray, normal), mi.Float(1), 0)))
-        self._normals = dr.ravel(mi.Vector3f(dr.normalize(normal)))
-        dr.eval(self._points, self._normals)
+        # No normal of a surface is like the zero of pixels that show no diffuse surface.
+        normal = dr.select(pixels.is_diffuse(ray, normal), dr.normalize(normal), 0)
+        self._planes = dr.ravel(mi.Vector4f(*normal, dr.dot(normal, pixels.point(pixel, ray))))
+        dr.eval(self._planes)
 
     def irradiance(self, others: DiffusePixels, coding: Coding, pixel: UInt32) -> Vector4f:
         """Light over albedo of other pixels by their numbers, and 1 where it is known, else 0."""
@@ -134,15 +135,15 @@ class KeyPicture:
         point, albedo = others.point(pixel, ray), others.albedo(pixel)
         is_known = others.is_diffuse(ray, normal)
         normal = dr.normalize(normal)
-        to_key = self._pixels.frame_from_world
+        to_key = self._to_frame
         in_key = [mi.Float64(value) for value in _moved(to_key, point)]
         origin, direction = _moved(to_key, ray.o), _turned(to_key[:3, :3], ray.d)
         slopes = [mi.Float64(direction[axis] / -direction[2]) for axis in (0, 1)]
         x, y = (mi.Float64(origin[axis]) + mi.Float64(origin[2]) * slopes[axis] for axis in (0, 1))
         phase = others.place(pixel)[0] % self._step if self._step > 1 else mi.UInt32(0)
         off_plane = _OFF_PLANE[0] * dr.abs(mi.Float(in_key[2])) + _OFF_PLANE[1] * self._views.display.gap
-        mean, views = self._pixels.color(0), 0
-        least, most = self._pixels.color(dr.inf), self._pixels.color(0)
+        mean, views = self._color(0), 0
+        least, most = self._color(dr.inf), self._color(0)
         for u, v, left, top, right, bottom in self._views.places(x, y, slopes[0], tuple(in_key), DEVICE):
             place = mi.Float(u), mi.Float(v)
             inside = mi.Int32(left), mi.Int32(top), mi.Int32(right), mi.Int32(bottom)
@@ -167,25 +168,23 @@ class KeyPicture:
     ) -> tuple[Bool, Array, Array, Array]:
         """About a place in a view: whether any of its pixels count; their mean, least and largest irradiance."""
         left, top, right, bottom = inside
-        step, width = self._step, self._pixels.shape[1]
+        step, width = self._step, self._width
         # Colours of their own stand side by side in a pixel.
         u, v = place[0] - 0.5 - (mi.Float(phase) - (step - 1) / 2) / step, place[1] - 0.5
         first_u, first_v = dr.floor(u), dr.floor(v)
-        total, light, albedo = mi.Float(0), self._pixels.color(0), self._pixels.color(0)
-        least, most = self._pixels.color(dr.inf), self._pixels.color(0)
+        total, light, albedo = mi.Float(0), self._color(0), self._color(0)
+        least, most = self._color(dr.inf), self._color(0)
         for across, down in product((0, 1), repeat=2):
             column, row = mi.Int32(first_u) + across, mi.Int32(first_v) + down
             is_there = active & (column >= left) & (column < right) & (row >= top) & (row < bottom)
             there = mi.UInt32(dr.select(is_there, (row * (width // step) + column) * step, 0)) + phase
-            x, y, z, diffuse = dr.gather(mi.Vector4f, self._points, there, is_there)
-            apart = (mi.Point3f(x, y, z) - point) * self._mm
-            is_same = is_there & (diffuse > 0) & (dr.abs(dr.dot(apart, normal)) < off_plane)
-            is_same &= dr.dot(dr.gather(mi.Normal3f, self._normals, there, is_there), normal) > _SAME_NORMAL
+            *own_normal, offset = dr.gather(mi.Vector4f, self._planes, there, is_there)
+            is_same = is_there & (dr.dot(mi.Normal3f(own_normal), normal) > _SAME_NORMAL)
+            is_same &= dr.abs(dr.dot(mi.Normal3f(own_normal), mi.Normal3f(point)) - offset) * self._mm < off_plane
             weight = (1 - dr.abs(u - mi.Float(column))) * (1 - dr.abs(v - mi.Float(row)))
             weight = dr.select(is_same, weight, 0)
-            total += weight
-            own_light = dr.gather(self._pixels.color, self._colors, there, is_same)
-            own_albedo = self._pixels.albedo(there, is_same)
+            own_light = dr.gather(self._color, self._colors, there, is_same)
+            own_albedo = dr.gather(self._color, self._albedo, there, is_same)
             irradiance = own_light / dr.maximum(own_albedo, 1e-6)
             least = dr.select(weight > 0, dr.minimum(least, irradiance), least)
             most = dr.select(weight > 0, dr.maximum(most, irradiance), most)
