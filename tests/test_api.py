@@ -27,6 +27,31 @@ def test_unknown_keywords_are_refused(small):
         lippmann.render_to_file("teapot", "x.png", tilt=3)
 
 
+def test_the_options_that_are_known_are_those_of_people(small):
+    with pytest.raises(UsageError, match="known are integrator, .*") as caught:
+        lippmann.plan("teapot", small, zzz=3)
+    assert "judged_by" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "parameter"),
+    [
+        ({"progress": 3}, "progress"),
+        ({"bleed": "a"}, "bleed"),
+        ({"correct": "lens", "headroom": "a"}, "headroom"),
+    ],
+)
+def test_values_of_a_wrong_type_are_refused_before_any_work(small, keywords, parameter):
+    with pytest.raises(UsageError) as caught:
+        lippmann.render("teapot", small, **keywords)
+    assert caught.value.parameter == parameter
+
+
+def test_light_that_is_no_light_is_refused():
+    with pytest.raises(UsageError, match="light: 5; a LightOptions"):
+        lippmann.load_scene("teapot", light=5)
+
+
 def test_pictures_files_quilts_and_plans_take_the_same_placement():
     for call in (
         lippmann.render,

@@ -236,7 +236,9 @@ def preview(
     >>> lippmann.preview("teapot", (16, 16), display="seed-lenticular", integrator="normal").pixels.shape
     (16, 16, 3)
     """
-    request = _request(placement, options)
+    from lippmann.viewing.replay import checked_size, eye_before
+
+    request, within = _request(placement, options), checked_size(size)
     if display is None:
         from lippmann.rendering.preview import render_preview
 
@@ -244,15 +246,14 @@ def preview(
             what = "eye" if eye is not None else "placement"
             raise UsageError("there is no display", parameter=what, fix=f"add display=, or leave {what} out")
         with show_progress(progress) as report:
-            return render_preview(_scene(scene), camera, size, request, report)
+            return render_preview(_scene(scene), camera, within, request, report)
 
     from lippmann.rendering.live.eye_preview import render_eye_preview
-    from lippmann.viewing.replay import checked_size, eye_before
 
     if camera is not None:
         fix = f'use placement={{"camera": {camera!r}}}'
         raise UsageError("a display stands before it", parameter="camera", fix=fix)
-    target, within = _display(display), checked_size(size)
+    target = _display(display)
     at = eye_before(target, eye)
     with show_progress(progress) as report:
         return render_eye_preview(_scene(scene), target, at, request, within, report)

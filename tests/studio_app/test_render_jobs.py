@@ -266,7 +266,7 @@ def test_a_folder_that_is_no_journal_is_not_gone_on_with(tmp_path):
         (0.25, 9.0, "tile 3 of 12", 27.0),
         (0.04, 60.0, "", None),  # too little is done
         (0.5, 2.0, "", None),  # kernels were compiled meanwhile
-        (0.02, 1.0, "35.1 of 40 dB, about 75 s left", 75.0),
+        (0.02, 1.0, "35.1 dB, goal 40 dB, about 75 s left", 75.0),
         (1.0, 10.0, "", 0.0),
     ],
 )
@@ -277,7 +277,7 @@ def test_the_time_left_is_told_once_it_is_known(share, elapsed, remark, left):
 @pytest.mark.parametrize(
     ("line", "stage", "left"),
     [
-        ("40 %: tracing, 35.1 of 40 dB, about 75 s left", "Tracing light", 75.0),
+        ("40 %: tracing, 35.1 dB, goal 40 dB, about 75 s left", "Tracing light", 75.0),
         ("40 %: denoising", "Removing noise", None),
         ("40 %: rendering frames, frame 3 of 48", "Rendering the film", None),
         ("40 %: something else", "Something else", None),

@@ -13,6 +13,7 @@ from dataclasses import replace
 from lippmann.display.display import Display
 from lippmann.display.panel import PixelWindow
 from lippmann.display.sheet import Sheet
+from lippmann.display.validation import is_real
 from lippmann.errors import UsageError
 
 #: Largest bleed in mm: print shops ask for 2 to 5, stretched canvas for some 50.
@@ -45,9 +46,9 @@ def with_bleed(display: Display, bleed: float) -> Display:
     """
     if bleed == 0:
         return display
-    if not 0 < bleed <= MOST_BLEED:
+    if not is_real(bleed) or not 0 < bleed <= MOST_BLEED:
         rule = f"it must be 0 to {MOST_BLEED:g} mm"
-        raise UsageError(f"{bleed:g} mm is out of range", parameter="bleed", rule=rule)
+        raise UsageError(f"{bleed!r} mm is out of range", parameter="bleed", rule=rule)
     if display.sheet is None:
         rule = "it applies to prints only"
         raise UsageError(f"does not apply to the display {display.name}", parameter="bleed", rule=rule)

@@ -27,10 +27,15 @@ POSITIVE = "it must be a finite length above zero"
 LENGTH = 'a length is a number of millimetres or a string with a unit such as "6.8 mm"'
 
 
+def is_real(value: object) -> bool:
+    """Whether ``value`` is a real number, of Python or of another library; booleans are none."""
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
 def number(value: object, key: str, *, rule: str) -> float:
     """``value`` as a float; refuses what is no number (booleans too) and NaN, lets infinities pass."""
     try:
-        checked = math.nan if isinstance(value, bool) or not isinstance(value, Real) else float(value)
+        checked = float(value) if isinstance(value, Real) and is_real(value) else math.nan
     except OverflowError:  # a whole number beyond all floats
         checked = math.inf
     if math.isnan(checked):

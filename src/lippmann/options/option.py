@@ -184,7 +184,9 @@ class Options:
             A name or a value is not known.
         """
         known = [each.name for each in fields(cls) if each.compare]
-        UsageError.refuse_unknown(f"option of a {cls.noun}", values, known, parameter=cls.keyword)
+        if unknown := [name for name in values if name not in known]:
+            options = [each.name for each, _ in options_of(cls)]
+            raise UsageError.unknown(f"option of a {cls.noun}", unknown[0], options, parameter=cls.keyword)
         return cls(**values)
 
     @classmethod

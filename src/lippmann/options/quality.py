@@ -174,7 +174,7 @@ class MachineOptions(Options):
     """
 
     device: Device = _machine("auto", "Where to render; auto: the GPU if there is one.")
-    threads: int | None = _machine(None, "CPU threads; all cores by default.", low=1, high=4096)
+    threads: int | None = _machine(None, "CPU threads, at most one per core; all cores by default.", low=1, high=4096)
     memory: int | None = _machine(
         None,
         "Memory to use, such as 2G; 60 % of the free by default. What is read from files counts, too.",

@@ -73,7 +73,7 @@ def start(device: DeviceChoice = "auto", threads: int | None = None) -> Engine:
         ``cpu``, ``gpu`` or ``auto``: the Mitsuba variant that the caller has set if it is one of :data:`VARIANTS`, else
         the GPU if it can be used, else the CPU.
     threads:
-        CPU threads, at least 1; None for all cores that the process may use.
+        CPU threads, at least 1 and at most one per core that the process may use; None for all of these.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def start(device: DeviceChoice = "auto", threads: int | None = None) -> Engine:
             _set_here = engine.variant
         mi.set_log_level(mi.LogLevel.Error)
         dr.set_log_level(dr.LogLevel.Error)
-        count = threads or machine.usable_cores()
+        count = min(threads or machine.usable_cores(), machine.usable_cores())
         if dr.thread_count() != count:
             dr.set_thread_count(count)
         return replace(engine, threads=count)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import NUMPY, Display
+from lippmann.display.validation import is_real
 from lippmann.errors import UsageError
 from lippmann.image.integral_image import IntegralImage
 from lippmann.image.stored_values import FloatArray
@@ -77,9 +78,9 @@ def focal_planes(
     """
     display = image.display
     for plane in planes:
-        if not math.isfinite(plane) or plane >= display.viewing_distance:
-            rule = f"it must be finite and below the viewing distance of {display.viewing_distance:g} mm"
-            raise UsageError(f"{plane:g} mm is out of range", parameter="plane", rule=rule)
+        if not is_real(plane) or not -math.inf < plane < display.viewing_distance:
+            rule = f"it must be finite mm below the viewing distance of {display.viewing_distance:g} mm"
+            raise UsageError(f"{plane!r}", parameter="plane", rule=rule)
     width, height = checked_size(default_size(display, DEFAULT_WIDTH) if size is None else size)
     if isinstance(image, IntegralImage) and display.lens_array.layout != "lenticular":
         return _compiled(image, planes, width, height)

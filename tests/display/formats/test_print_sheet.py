@@ -175,3 +175,9 @@ def test_what_is_missing_is_named(missing):
 def test_whatever_is_typed_is_a_print_or_refused(texts):
     with suppress(DisplayError):
         assert print_of_texts({**GOOD, **texts}).display().gap > 0
+
+
+def test_a_print_is_named_by_the_pitch_that_was_given():
+    sheet = Print(ppi=360, size=(60.0, 45.0), print_lpi=60.05).display()
+    assert sheet.name == "print-60.05lpi"
+    assert sheet.title.startswith("60.0999-lpi lenticular print (print pitch 60.05 lpi), 60x45 mm")

@@ -167,7 +167,7 @@ def test_reports_climb_to_the_end_and_say_where_the_picture_stands():
     done = [report.done for report in reports]
     assert done == sorted(done)
     assert all(report.done <= report.total for report in reports)
-    assert "of 40 dB, about" in reports[-1].note
+    assert "dB, goal 40 dB, about" in reports[-1].note
     assert reports[-1].note.endswith("about 0 s left")
 
 

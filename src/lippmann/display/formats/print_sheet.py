@@ -306,10 +306,11 @@ class Print:
         lens_pitch = validation.INCH / lpi
         lenses = LensArray("lenticular", lens_pitch)
         place = "afar" if math.isinf(distance) else f"{distance:g} mm"
+        measured = "" if self.print_lpi is None else f" (print pitch {self.print_lpi:g} lpi)"
         size = f"{self.size[0]:g}x{self.size[1]:g} mm"
         return Display(
-            name=f"print-{lpi:g}lpi",
-            title=f"{lpi:g}-lpi lenticular print, {size} at {self.ppi:g} ppi, seen from {place}",
+            name=f"print-{self._stated_lpi:g}lpi",
+            title=f"{lpi:g}-lpi lenticular print{measured}, {size} at {self.ppi:g} ppi, seen from {place}",
             panel=Panel(width, height, pixel, stripe("none", "subpixels")),
             lens_array=lenses,
             gap=gap,

@@ -93,10 +93,10 @@ class Goal:
 
     def describe(self, estimate: Estimate) -> str:
         """Estimated PSNR beside the goal, for a progress report."""
-        parts = [] if self.quality is None else [f"{estimate.psnr:.1f} of {self.quality:g} dB"]
+        parts = [] if self.quality is None else [f"{estimate.psnr:.1f} dB, goal {self.quality:g} dB"]
         if self.quality_worst is not None or not parts:
-            bound = "" if self.quality_worst is None else f" of {self.quality_worst:g}"
-            parts.append(f"worst {self.part} {estimate.worst:.1f}{bound} dB")
+            goal = "" if self.quality_worst is None else f", goal {self.quality_worst:g} dB"
+            parts.append(f"worst {self.part} {estimate.worst:.1f} dB{goal}")
         return ", ".join(parts)
 
     def describe_shortfall(self, estimate: Estimate) -> str:
@@ -104,9 +104,9 @@ class Goal:
         shortfalls = []
         for what, value, low, asked in self._asked(estimate):
             if value < asked:
-                shortfalls.append(f"{what} is estimated at {_floor(value):.1f} of {asked:g} dB")
+                shortfalls.append(f"{what} is estimated at {_floor(value):.1f} dB, goal {asked:g} dB")
             elif low < asked - TUNING.tolerance:
-                shortfalls.append(f"{what} is likely there, but may have {_floor(low):.1f} of {asked:g} dB")
+                shortfalls.append(f"{what} is likely there, but may have {_floor(low):.1f} dB, goal {asked:g} dB")
         return ", ".join(shortfalls) or "too few samples to be sure"
 
     def _asked(self, estimate: Estimate) -> list[tuple[str, float, float, float]]:

@@ -87,7 +87,7 @@ def why_no_estimate(request: RenderRequest) -> str | None:
     if request.pixel_filter == "point" and request.integrator not in POOLED_LIGHT:
         return "no estimate of the error: one ray through each pixel's middle leaves nothing to chance"
     if request.spp == 1:
-        return "no estimate of the error: one sample per pixel does not tell it, two or more do"
+        return "no estimate of the error: it needs two samples per pixel or more (spp=2)"
     return request.judged_by or None
 
 

@@ -141,6 +141,10 @@ def load_scene(
     allow_outside = options.pop("allow_outside", False)
     if isinstance(light, Mapping):
         light = LightOptions.of(light)
+    elif light is not None and not isinstance(light, LightOptions):
+        raise UsageError(
+            f"{light!r}", parameter="light", rule='a LightOptions, or a dict such as {"light_strength": 2}'
+        )
     return read_scene(source, SceneOptions.of(options), light, allow_outside=allow_outside)
 
 
