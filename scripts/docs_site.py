@@ -1,5 +1,5 @@
-"""What MkDocs builds beside the files of ``docs/``: a page for every command, from the command line's own help, and one
-of the properties of file formats, from the tables in ``docs/reference/properties``.
+"""Pages that MkDocs builds beside the files of ``docs/``: one for every command, from the command line's own help;
+and what it adds to pages: the list of commands, the options, and the tables of ``docs/reference/properties``.
 
 MkDocs calls the functions named ``on_...``; ``mkdocs.yml`` names this file as a hook.
 """
@@ -39,16 +39,23 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the pages of the commands and of the properties."""
-    tables = [tomllib.loads(Path(file.abs_src_path).read_text("utf-8")) for file in files if _is_table(file)]
-    files.append(File.generated(config, PROPERTIES, content=properties_page(tables)))
-    files.append(File.generated(config, OPTIONS, content=options_page()))
-    commands = list(leaves(command_tree()))
-    files.append(File.generated(config, f"{COMMANDS}index.md", content=overview(commands)))
-    for path, command in commands:
+    """Add the pages of the commands."""
+    for path, command in leaves(command_tree()):
         uri = f"{COMMANDS}{'-'.join(path)}.md"
         files.append(File.generated(config, uri, content=command_page(path, command)))
     return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Add the list of commands, the options and the tables of properties to the pages that introduce them."""
+    if page.file.src_uri == f"{COMMANDS}index.md":
+        return f"{markdown}\n{overview(list(leaves(command_tree())))}"
+    if page.file.src_uri == OPTIONS:
+        return f"{markdown}\n{options()}"
+    if page.file.src_uri == PROPERTIES:
+        tables = sorted((Path(config.docs_dir) / "reference" / "properties").glob("*.toml"))
+        return f"{markdown}\n{properties([tomllib.loads(table.read_text('utf-8')) for table in tables])}"
+    return markdown
 
 
 def on_page_content(content: str, page: Page, config: MkDocsConfig, files: Files) -> str:
@@ -56,14 +63,9 @@ def on_page_content(content: str, page: Page, config: MkDocsConfig, files: Files
     return ROLE.sub(r"\1", content)
 
 
-def properties_page(tables: list[dict[str, Any]]) -> str:
-    """The page of the properties of file formats."""
-    parts = [
-        "# What of a file counts",
-        "Every property of a format that can change a picture or a measure, as its specification lists them. It is "
-        "**honoured**, **noted** (the command says what is shown instead) or **refused** (one line names it). A test "
-        "shows each row.",
-    ]
+def properties(tables: list[dict[str, Any]]) -> str:
+    """The tables of the properties of file formats, by title."""
+    parts = []
     for table in sorted(tables, key=lambda table: str(table["title"]).casefold()):
         rows = [f"| {_cell(row['name'])} | {row['is']} | {_cell(row['how'])} |" for row in table["rows"]]
         head = "| property | is | how |\n|---|---|---|"
@@ -71,19 +73,15 @@ def properties_page(tables: list[dict[str, Any]]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def options_page() -> str:
-    """The page of the options of a render, as Python and the studio's files have them."""
+def options() -> str:
+    """The tables of the options of a render, as Python and the studio's files have them."""
     from lippmann.options.light import LightOptions
     from lippmann.options.option import default_of, options_of
     from lippmann.options.placement import PlacementOptions
     from lippmann.options.quality import MachineOptions, QualityOptions
     from lippmann.options.scene import SceneOptions
 
-    parts = [
-        "# Options",
-        "Keywords of the calls, fields of these classes, settings of a studio's file, and options of the command line "
-        "(with `-` for `_`) are the same.",
-    ]
+    parts = []
     for kind, where in (
         (SceneOptions, "Keywords of `load_scene`."),
         (LightOptions, "`light` of `load_scene`: the class, or a dict of its fields."),
@@ -99,10 +97,6 @@ def options_page() -> str:
             "\n".join([f"## {kind.__name__}\n", f"{where}\n", "| option | meaning | default |", "|---|---|---|", *rows])
         )
     return "\n\n".join(parts) + "\n"
-
-
-def _is_table(file: File) -> bool:
-    return file.src_uri.startswith("reference/properties/") and file.src_uri.endswith(".toml")
 
 
 def command_tree() -> Any:
@@ -123,12 +117,11 @@ def leaves(command: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str
 
 
 def overview(commands: list[tuple[tuple[str, ...], Any]]) -> str:
-    """The page that lists all commands."""
+    """The table of all commands."""
     rows = [
         f"| [`lippmann {' '.join(path)}`]({'-'.join(path)}.md) | {_cell(_summary(one))} |" for path, one in commands
     ]
-    head = "# Commands\n\nThis list and its pages are made from the program's own help, `lippmann COMMAND --help`.\n"
-    return "\n".join([head, "| command | what it does |", "|---|---|", *rows]) + "\n"
+    return "\n".join(["| command | what it does |", "|---|---|", *rows]) + "\n"
 
 
 def command_page(path: tuple[str, ...], command: Any) -> str:

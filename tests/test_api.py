@@ -28,7 +28,7 @@ def test_unknown_keywords_are_refused(small):
 
 
 def test_the_options_that_are_known_are_those_of_people(small):
-    with pytest.raises(UsageError, match="known are integrator, .*") as caught:
+    with pytest.raises(UsageError, match="known are integrator, ") as caught:
         lippmann.plan("teapot", small, zzz=3)
     assert "judged_by" not in str(caught.value)
 

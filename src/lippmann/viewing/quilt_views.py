@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.errors import PictureError, UsageError
+from lippmann.errors import PictureError
 from lippmann.image.stored_values import FloatArray
 from lippmann.quilts.quilt import Quilt
+from lippmann.viewing.refocus import check_planes
 from lippmann.viewing.replay import Eye, Real, checked_size, eye_before, eye_of_offset, lens_plane_points
 
 #: Default limit on the width of a picture, in pixels.
@@ -108,10 +109,7 @@ def refocus_quilt(
     UsageError
         If a plane or the size is out of range; raised at once.
     """
-    for plane in planes:
-        if not math.isfinite(plane) or plane >= display.viewing_distance:
-            rule = f"it must be finite and below the viewing distance of {display.viewing_distance:g} mm"
-            raise UsageError(f"{plane:g} mm is out of range", parameter="plane", rule=rule)
+    check_planes(planes, display)
     width, height = checked_size(_default_size(quilt, display) if size is None else size)
     return (_refocused(quilt, display, plane, width, height) for plane in planes)
 

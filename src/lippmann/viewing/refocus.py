@@ -60,6 +60,14 @@ def refocus(image: IntegralImage | LargePicture, plane: float, *, size: tuple[in
     return next(focal_planes(image, [plane], size=size))
 
 
+def check_planes(planes: Sequence[float], display: Display) -> None:
+    """Refuse a plane that is no finite height in mm below the viewing distance."""
+    for plane in planes:
+        if not is_real(plane) or not -math.inf < plane < display.viewing_distance:
+            rule = f"it must be finite mm below the viewing distance of {display.viewing_distance:g} mm"
+            raise UsageError(f"{plane!r}", parameter="plane", rule=rule)
+
+
 def focal_planes(
     image: IntegralImage | LargePicture, planes: Sequence[float], *, size: tuple[int, int] | None = None
 ) -> Iterator[FloatArray]:
@@ -77,10 +85,7 @@ def focal_planes(
     Iterator of ``(height, width, 3)`` float32 linear RGB; errors are those of :func:`refocus`, raised at once.
     """
     display = image.display
-    for plane in planes:
-        if not is_real(plane) or not -math.inf < plane < display.viewing_distance:
-            rule = f"it must be finite mm below the viewing distance of {display.viewing_distance:g} mm"
-            raise UsageError(f"{plane!r}", parameter="plane", rule=rule)
+    check_planes(planes, display)
     width, height = checked_size(default_size(display, DEFAULT_WIDTH) if size is None else size)
     if isinstance(image, IntegralImage) and display.lens_array.layout != "lenticular":
         return _compiled(image, planes, width, height)
