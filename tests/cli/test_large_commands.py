@@ -27,42 +27,6 @@ def content(path):
     return {file.relative_to(path).as_posix(): file.read_bytes() for file in files if file.is_file()}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("views",),
-        ("micro-images",),
-        ("replay", "--filter", "linear"),
-        ("refocus", "--plane", 3),
-    ],
-)
-def test_the_outcome_is_the_same(lippmann, pair, tmp_path, monkeypatch, words):
-    command, *others = words
-    ending = "" if command in ("views", "micro-images") else ".png"
-    outcomes = []
-    for limit, name in ((0, "pieces"), (1 << 25, "whole")):
-        monkeypatch.setattr(streamed, "LARGE", limit)
-        done = lippmann(command, pair[0], *others, "--json", "-o", tmp_path / f"{name}{ending}")
-        assert done.code == 0, done.err
-        outcomes.append({key: value for key, value in done.json.items() if key != "output"})
-    assert outcomes[0] == outcomes[1]
-    assert content(tmp_path / f"pieces{ending}") == content(tmp_path / f"whole{ending}")
-
-
-@pytest.mark.slow
-def test_figures_are_the_same(lippmann, pair, tmp_path, monkeypatch):
-    found = []
-    for limit in (0, 1 << 25):
-        monkeypatch.setattr(streamed, "LARGE", limit)
-        done = lippmann("compare", *pair, "--json", "--csv", tmp_path / "a.csv")
-        assert done.code == 0, done.err
-        found.append(done.json)
-    for key in ("psnr", "mean_squared_error"):
-        assert found[0][key] == pytest.approx(found[1][key], rel=1e-9)
-    assert found[0]["ssim"]["mean"] == pytest.approx(found[1]["ssim"]["mean"], rel=1e-6)
-
-
 def test_an_error_map_needs_the_whole_picture(lippmann, pair, tmp_path, monkeypatch):
     monkeypatch.setattr(streamed, "LARGE", 0)
     done = lippmann("compare", *pair, "--map", tmp_path / "map.png")

@@ -4,7 +4,6 @@ a bad one ends it."""
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -21,8 +20,6 @@ NOTHING_FOUND = (
     "from pathlib import Path; from lippmann.runtime import llvm;"
     "llvm.listed_files = lambda: iter(()); llvm.search_folders = lambda: []\n"
 )
-
-BY_FILE_NAME = "llvm.elf_head = lambda: llvm.kind_of(b'its name is all that is looked at')\n"
 
 
 def python(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -83,51 +80,11 @@ def test_no_library_found_on_the_device_of_choice():
     assert "no usable LLVM library is installed" in start_fails(NOTHING_FOUND, device="auto")
 
 
-def old_libraries(folder: Path) -> list[tuple[int, Path, str]]:
-    """Old libraries as (version, path, code that makes them look so): the machine's own, and some by name only."""
-    found = [(library.version[0], library.path, "") for library in OLD]
-    for version in {14, 15, 16} - {version for version, _, _ in found}:
-        path = folder / f"libLLVM-{version}.so.1"
-        path.write_text("its name is all that is looked at")
-        found.append((version, path, BY_FILE_NAME))
-    return found
-
-
-@pytest.mark.long
-def test_only_an_old_library_found(tmp_path):
-    for version, path, look in old_libraries(tmp_path):
-        before = NOTHING_FOUND + look + f"llvm.files_in = lambda folders: iter([Path({str(path)!r})])\n"
-        message = start_fails(before)
-        assert f"found only {version}" in message
-        assert llvm.install_command() in message
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("device", [pytest.param("cpu", marks=pytest.mark.long), "auto"])
-def test_named_library_is_an_old_one(tmp_path, device):
-    for version, path, look in old_libraries(tmp_path):
-        message = start_fails(NOTHING_FOUND + look, device=device, **{llvm.PATH_VARIABLE: str(path)})
-        assert message.startswith(f"{llvm.PATH_VARIABLE}: '{path}' is LLVM {version}")
-
-
-@pytest.mark.slow
-def test_named_library_is_missing(tmp_path):
-    path = str(tmp_path / "libLLVM.so.19.1")
-    assert f"'{path}' not found" in start_fails(device="auto", **{llvm.PATH_VARIABLE: path})
-
-
 @pytest.mark.slow
 def test_named_library_is_missing_and_a_gpu_does_not_excuse_it(tmp_path):
     before = "from lippmann.runtime import machine; machine.find_gpu = lambda: 'Test GPU'\n"
     path = str(tmp_path / "libLLVM.so.19.1")
     assert f"'{path}' not found" in start_fails(before, device="auto", **{llvm.PATH_VARIABLE: path})
-
-
-@pytest.mark.slow
-def test_named_library_is_a_text_file(tmp_path):
-    path = tmp_path / "libLLVM.so.19.1"
-    path.write_text("no library")
-    assert f"'{path}' is not a shared library" in start_fails(**{llvm.PATH_VARIABLE: str(path)})
 
 
 @pytest.mark.slow
