@@ -84,6 +84,8 @@ class SurfaceModel:
         KHR_materials_anisotropy and KHR_materials_iridescence.
     opacity, opacity_cutoff:
         Share of the surface that is there; with a cutoff all or nothing.
+    front_only:
+        Whether only front faces are there; the opacity is then 1.
     tinted, faded:
         The mesh's vertex colours multiply the base colour, their alpha the opacity.
     """
@@ -112,6 +114,7 @@ class SurfaceModel:
     film: ThinFilm | None = None
     opacity: Signal | None = None
     opacity_cutoff: Signal | None = None
+    front_only: bool = False
     tinted: bool = False
     faded: bool = False
 
@@ -129,6 +132,8 @@ class SurfaceModel:
         alpha = self.opacity.eval(place)
         if self.faded:
             alpha = alpha * place.alpha
+        if self.front_only:
+            alpha = dr.select(place.si.wi.z > 0, alpha, 0)
         if self.opacity_cutoff is not None:
             return dr.select(alpha >= self.opacity_cutoff.eval(place), mi.Float(1), 0)
         return dr.clip(alpha, 0, 1)

@@ -80,7 +80,7 @@ class Structure:
     sheen: bool
     anisotropic: bool
     iridescent: bool
-    opacity: Literal["full", "mask", "blend"]
+    opacity: Literal["full", "front", "mask", "blend"]
 
 
 def group(materials: Sequence[Material], variants: Sequence[Variant], store: TextureStore) -> list[list[Variant]]:
@@ -139,7 +139,7 @@ def structure_of(m: Material, faded: bool, store: TextureStore) -> Structure:
         sheen=sheen,
         anisotropic=anisotropic,
         iridescent=iridescent,
-        opacity="full" if whole else "mask" if m.alpha_mode == "mask" else "blend",
+        opacity=("front" if m.front_only else "full") if whole else "mask" if m.alpha_mode == "mask" else "blend",
     )
 
 
@@ -283,7 +283,9 @@ class _Maker:
             model.gloss_albedo = self._store.table("gloss", microfacet.gloss_albedo_table)
         if structure.solid and self._compensates:
             model.interface_albedo = self._store.table("interface", microfacet.interface_albedo_table)
-        if structure.opacity != "full":
+        if structure.opacity == "front":
+            model.opacity, model.front_only = Signal(numbers(np.ones(1))), True
+        elif structure.opacity != "full":
             model.opacity = self._channel("alpha", 3, "base_color_texture")
         if structure.opacity == "mask":
             model.opacity_cutoff = Signal(numbers(self._numbers("alpha_cutoff")))
@@ -333,9 +335,9 @@ class _Maker:
 
     def _emission(self, model: SurfaceModel) -> Emission:
         first = self._members[0]
-        covered = model if model.opacity is not None else None
+        covered = model if model.opacity is not None and not model.front_only else None
         if first.unlit:
-            return Emission(model.base_color, two_sided=True, model=covered, tinted=model.tinted)
+            return Emission(model.base_color, two_sided=not model.front_only, model=covered, tinted=model.tinted)
         return Emission(self._color("emission"), first.double_sided, covered, tinted=False)
 
     def _numbers(self, name: str) -> NDArray[np.float64]:
@@ -384,6 +386,7 @@ def _black(model: SurfaceModel) -> SurfaceModel:
         dull=True,
         opacity=model.opacity,
         opacity_cutoff=model.opacity_cutoff,
+        front_only=model.front_only,
         faded=model.faded,
     )
 

@@ -223,6 +223,7 @@ class ShadowRays:
                 part.maxt = distance
                 hit = self._scene.ray_intersect(part, mi.RayFlags.All, False, active)
                 crosses = hit.is_valid()
+                hit.wi = -hit.wi  # as the light comes
                 through = hit.bsdf(part).eval_null_transmission(hit, crosses)
                 transmittance = dr.select(crosses, transmittance * through, transmittance)
                 crossings += 1

@@ -80,7 +80,8 @@ class Material:
     thickness G, iridescence R, its thickness G). Colours of light (``emission``) are radiances; all others lie in
     [0, 1]. ``anisotropy`` is a strength in [0, 1], its ``rotation`` in radians from +u toward the top of the picture;
     its texture holds a direction in RG and a strength in B. The thin film of ``iridescence`` is some nanometres thick:
-    from minimum to maximum as its texture says, the maximum without one.
+    from minimum to maximum as its texture says, the maximum without one. An opaque ``front_only`` material has no back
+    faces: rays pass through them, and light falls through from behind.
 
     Examples
     --------
@@ -103,6 +104,7 @@ class Material:
     emission: Color = (0.0, 0.0, 0.0)
     emission_texture: Texture | None = None
     double_sided: bool = False
+    front_only: bool = False
     unlit: bool = False
     ior: float = 1.5
     transmission: float = 0.0

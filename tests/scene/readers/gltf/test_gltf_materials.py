@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import lippmann
 from lippmann.errors import SceneError
 from lippmann.scene.values.description import Material
 
@@ -35,6 +36,46 @@ def test_defaults(writer, read):
         expected = vars(Material(name=material.name, metallic=1.0))
         assert {k: v for k, v in vars(material).items() if v != expected[k]} == {}
     assert implied.name == "default"
+
+
+CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32)
+INWARD = np.array([(0, 2, 1), (1, 2, 3), (4, 5, 6), (5, 7, 6), (0, 1, 4), (1, 5, 4), (2, 6, 3), (3, 6, 7)])
+INWARD = np.concatenate([INWARD, [(0, 4, 2), (2, 4, 6), (1, 3, 5), (3, 7, 5)]])
+
+
+def box(writer, size, faces, **material):
+    index = writer.accessor(faces.ravel(), "u1")
+    writer.triangle(positions=CORNERS * size, indices=index, material=writer.add("materials", **material))
+
+
+@pytest.mark.parametrize(
+    ("faces", "material", "front_only"),
+    [
+        (INWARD, {}, True),
+        (INWARD[:, ::-1], {}, False),
+        (INWARD[:2], {}, False),
+        (INWARD, {"doubleSided": True}, False),
+        (INWARD, {"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}}, False),
+    ],
+)
+def test_inward_meshes_have_no_back_faces(writer, read, faces, material, front_only):
+    box(writer, 1, faces, **material)
+    scene = read(writer)
+    assert scene.materials[scene.meshes[0].material].front_only == front_only
+
+
+@pytest.mark.parametrize(("faces", "is_open"), [(INWARD, True), (INWARD[:, ::-1], False)])
+def test_a_room_is_looked_into_from_outside_and_lit_from_there(writer, tmp_path, faces, is_open):
+    def matte(*color):
+        return {"pbrMetallicRoughness": {"metallicFactor": 0, "baseColorFactor": [*color, 1]}}
+
+    box(writer, 1, faces, **matte(0.5, 0.5, 0.5))
+    box(writer, 0.4, INWARD[:, ::-1], **matte(0.8, 0.05, 0.05))
+    (tmp_path / "room.glb").write_bytes(writer.glb())
+    pixels = lippmann.preview(tmp_path / "room.glb", (20, 20), spp=16, denoise="none").pixels
+    red, green, _ = pixels[8:12, 8:12].mean(axis=(0, 1))
+    assert red > 0.1
+    assert (red > 3 * green) == is_open
 
 
 def test_metallic_roughness(material):

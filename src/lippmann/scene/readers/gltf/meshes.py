@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,6 +17,10 @@ from lippmann.scene.readers.gltf.splats import is_splats
 from lippmann.scene.values.description import FloatArray, Material, Mesh, Texture
 
 _Key = tuple[Hashable, ...]
+
+#: Of an inward mesh, the area-weighted mean of what its normals have along the way from its middle is below minus this;
+#: a closed box seen from inside has about 0.8, a sheet 0.
+_INWARD = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +38,12 @@ class Meshes:
     _places: dict[tuple[_Key, int], int] = field(default_factory=dict)
     _by_mesh: dict[_Key, list[int]] = field(default_factory=dict)
     _geometries: dict[_Key, Geometry | None] = field(default_factory=dict)
-    _unshaded: dict[int, int] = field(default_factory=dict)
+    _changed: dict[tuple[int, Callable[[Material], Material]], int] = field(default_factory=dict)
 
     def posed(self, document: Document, primitives: Primitives) -> Meshes:
         """Meshes of the same file as other nodes show them; geometry without skin or morph weights is shared."""
         unskinned = {key: geometry for key, geometry in self._geometries.items() if key[2:] == ((), None)}
-        return Meshes(document, primitives, self.materials, _geometries=unskinned, _unshaded=self._unshaded)
+        return Meshes(document, primitives, self.materials, _geometries=unskinned, _changed=self._changed)
 
     def places(self, index: int, node: Fields, skin: Skin | None) -> list[int]:
         """The places in :attr:`read` of the primitives of ``meshes[index]``, as ``node`` shows it.
@@ -70,7 +74,9 @@ class Meshes:
                 continue
             material = self.materials.place(self._material(primitive))
             if geometry.faces.shape[1] < 3 and not _has_normals(primitive):
-                material = self._without_shading(material)
+                material = self._change(material, points_lines.as_material)
+            if _is_culled(self.materials.read[material]) and _faces_inward(geometry):
+                material = self._change(material, _front_only)
             if (key, material) not in self._places:
                 self._places[key, material] = len(self.read)
                 name = fields.text("name") or fields.place
@@ -89,12 +95,12 @@ class Meshes:
                     return self.document.reference(mapping, "material", "materials")
         return self.document.reference(primitive, "material", "materials")
 
-    def _without_shading(self, material: int) -> int:
-        """The index of the same material as points and lines without normals show it."""
-        if material not in self._unshaded:
-            self._unshaded[material] = len(self.materials.read)
-            self.materials.read.append(points_lines.as_material(self.materials.read[material]))
-        return self._unshaded[material]
+    def _change(self, material: int, change: Callable[[Material], Material]) -> int:
+        """The index of a material after a change, made once."""
+        if (material, change) not in self._changed:
+            self._changed[material, change] = len(self.materials.read)
+            self.materials.read.append(change(self.materials.read[material]))
+        return self._changed[material, change]
 
     def _mesh(self, name: str, geometry: Geometry, material: int, primitive: Fields) -> Mesh:
         uv_sets = _uv_sets(self.materials.read[material])
@@ -115,6 +121,31 @@ class Meshes:
             geometry.colors,
             tangents=geometry.tangents,
         )
+
+
+def _is_culled(material: Material) -> bool:
+    """Whether glTF shows a material's front faces alone; glass has light on both sides of them."""
+    return not (material.double_sided or material.transmission)
+
+
+def _front_only(material: Material) -> Material:
+    return replace(material, front_only=True)
+
+
+def _faces_inward(geometry: Geometry) -> bool:
+    """Whether triangles mostly face the middle of their mesh, as those of rooms seen from outside and of outlines do.
+
+    Back faces of other meshes are drawn: they are seen where a shell is open.
+    """
+    if geometry.faces.shape[1] < 3:
+        return False
+    corners = geometry.positions[geometry.faces].astype(np.float64)
+    middles = corners.mean(axis=1)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1)
+    total = areas.sum()
+    outward = middles - areas @ middles / total if total else middles
+    return bool((normals * outward).sum() < -_INWARD * (areas * np.linalg.norm(outward, axis=1)).sum())
 
 
 def _is_fitted(mesh: Fields) -> bool:
