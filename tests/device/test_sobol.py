@@ -8,14 +8,14 @@ import pytest
 pytestmark = pytest.mark.usefixtures("engine")
 
 
-def points(pixel, count, seed=3, dimension=5):
+def points(pixel, count, seed=3, dimension=5, half=0):
     import drjit as dr
     import mitsuba as mi
 
     from lippmann.device.sobol import SampleStream
 
     index = dr.arange(mi.UInt32, count)
-    return np.array(SampleStream.of_pixels(mi.UInt32(pixel), index, mi.UInt32(seed)).next_2d(dimension)).T
+    return np.array(SampleStream.of_pixels(mi.UInt32(pixel), index, mi.UInt32(seed), half).next_2d(dimension)).T
 
 
 @pytest.mark.parametrize("pixel", [0, 1, 77, 2**31])
@@ -41,9 +41,9 @@ def test_one_sample_per_pixel_is_uniform_over_pixels():
     assert 255 - 5 * np.sqrt(2 * 255) < chi2 < 255 + 5 * np.sqrt(2 * 255)
 
 
-def test_pixels_dimensions_and_seeds_are_uncorrelated():
+def test_pixels_dimensions_seeds_and_halves_are_uncorrelated():
     base = points(4, 4096)
-    for other in (points(5, 4096), points(4, 4096, seed=4), points(4, 4096, dimension=6)):
+    for other in (points(5, 4096), points(4, 4096, seed=4), points(4, 4096, dimension=6), points(4, 4096, half=1)):
         assert not np.array_equal(base, other)
         assert np.abs(np.corrcoef(base.T, other.T)[:2, 2:]).max() < 0.06
 

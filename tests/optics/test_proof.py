@@ -118,6 +118,10 @@ def test_dark_lines_make_moire():
     across = panel.pixels_per_lens[0]
     periods = {wave.order: wave.period for wave in waves}
     assert periods[1, 0] == pytest.approx(panel.lattice.pitch / abs(across - round(across)), rel=1e-6)
+    # A Gaussian of a fifth of a pixel's width leaves exp(-2 (pi / 5)^2) of a wave a pixel.
+    inked = moire_waves(replace(panel, pixel=replace(panel.pixel, blur=panel.panel.pixel_pitch / 5)))
+    plain, bled = ({wave.order: wave.contrast for wave in each}[1, 0] for each in (waves, inked))
+    assert bled / plain == pytest.approx(math.exp(-2 * (math.pi / 5) ** 2))
     blurred = moire_waves(replace(panel, lens=LensProfile(2.0, 1.5)))
     assert max((wave.contrast for wave in blurred), default=0) < max(wave.contrast for wave in waves)
 

@@ -155,6 +155,10 @@ def test_where_nothing_is_saved_there_is_no_window(ball, monkeypatch):
     endless = replace(DISPLAYS[0], name="endless")
     assert panel_window(np.full((8, 3), np.inf), endless) is None
     assert view_window(np.full((8, 3), np.inf), endless, (100, 80)) is None
+    # Nothing is met before the aperture, 20 mm out, where a corner may lie behind the eye at 300 mm.
+    small = np.array(corners) * 0.1
+    near, beyond = (np.where(small[:, 2:] > 0, small * [1, 1, 0] + [0, 0, z], small) for z in (20, 400))
+    assert panel_window(beyond, DISPLAYS[0]) == panel_window(near, DISPLAYS[0]) != panel_window(small, DISPLAYS[0])
     # All of it beside the panel: one pixel is left.
     beside = np.array(corners)
     beside[:, 0] += 1e4
