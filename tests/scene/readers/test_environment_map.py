@@ -60,18 +60,16 @@ def test_the_content_counts_and_not_the_name(tmp_path, pixels):
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({(2, 3): (1, np.nan, 1)}, r"sky\.exr: pixel \(3, 2\) is \[1\.0, nan, 1\.0\]; light is finite"),
-        ({(2, 3): (1, np.inf, 1)}, r"pixel \(3, 2\)"),
-        ({(0, 0): (-1, 0, 0)}, r"pixel \(0, 0\) is \[-1\.0, 0\.0, 0\.0\]"),
-    ],
+    ("value", "counts_as"), [((1, np.nan, 1), (1, 0, 1)), ((np.inf, 1, 1), (65504, 1, 1)), ((-1e-7, 3, 0), (0, 3, 0))]
 )
-def test_light_that_cannot_be(tmp_path, pixels, change, message):
-    for place, value in change.items():
-        pixels[place] = value
-    with pytest.raises(SceneError, match=message):
-        read_environment(save_exr(tmp_path / "sky.exr", {"RGB": pixels}))
+def test_light_that_cannot_be_is_mended_with_a_note(tmp_path, pixels, value, counts_as):
+    pixels[2, 3] = value
+    sky = read_environment(save_exr(tmp_path / "sky.exr", {"RGB": pixels}))
+    assert sky.pixels[2, 3].tolist() == list(counts_as)
+    assert [note for note in sky.notes if note.startswith("sky.exr: 1 pixels hold negative light")]
+    pixels[2, 3] = counts_as
+    assert (sky.pixels == pixels).all()
+    assert not read_environment(save_exr(tmp_path / "sky.exr", {"RGB": pixels})).notes
 
 
 def test_shapes_that_are_no_panorama(tmp_path, pixels):

@@ -147,6 +147,13 @@ def test_what_cannot_be_drawn_is_counted_in_a_note(read):
     assert scene.notes == ["2 curves are not rendered", *statements]
 
 
+def test_free_form_surfaces_alone_are_no_cloud_of_their_control_points(read):
+    with pytest.raises(
+        SceneError, match="holds curves and free-form surfaces alone; faces, lines and points are shown"
+    ):
+        read(SQUARE + "cstype bezier\ndeg 1 1\ncurv 0 1 1 2\nsurf 0 1 0 1 1 2 4 3\nparm u 0 1\nend\n")
+
+
 def test_points_and_lines_are_drawn(read):
     text = "mtllib m.mtl\n" + SQUARE + "p 1 3\nusemtl red\nl 1/1 2 -1\nf 1 2 3\nusemtl blue\nl 2 2\nl 3 4\n"
     scene = read(text, m__mtl="newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n")

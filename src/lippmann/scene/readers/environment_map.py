@@ -14,6 +14,8 @@ from lippmann.errors import PictureError, SceneError
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.values.description import Environment
 
+_LARGEST_HALF = 65504.0
+
 #: Channels of red, green and blue: luminance or red alone is grey.
 _COLORS = (("R", "G", "B"), ("Y", "Y", "Y"), ("R", "R", "R"))
 
@@ -24,12 +26,23 @@ def read_environment(path: Path) -> Environment:
     Raises
     ------
     SceneError
-        The file is missing, damaged or neither EXR nor HDR; it has no three colours; a value is negative, not finite
-        or beyond 32-bit floats; it is less than two pixels high or wide, or not about twice as wide as high.
+        The file is missing, damaged or neither EXR nor HDR; it has no three colours; it is less than two pixels high
+        or wide, or not about twice as wide as high.
     """
     pixels, notes = read_linear(path, check_size=lambda height, width: _check_size(height, width, path.name))
-    _check(pixels, path.name)
-    return Environment(pixels, name=path.name, notes=notes)
+    light = possible_light(pixels)
+    if changed := int((light != pixels).any(axis=-1).sum()):
+        what = "negative light or none that is a finite number, which counts as 0, infinite light as 65504"
+        notes = (*notes, f"{path.name}: {changed} pixels hold {what}")
+    return Environment(light, name=path.name, notes=notes)
+
+
+def possible_light(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Radiance ``(h, w, 3)`` without negative values, which lossy coding and sharpening leave behind, and NaN.
+
+    Infinite values, suns that overflowed a half float, become the largest such number.
+    """
+    return np.clip(np.nan_to_num(pixels, posinf=_LARGEST_HALF), 0.0, None)
 
 
 def read_linear(
@@ -93,16 +106,4 @@ def _check_size(height: int, width: int, where: str) -> None:
             where=where,
             rule="an equirectangular picture is twice as wide as high",
             fix="convert cube maps and mirror balls first",
-        )
-
-
-def _check(pixels: NDArray[np.float32], where: str) -> None:
-    _check_size(pixels.shape[0], pixels.shape[1], where)
-    bad = ~np.isfinite(pixels).all(axis=-1) | (pixels < 0.0).any(axis=-1)
-    if bad.any():
-        row, column = (int(value) for value in np.argwhere(bad)[0])
-        raise SceneError(
-            f"pixel ({column}, {row}) is {pixels[row, column].tolist()}",
-            where=where,
-            rule="light is finite and not negative",
         )

@@ -77,6 +77,7 @@ _ELSEWHERE = {
     ".b3dm": "take the .glb out of it by: npx 3d-tiles-tools b3dmToGlb -i in.b3dm -o out.glb",
     ".vtm": "save its blocks as one data set, in PyVista by: pyvista.read('a.vtm').combine().save('a.vtu')",
     ".pvd": "name one of the files that it lists",
+    ".vtkhdf": "save it as .vtu, in PyVista by: pyvista.read('a.vtkhdf').cast_to_unstructured_grid().save('a.vtu')",
     **dict.fromkeys((".nrrd", ".nhdr", ".mha", ".mhd"), _SLICER_3D),
     **dict.fromkeys((".mgz", ".mgh"), "convert it by FreeSurfer: mri_convert in.mgz out.nii.gz"),
     ".mtl": "it holds the materials of an .obj file: name that",

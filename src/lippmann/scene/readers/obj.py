@@ -102,6 +102,11 @@ def read_obj(path: Path, *, files: NamedFiles | None = None) -> SceneDescription
     where = path.name
     statements = _split_statements(decode_text(read_bytes(path), where), where)
     if not (statements.faces.bodies or statements.points.bodies or statements.lines.bodies):
+        foreign = [what for what in statements.ignored if what in _UNSUPPORTED.values()]
+        if foreign:
+            fix = "turn them into meshes, in Blender for instance"
+            what = f"holds {' and '.join(foreign)} alone"
+            raise SceneError(what, where=where, rule="faces, lines and points are shown", fix=fix)
         if not statements.positions.bodies or statements.uvs.bodies:  # clouds have no texture coordinates
             fix = "is it cut short?" if statements.uvs.bodies else "is it an OBJ file?"
             raise SceneError("holds no faces, lines or points", where=where, fix=fix)

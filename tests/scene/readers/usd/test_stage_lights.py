@@ -115,14 +115,14 @@ def Camera "flat" {
     float verticalAperture = 20
 }
 """
-    head = '#usda 1.0\n(\n    upAxis = "Y"\n    metersPerUnit = 0.1\n)\n'
+    head = '#usda 1.0\n(\n    upAxis = "Y"\n    metersPerUnit = 10\n)\n'
     view, flat = read(triangle() + body, head=head).cameras
     assert view.fov_y == pytest.approx(2 * math.atan(12 / 50))
     assert view.aspect == pytest.approx(1.5)
-    assert view.focus_distance == pytest.approx(0.7)
-    assert view.world_from_camera[:3, 3] == pytest.approx([0, 0, 0.5])
-    # An aperture is in tenths of a unit, a unit is 0.1 m.
-    assert (flat.height, flat.aspect) == pytest.approx((0.2, 2))
+    assert view.focus_distance == pytest.approx(70)
+    assert view.world_from_camera[:3, 3] == pytest.approx([0, 0, 50])
+    # An aperture is in tenths of a unit, a unit is 10 m.
+    assert (flat.height, flat.aspect) == pytest.approx((20, 2))
 
 
 def test_exposure_and_shift_of_cameras_are_those_of_pxr(read):

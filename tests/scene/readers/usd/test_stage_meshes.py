@@ -157,10 +157,10 @@ def test_cages_are_refined_by_default(read):
 
 
 def test_units_and_the_up_axis(read):
-    head = '#usda 1.0\n(\n    upAxis = "Z"\n    metersPerUnit = 0.01\n)\n'
+    head = '#usda 1.0\n(\n    upAxis = "Z"\n    metersPerUnit = 100\n)\n'
     scene = read(triangle(), head=head)
     # x stays, z is up, y leads away from the viewer.
-    assert world_corners(scene)[0] == pytest.approx(np.array([[0, 0, 0], [0.01, 0, 0], [0, 0, -0.01]]))
+    assert world_corners(scene)[0] == pytest.approx(np.array([[0, 0, 0], [100, 0, 0], [0, 0, -100]]))
 
 
 def test_hidden_prims_and_guides_are_not_shown(read):

@@ -34,6 +34,18 @@ def test_axes_lead_to_a_patient_seen_from_the_front_head_up(tmp_path, name, vers
     assert volume.world_from_voxel.tolist() == [[2, 0, 0, -10], [0, 0, 4, 30], [0, 3, 0, -20], [0, 0, 0, 1]]
 
 
+def test_a_volume_that_does_not_say_how_the_patient_lies_says_what_is_assumed(tmp_path):
+    import nibabel
+
+    image = nibabel.Nifti1Image(GRID, None)
+    for name, code in (("bare.nii", 0), ("placed.nii", 1)):
+        image.header["sform_code"], image.header["qform_code"] = 0, code
+        nibabel.save(image, tmp_path / name)
+    scenes = [load_scene(tmp_path / name) for name in ("bare.nii", "placed.nii")]
+    assert [any("how the patient lies" in note for note in scene.notes) for scene in scenes] == [True, False]
+    assert scenes[0].description.volume.world_from_voxel[:3, :3].tolist() == [[1, 0, 0], [0, 0, 1], [0, 1, 0]]
+
+
 def test_scale_of_values_and_units_of_length(tmp_path):
     import nibabel
 

@@ -18,7 +18,7 @@ from lippmann.runtime.atomic_write import scratch_folder
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import MissingFileError, NamedFiles, decode_image, read_bytes
 from lippmann.scene.parsing.texture_maps import unit
-from lippmann.scene.readers.environment_map import read_environment, read_linear
+from lippmann.scene.readers.environment_map import possible_light, read_environment, read_linear
 from lippmann.scene.readers.usd.records import Record
 from lippmann.scene.values.description import Image
 
@@ -96,7 +96,7 @@ class Assets:
             with self._file(asset) as path:
                 pixels, notes = read_linear(path)
             self.notes.update(dict.fromkeys(notes))
-            return Image(path.name, np.maximum(np.nan_to_num(pixels, posinf=0.0, neginf=0.0), 0.0))
+            return Image(path.name, possible_light(pixels))
         return decode_image(self._bytes(asset), Path(name).name, where=self.stage.name)
 
     def environment(self, asset: Record) -> NDArray[np.float32]:

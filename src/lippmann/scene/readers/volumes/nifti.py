@@ -81,6 +81,8 @@ def read_nifti(path: Path, *, series: str | None = None) -> SceneDescription:
     grid = np.frombuffer(data, dtype).reshape(shape[::-1])
     scaling = np.diag([unit, unit, unit, 1.0])
     notes = [f"volume {number} of {count} (series)"] if count > 1 else []
+    if not (header["qform_code"] > 0 or header["sform_code"] > 0):
+        notes.append("nothing says how the patient lies: x is taken to run to the left, y to the front, z to the head")
     return describe_volume(
         path.name.removesuffix(".gz").removesuffix(".nii"),
         grid,
