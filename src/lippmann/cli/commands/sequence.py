@@ -166,7 +166,7 @@ def render_frames(
 
 
 def open_moving(source: SceneSource, spec: SequenceOptions, request: RenderRequest) -> Motion:
-    """The motion of the options."""
+    """Animation, camera flight or turntable that the options ask for."""
     if spec.turns:
         from lippmann.options.placement import PlacementOptions
         from lippmann.runtime import engine

@@ -28,7 +28,7 @@ class DamagedError(Exception):
 
 @compiled
 def take(data: Bytes, at: NDArray[np.int64], bits: int) -> int:
-    """The next ``bits`` bits, 0 to 25, of ``data`` from bit ``at[0]`` on, which moves; zeros after its end."""
+    """Read the next ``bits`` bits, 0 to 25, of ``data`` and advance ``at[0]``, the bit; zeros after the end."""
     position = at[0]
     byte = position >> 3
     value = 0
