@@ -158,6 +158,18 @@ def test_no_eye_behind_the_display_and_no_endless_preview(lippmann, kept, words,
     refuse(lippmann("preview", "no.glb", *words, "-o", kept), named)
 
 
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("--display", "panel-4k"), "--display: is for a display"),
+        (("--turn", "30"), "--turn: is for a display"),
+        (("--eye", "0,0,600"), "--eye: is for a display"),
+    ],
+)
+def test_a_plain_picture_has_no_options_of_a_display(lippmann, kept, words, named):
+    refuse(lippmann("preview", "teapot", "--plain", *words, "-o", kept), named)
+
+
 def test_an_unknown_output_format(lippmann, tmp_path):
     refuse(lippmann("render", "teapot", *FAST, "-o", tmp_path / "out.bmp"), ".bmp", "png")
     assert list(tmp_path.iterdir()) == []

@@ -204,7 +204,7 @@ def test_a_folder_a_display_and_what_is_said(lippmann, frames, tmp_path):
         ((*SHEET, "--size", "30x20mm", "--shift", "3"), "--shift: '3'; must be a number with its unit"),
         ((*SHEET, "--size", "30x20mm", "--bleed=-1mm"), "--bleed: -1 mm is out of range"),
         ((*SHEET, "--size", "30x20mm", "--lenses", "across", "--marks", "8mm"), "--marks: marks are for upright"),
-        ((*SHEET, "--size", "30x20mm", "--icc", "absent.icc"), "absent.icc: cannot be read"),
+        ((*SHEET, "--size", "30x20mm", "--icc", "absent.icc"), "absent.icc: no such file"),
         (("-d", "lkg-portrait", "--marks", "8mm"), "--marks: does not apply"),
         (("-d", "lkg-portrait", "--mirror"), "--mirror: does not apply"),
         (("-d", "lkg-portrait", "--icc", "a.icc"), "--icc: does not apply"),

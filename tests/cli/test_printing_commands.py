@@ -130,7 +130,7 @@ def test_bad_prints_are_one_line_and_code_2(lippmann, tmp_path, words, said):
         ),
         (("render", "teapot", "--bleed", "3mm"), "--bleed: does not apply to the display seed-lenticular"),
         (("render", "teapot", "-d", "lkg-portrait", "--mirror"), "--mirror: does not apply to the display"),
-        (("render", "teapot", "-d", SHORT, "--icc", "absent.icc"), "absent.icc: cannot be read"),
+        (("render", "teapot", "-d", SHORT, "--icc", "absent.icc"), "absent.icc: no such file"),
         (("render", "teapot", "-d", SHORT, "--bleed", "200mm"), "--bleed: 200 mm is out of range"),
         (("render", "teapot", "-d", SHORT, "--maps", "maps", "--resume"), "--maps: needs the whole picture at once"),
         (("render", "teapot", "-d", SHORT, "--mirror", "--turntable", "2"), "--mirror: does not apply to frames"),
@@ -138,7 +138,7 @@ def test_bad_prints_are_one_line_and_code_2(lippmann, tmp_path, words, said):
         (("pitch-test", *SHEET, "--strips", "0"), "0 is out of range"),
         (("pitch-test", *SHEET, "--step", "-1"), "-1 is out of range"),
         (("pitch-test",), "--ppi: ppi is missing"),
-        (("marks", "absent.tif"), "absent.tif: not found"),
+        (("marks", "absent.tif"), "absent.tif: no such file"),
     ],
 )
 def test_bad_input_is_one_line_and_code_2(lippmann, tmp_path, words, said):

@@ -76,9 +76,11 @@ def test_a_sweep_in_another_codec(lippmann, picture, tmp_path, codec, name):
         (("--sbs", "wide"), "'wide'"),
         (("--codec", "av1"), "--codec: applies to an animation only"),
         (("--codec", "av1", "--sweep"), "--codec: only MP4 has a choice of codecs"),
-        (("--path", "none.csv"), "none.csv: cannot be read"),
+        (("--path", "none.csv"), "none.csv: no such file"),
         (("--path", "none.csv", "--sweep"), "--path: the path says where the eye is"),
         (("--path", "none.csv", "--sweep-width", "9"), "--sweep-width: applies to a sweep only"),
+        (("--frames", "9"), "--frames: applies to a sweep only"),
+        (("--sweep", "--bits", "16"), "--bits: 16; animations have 8"),
     ],
 )
 def test_what_makes_no_sense_is_refused_in_one_line(lippmann, picture, tmp_path, words, said):

@@ -161,7 +161,7 @@ def test_pictures_that_will_not_do(lippmann, shot, tmp_path, monkeypatch, way):
     plain = tmp_path / "plain.png"
     write_plain_picture(PIXELS, plain)
     refuse(lippmann("view", plain, *way), "plain.png", "--display")
-    refuse(lippmann("view", tmp_path / "gone.png", *way), "gone.png", "not found")
+    refuse(lippmann("view", tmp_path / "gone.png", *way), "gone.png", "no such file")
     refuse(lippmann("view", shot, tmp_path / "gone.png", *way), "gone.png")
     foreign = tmp_path / "foreign.png"
     foreign.write_bytes(b"no picture")

@@ -84,7 +84,7 @@ def test_what_is_not_meant_is_refused(display, picture, tmp_path):
         export_image(image, tmp_path / "x", "zarr", distance=5.0)
     with pytest.raises(UsageError, match="unknown layout 'hdf'"):
         import_image(tmp_path, "hdf")
-    with pytest.raises(PictureError, match="not found"):
+    with pytest.raises(PictureError, match="no such file"):
         import_image(tmp_path / "no")
     (tmp_path / "x.dat").write_bytes(b"1")
     with pytest.raises(PictureError, match="the layout is not recognized; say layout="):

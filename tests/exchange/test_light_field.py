@@ -109,7 +109,7 @@ def test_only_rows_and_columns_of_whole_lenses_are_rectangular(display):
     for made, what in (
         (display("hexagonal"), "has hexagonal lenses; it takes lenses in rows and columns"),
         (load_display("panel-4k"), "has slanted lenses"),
-        (load_display("print-60lpi"), "print-60lpi do not; it takes lenses that cover whole pixels"),
+        (load_display("print-60lpi"), "print-60lpi cover parts of pixels; it takes lenses that cover whole pixels"),
     ):
         with pytest.raises(PictureError, match=what):
             check_rectangular(made, "it")

@@ -48,7 +48,8 @@ def with_bleed(display: Display, bleed: float) -> Display:
         return display
     if not is_real(bleed) or not 0 < bleed <= MOST_BLEED:
         rule = f"it must be 0 to {MOST_BLEED:g} mm"
-        raise UsageError(f"{bleed!r} mm is out of range", parameter="bleed", rule=rule)
+        what = f"{bleed:g} mm is out of range" if is_real(bleed) else repr(bleed)
+        raise UsageError(what, parameter="bleed", rule=rule)
     if display.sheet is None:
         rule = "it applies to prints only"
         raise UsageError(f"does not apply to the display {display.name}", parameter="bleed", rule=rule)

@@ -222,8 +222,8 @@ def check_rectangular(display: Display, layout: str) -> None:
         rule = f"{layout} takes lenses in rows and columns"
         raise PictureError(f"the display {display.name} has {kind}", rule=rule, fix=fix)
     if not view_grid(display).exact:
-        rule = f"{layout} takes lenses that cover whole pixels"
-        raise PictureError(f"the lenses of the display {display.name} do not", rule=rule, fix=fix)
+        what = f"the lenses of the display {display.name} cover parts of pixels"
+        raise PictureError(what, rule=f"{layout} takes lenses that cover whole pixels", fix=fix)
 
 
 def view_shape(display: Display) -> Shape:

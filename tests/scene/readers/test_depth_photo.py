@@ -476,3 +476,13 @@ def test_a_photograph_of_another_colour_space_becomes_srgb(tmp_path):
     np.save(tmp_path / "d.npy", np.ones((8, 8)))
     description = load_scene(tmp_path / "a.png", depth_map=tmp_path / "d.npy").description
     assert description.materials[0].base_color_texture.image.pixels == pytest.approx(188, abs=1)
+
+
+def test_light_that_changes_nothing_in_a_photograph_is_said(tmp_path):
+    Pillow.new("RGB", (8, 8)).save(tmp_path / "a.png")
+    np.save(tmp_path / "a-depth.npy", np.ones((8, 8)))
+    scene = load_scene(tmp_path / "a.png", light={"light_strength": 2.0}, single_scattering=True)
+    assert scene.notes[-1] == (
+        "a photograph keeps its own colours, whatever light is given: single_scattering, light_strength"
+    )
+    assert "whatever light" not in "".join(load_scene(tmp_path / "a.png").notes)

@@ -15,6 +15,7 @@ from lippmann.cli.shared.scene_source import SceneSource, display_of
 from lippmann.errors import UsageError
 from lippmann.options.forms import LEFT_OUT
 from lippmann.options.light import LightOptions
+from lippmann.options.option import default_of, flag_of, options_of
 from lippmann.options.outputs import AccessOptions
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.prints import PrintOptions
@@ -29,11 +30,15 @@ if TYPE_CHECKING:
     from lippmann.scene.scene import Scene
 
 
+#: The display of a picture for which none is given.
+_DISPLAY = "seed-lenticular"
+
+
 @with_options
 def preview(
     scene: options.Scene,
     output: options.OptionalOutput = None,
-    display: options.DisplayName = "seed-lenticular",
+    display: options.DisplayName = _DISPLAY,
     plain: Annotated[
         bool,
         typer.Option(
@@ -75,6 +80,8 @@ def preview(
     console = Console(quiet, as_json)
     output = output_of(output, scene, "-preview.png")
     check_output(output, bits)
+    if plain:
+        _check_plain(eye, display, placement, is_of_state=state is not None)
     target = display_of(display, printed)
     request = RenderRequest.from_options(how, machine, placement=placement).for_file(output, bits)
     source = SceneSource(scene, asked, light, access)
@@ -85,7 +92,7 @@ def preview(
         loaded = source.load()
         load_seconds = time.perf_counter() - started
         if plain:
-            image = _plain(loaded, placement.camera, size, eye, request, progress)
+            image = _plain(loaded, placement.camera, size, request, progress)
         else:
             from lippmann.rendering.live.eye_preview import render_eye_preview
 
@@ -105,16 +112,28 @@ def preview(
     )
 
 
+def _check_plain(eye: str | None, display: str, placement: PlacementOptions, *, is_of_state: bool) -> None:
+    """Refuse options of a display, of which a plain picture has none; the file of a studio may hold them."""
+    given = ["eye"] if eye is not None else []
+    if not is_of_state:
+        given += ["display"] if display != _DISPLAY else []
+        given += [
+            each.name
+            for each, _ in options_of(PlacementOptions)
+            if each.name != "camera" and getattr(placement, each.name) != default_of(each)
+        ]
+    if given:
+        rule = "--plain shows the scene without a display"
+        raise UsageError("is for a display", where=flag_of(given[0]), rule=rule, fix="leave one of them out")
+
+
 def _plain(
     scene: Scene,
     camera: str | None,
     size: tuple[int, int],
-    eye: str | None,
     request: RenderRequest,
     progress: ProgressCallback,
 ) -> Preview:
     from lippmann.rendering.preview import render_preview
 
-    if eye is not None:
-        raise UsageError("sees a display", where="--eye", rule="--plain has none", fix="leave one of them out")
     return render_preview(scene, camera, size, request, progress)

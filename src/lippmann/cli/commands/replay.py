@@ -47,7 +47,7 @@ def replay(
     sweep: Annotated[
         bool, typer.Option("--sweep", help="Write an animation from left to right: .mp4 or .png (APNG).")
     ] = False,
-    frames: Annotated[int, typer.Option("--frames", help="Number of frames of the sweep.")] = 48,
+    frames: Annotated[int | None, typer.Option("--frames", help="Number of frames of the sweep; 48.")] = None,
     width: Annotated[
         float | None, typer.Option("--sweep-width", help="Width of the sweep in mm. Default: the field of view.")
     ] = None,
@@ -118,8 +118,9 @@ def replay(
     moves = sweep or path is not None
     output = output_of(output, picture, "-sweep.mp4" if moves else "-seen.png")
     _check_output(output, film, moves=moves, stereo=stereo is not None, bits=bits)
-    if width is not None and not sweep:
-        raise UsageError("applies to a sweep only", where="--sweep-width", fix="add --sweep")
+    if not sweep and (width is not None or frames is not None):
+        flag = "--frames" if width is None else "--sweep-width"
+        raise UsageError("applies to a sweep only", where=flag, fix="add --sweep")
     places = None if path is None else head_path(path)
     quilt = quilt_of(picture, layout, aspect)
     if quilt is None:
@@ -156,7 +157,7 @@ def replay(
     if places is None:
         reach = _field_width(target, position[2]) if width is None else width
         start, stop = ((position[0] + side * reach / 2, *position[1:]) for side in (-1, 1))
-        places = path_of_eye(start, stop, frames)
+        places = path_of_eye(start, stop, 48 if frames is None else frames)
     with console.progress() as progress:
 
         def frames_in_turn() -> Iterator[FloatArray]:
@@ -178,6 +179,8 @@ def _check_output(output: Path, film: SequenceOptions, *, moves: bool, stereo: b
     from lippmann.viewing.video_file import check_animation_path
 
     if moves:
+        if bits not in (None, 8):
+            raise UsageError(str(bits), where="--bits", rule="animations have 8", fix="leave it out")
         check_animation_path(output, film.codec)
         check_writable(output)
         return

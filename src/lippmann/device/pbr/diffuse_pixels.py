@@ -166,7 +166,7 @@ class KeyPicture:
         off_plane: Float,
         active: Bool,
     ) -> tuple[Bool, Array, Array, Array]:
-        """Mean, least and largest irradiance of the pixels that count around a place in a view, and whether there are any."""
+        """Whether any pixels around a place in a view count; their mean, least and largest irradiance."""
         left, top, right, bottom = inside
         step, width = self._step, self._width
         # Colours of their own stand side by side in a pixel.

@@ -12,7 +12,7 @@ import numpy as np
 from lippmann.codecs.types import FILMS
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.light import LightOptions
-from lippmann.options.option import takes
+from lippmann.options.option import default_of, options_of, takes
 from lippmann.options.outputs import AccessOptions
 from lippmann.options.scene import LoadKeywords, SceneOptions, Up
 from lippmann.options.texts import settings_of
@@ -184,6 +184,8 @@ def read_scene(
     description = override_light(scene.physical, sky, color)
     if asked.single_scattering:
         description = _single_scattering(description)
+    if scene.fills_panel and isinstance(description, SceneDescription):
+        description = _note_unused_light(description, asked, light or LightOptions())
     return replace(scene, description=description, studio=studio)
 
 
@@ -194,6 +196,16 @@ def _selected(scene: Scene, asked: SceneOptions) -> Scene:
     of_splats, of_volume = (None, asked.crop) if scene.has_volume else (asked.crop, None)
     scene = SplatSelection(of_splats, asked.unit_scale, asked.min_opacity).of(scene)
     return VolumeSelection(of_volume, asked.transfer_function, asked.window).of(scene)
+
+
+def _note_unused_light(photograph: SceneDescription, asked: SceneOptions, light: LightOptions) -> SceneDescription:
+    """A photograph with a note that names the options of light that were given, which it has no use for."""
+    unused = [name for name in ("environment", "single_scattering") if getattr(asked, name)]
+    unused += [each.name for each, _ in options_of(LightOptions) if getattr(light, each.name) != default_of(each)]
+    if not unused:
+        return photograph
+    remark = f"a photograph keeps its own colours, whatever light is given: {', '.join(unused)}"
+    return replace(photograph, notes=(*photograph.notes, remark))
 
 
 def _single_scattering(description: SceneDescription | MitsubaSource) -> SceneDescription:
