@@ -98,7 +98,7 @@ def test_a_scene_with_light_keeps_its_own(description):
     assert scene.notes == ()
 
 
-def test_a_note_names_the_studio_where_mirrors_show_black():
+def test_a_note_names_the_studio_where_mirrors_would_show_black():
     bulb = [Light("point", (1, 1, 1), np.eye(4))]
 
     def notes(environment=None, **surface):
@@ -108,6 +108,20 @@ def test_a_note_names_the_studio_where_mirrors_show_black():
     assert notes(metallic=1.0, roughness=0.1) == notes(transmission=1.0, roughness=0.0) == (MIRROR_NOTE,)
     assert notes(metallic=1.0, roughness=0.9) == notes(metallic=0.0, roughness=0.1) == ()
     assert notes(studio(), metallic=1.0, roughness=0.1) == ()
+
+
+def test_mirrors_that_lights_alone_light_mirror_a_studio_a_quarter_as_bright():
+    sun = [Light("directional", (6.0, 2.0, 1.0), np.eye(4))]
+    lit = dataclasses.replace(
+        describe(material=Material(metallic=1.0, roughness=0.1), lights=sun), physical_lights=True
+    )
+    scene = Scene("s", lit)
+    assert scene.background == (0, 0, 0)
+    assert scene.environment.follows_viewer
+    # A white surface that faces the sun has a radiance of 3 / pi, in the studio of strength 1 one of 1.
+    np.testing.assert_allclose(scene.environment.pixels, studio().pixels * (0.25 * 3 / np.pi), rtol=1e-5)
+    dark = Scene("s", lit, studio=False)
+    assert (dark.environment, dark.background, dark.notes) == (None, None, ())
 
 
 def test_light_that_does_not_count():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -36,10 +37,13 @@ if TYPE_CHECKING:
 Bounds = NDArray[np.float64]
 
 STUDIO_NOTE = "no lights in the scene: lit by the built-in studio"
-MIRROR_NOTE = 'the lights have no surroundings, so that metal and glass mirror black: environment="studio" adds some'
+MIRROR_NOTE = "the lights have no surroundings: metal and glass mirror a dim studio (environment=none: black)"
 
 #: Radiance of even surroundings; surfaces that light a scene less than these would are no light sources.
 _DIMMEST = 0.02
+
+#: Radiance of a white surface that the studio adds to a file's lights, as a share of what these give it.
+_FILL = 0.25
 
 _FRAMING_FOV = np.radians(30.0)
 
@@ -242,10 +246,12 @@ class Scene:
 
     @cached_property
     def _original_environment(self) -> Environment | None:
-        if not self.in_studio:
+        if not (self.in_studio or self._needs_surroundings):
             return self.physical.environment
         from lippmann.scene.studio_light import studio, studio_for
 
+        if not self.in_studio:
+            return studio(_FILL * self._irradiance() / math.pi)
         return studio_for(self.physical) if isinstance(self.physical, SceneDescription) else studio()
 
     @property
@@ -274,7 +280,7 @@ class Scene:
     def background(self) -> Color | None:
         """Colour seen where nothing is hit; None for the environment itself (black without one)."""
         if self.physical.background is not None or not self.in_studio:
-            return self.physical.background
+            return (0.0, 0.0, 0.0) if self._needs_surroundings else self.physical.background
         from lippmann.scene.studio_light import BACKDROP
 
         return BACKDROP
@@ -285,19 +291,34 @@ class Scene:
         notes = tuple(self.physical.notes) if isinstance(self.physical, SceneDescription) else ()
         if self.in_studio:
             return (*notes, STUDIO_NOTE)
-        return (*notes, MIRROR_NOTE) if self._mirrors_black() else notes
+        return (*notes, MIRROR_NOTE) if self._needs_surroundings else notes
 
-    def _mirrors_black(self) -> bool:
+    @cached_property
+    def _needs_surroundings(self) -> bool:
         """Whether there are smooth metals or glass that only the point, spot or directional lights of a file light."""
-        if not self.has_physical_lights or not self.lights or self.environment is not None:
+        if not (self.studio and self.has_physical_lights) or self.physical.environment is not None:
             return False
         assert isinstance(self.physical, SceneDescription)
+        if not self.physical.lights:
+            return False
         materials = (self.physical.materials[self.physical.meshes[mesh].material] for mesh in self.physical.placements)
         return any(
             each.roughness < 0.5 and max(each.metallic, each.transmission) > 0.5
             for each in materials
             if each.metallic_roughness_texture is None
         )
+
+    def _irradiance(self) -> float:
+        """What the file's lights send to a surface in the scene's middle that faces them all, W/m², mean of colours."""
+        assert isinstance(self.physical, SceneDescription)
+        low, high = self.bounds
+        total = 0.0
+        for light in self.physical.lights:
+            way = np.asarray(light.world_from_light)[:3, 3] - (low + high) / 2
+            nearest = float((high - low) @ (high - low)) / 4
+            square = 1.0 if light.kind == "directional" else max(float(way @ way), nearest)
+            total += sum(light.color) / 3 / square
+        return total
 
     def camera(self, name: str | None = None) -> Camera:
         """A camera by name; without one the first, or for a scene without cameras one that frames it from +z.
