@@ -79,7 +79,7 @@ def _render(path: Path, display: str, memory: int) -> dict[str, Any]:
 
     # Kernels are compiled once and kept: a small picture before the clock runs.
     small = lippmann.load_scene(path)
-    few = small.description.splats.chosen(np.arange(0, small.description.splats.count, 50))
+    few = small.description.splats.select(np.arange(0, small.description.splats.count, 50))
     lippmann.render(type(small.description)("few", splats=few), "seed-lenticular")
     start = time.process_time()
     scene = lippmann.load_scene(path)

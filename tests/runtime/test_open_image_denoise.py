@@ -53,7 +53,7 @@ def test_filters_close_after_their_run_or_with_the_block_that_keeps_memory(devic
     picture = np.random.default_rng(3).random(SIZE, dtype=np.float32)
     alone = run(device, picture)
     assert len(closed) == 1
-    with library.kept_memory():
+    with library.keep_memory():
         runs = [run(device, picture) for _ in range(2)]
         assert len(closed) == 1
     assert len(closed) == 3
@@ -64,7 +64,7 @@ def test_filters_close_after_their_run_or_with_the_block_that_keeps_memory(devic
 
 def test_filters_close_after_an_error_too(device, closed):
     def fails():
-        with library.kept_memory(), library.open_filter(device):
+        with library.keep_memory(), library.open_filter(device):
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):

@@ -9,7 +9,7 @@ from contextlib import suppress
 import pytest
 
 from lippmann.runtime import thread_policy
-from lippmann.runtime.thread_policy import kept_policy, run_behind
+from lippmann.runtime.thread_policy import keep_policy, run_behind
 
 REAL_TIME = getattr(os, "SCHED_FIFO", None)
 
@@ -31,7 +31,7 @@ def test_a_thread_and_its_new_ones_leave_real_time_again():
 
     child = threading.Thread(target=wait)
     try:
-        with kept_policy():
+        with keep_policy():
             go_real_time()
             child.start()
             while not seen:
@@ -48,7 +48,7 @@ def test_a_thread_and_its_new_ones_leave_real_time_again():
 def test_it_holds_after_an_error():
     before = os.sched_getscheduler(0)
     try:
-        with suppress(RuntimeError), kept_policy():
+        with suppress(RuntimeError), keep_policy():
             go_real_time()
             raise RuntimeError
         assert os.sched_getscheduler(0) == before
@@ -58,11 +58,11 @@ def test_it_holds_after_an_error():
 
 def test_systems_without_such_policies_are_left_alone(monkeypatch):
     monkeypatch.delattr(os, "sched_getscheduler", raising=False)
-    with kept_policy():
+    with keep_policy():
         pass
     monkeypatch.undo()
     monkeypatch.setattr(thread_policy, "_THREADS", thread_policy._THREADS / "none")
-    with kept_policy():
+    with keep_policy():
         pass
 
 

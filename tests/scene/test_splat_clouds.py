@@ -66,7 +66,7 @@ def test_floaters_do_not_change_the_extent(seed, share, far):
     floating = random.uniform(size=4000) < share
     centers = np.where(floating[:, None], far * random.normal(size=(4000, 3)), cloud.centers).astype(np.float32)
     alone, with_floaters = (
-        np.ptp(typical_points(each), axis=0) for each in (cloud.chosen(~floating), replace(cloud, centers=centers))
+        np.ptp(typical_points(each), axis=0) for each in (cloud.select(~floating), replace(cloud, centers=centers))
     )
     assert (alone > 1.8).all()
     assert (alone < 2.8).all()

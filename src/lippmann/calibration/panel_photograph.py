@@ -242,27 +242,27 @@ def _squares_at(light: Real, matrix: Real, display: Display, brightness: float) 
     width, height, frame = _margins(display)
     _, square = _frame(display)
 
-    def seen(sides: tuple[float, float]) -> Real:
+    def colors_of(sides: tuple[float, float]) -> Real:
         place, around = (frame - square / 2) / np.array(sides), np.linspace(-0.25, 0.25, 5) * square
         points = np.where(_CORNERS > 0, 1 + place, -place)
         grid = np.stack(np.meshgrid(around / sides[0], around / sides[1]), axis=-1).reshape(1, -1, 2)
         return np.asarray(np.median(_sampled(light, matrix, points[:, None] + grid), axis=1))
 
-    upright, turned = seen((width, height)), seen((height, width))
+    upright, turned = colors_of((width, height)), colors_of((height, width))
     colors = max(upright, turned, key=lambda each: float(each.max(axis=-1).min()))
     shares = colors / np.maximum(np.abs(colors).sum(axis=-1, keepdims=True), 1e-9)
     # Which corner is the reddest, the greenest and the bluest; the fourth is white.
-    found = [int(np.argmax(shares[:, channel])) for channel in range(3)]
-    white = ({0, 1, 2, 3} - set(found)).pop()
-    order = [*found, white]
-    clockwise = [(found[0] + step) % 4 for step in range(4)] == order
-    back = [(found[0] - step) % 4 for step in range(4)] == order
+    corners = [int(np.argmax(shares[:, channel])) for channel in range(3)]
+    white = ({0, 1, 2, 3} - set(corners)).pop()
+    order = [*corners, white]
+    clockwise = [(corners[0] + step) % 4 for step in range(4)] == order
+    back = [(corners[0] - step) % 4 for step in range(4)] == order
     if not (clockwise or back) or colors.max(axis=-1).min() < _DARK * brightness:
         raise PictureError(
             "the photograph does not show the squares in the pattern's corners",
             fix="take all of the panel in a dark room; if you see none either, the picture is scaled beyond the panel",
         )
-    return colors[order], found[0], back
+    return colors[order], corners[0], back
 
 
 def _phasor(values: Real, squares: Real) -> NDArray[np.complex128]:

@@ -101,11 +101,11 @@ class TileStore:
         begun = Unfinished(lambda: _remove_without_tiles(folder))
         with ExitStack() as stack:
             stack.callback(begun.undo)
-            with _reported(folder):
+            with _report_errors(folder):
                 folder.mkdir(exist_ok=True)
             if (folder / LOCK).is_symlink():
                 raise _no_journal(folder, "its lock is a symbolic link")
-            with _reported(folder):
+            with _report_errors(folder):
                 lock = stack.enter_context(locked(folder / LOCK, folder))
                 sweep(folder)
             if not _is_begun(output, folder, job, resume):  # again: another process may have begun and ended meanwhile
@@ -181,7 +181,7 @@ class TileStore:
         place, tiles = self.folder, {self._name(index) for index in range(len(self.grid))}
         # Under another name first: a journal half removed would look like one half made.
         old = self.folder.with_name(f".{self.folder.name}-{os.urandom(4).hex()}.old")
-        with _reported(self.folder), undone(lambda: _clear_old(old)):
+        with _report_errors(self.folder), undone(lambda: _clear_old(old)):
             if not foreign_names(self.folder, tiles.__contains__):
                 os.rename(self.folder, old)
                 place = old
@@ -240,7 +240,7 @@ def read_job(output: Path) -> Job | None:
     """
     folder = journal_of(output)
     try:
-        with _reported(folder, "read"):
+        with _report_errors(folder, "read"):
             if not os.path.lexists(folder):
                 return None
             if folder.is_symlink() or not folder.is_dir():
@@ -249,13 +249,13 @@ def read_job(output: Path) -> Job | None:
                 if foreign := foreign_names(folder, no_tile):
                     raise _no_journal(folder, f"it holds {foreign[0]!r} and no {JOB}")
                 return None  # of a run that ended before it wrote its job
-        with _reported(folder, "read"), (folder / JOB).open("rb") as file:
+        with _report_errors(folder, "read"), (folder / JOB).open("rb") as file:
             job = json.loads(file.read(_MOST_JOB))
     except (ValueError, RecursionError) as error:
         raise _no_journal(folder, f"it has no readable {JOB}") from error
     if not isinstance(job, dict) or _KEY not in job:
         raise _no_journal(folder, f"its {JOB} is none of ours")
-    with _reported(folder, "read"):
+    with _report_errors(folder, "read"):
         if not holds_tiles(folder):
             return None
     if job[_KEY] != _VERSION:
@@ -368,7 +368,7 @@ def _is_whole(path: Path, most: int) -> bool:
 
 
 @contextmanager
-def _reported(folder: Path, done: str = "written") -> Iterator[None]:
+def _report_errors(folder: Path, done: str = "written") -> Iterator[None]:
     """Turn an :class:`OSError` about the journal into an :class:`OutputError`."""
     try:
         yield

@@ -184,7 +184,7 @@ class _Source(NamedTuple):
 def _views_in(path: Path) -> list[_Source]:
     """The photograph of a file; of a stereo pair both views, the left one first."""
     check_kind(path, PictureError)
-    with _reported(path):
+    with _report_errors(path):
         if path.suffix.lower() in HEIF:
             from lippmann.scene.readers.heif import read_heif_pair
 
@@ -264,12 +264,12 @@ def _opened(source: _Source) -> Iterator[Photograph]:
         yield source.view
         return
     path = source.path
-    with _reported(path), path.open("rb") as file, open_photograph(file, path) as photograph:
+    with _report_errors(path), path.open("rb") as file, open_photograph(file, path) as photograph:
         yield photograph
 
 
 @contextmanager
-def _reported(path: Path) -> Iterator[None]:
+def _report_errors(path: Path) -> Iterator[None]:
     from PIL import UnidentifiedImageError
 
     try:

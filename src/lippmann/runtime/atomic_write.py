@@ -218,7 +218,7 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     place = _place(path)
     temporary = temporary_file(place)
-    with _reported(path, temporary):
+    with _report_errors(path, temporary):
         sweep(place)
         with undone(lambda: remove(temporary)):
             _create(temporary, like=place)
@@ -244,7 +244,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
     """
     place = _place(path, folder=True)
     temporary = temporary_folder(place)
-    with _reported(path, temporary):
+    with _report_errors(path, temporary):
         sweep(place)
         with undone(lambda: remove(temporary)):
             temporary.mkdir()
@@ -262,7 +262,7 @@ def check_writable(path: Path) -> None:
     """Raise :class:`OutputError` if :func:`replacing` cannot write ``path``, for a check before a long render."""
     place = _place(path)
     temporary = place.with_name(f".{secrets.token_hex(8)}.part")
-    with _reported(path, temporary), undone(lambda: remove(temporary)):
+    with _report_errors(path, temporary), undone(lambda: remove(temporary)):
         _create(temporary, like=place)
 
 
@@ -271,7 +271,7 @@ def check_folder_writable(path: Path) -> None:
     render."""
     place = _place(path, folder=True)
     temporary = place.with_name(f".{secrets.token_hex(8)}.part")
-    with _reported(path, temporary), undone(lambda: remove(temporary)):
+    with _report_errors(path, temporary), undone(lambda: remove(temporary)):
         temporary.mkdir()
 
 
@@ -383,7 +383,7 @@ def _exchange(temporary: Path, place: Path) -> None:
 
 
 @contextmanager
-def _reported(path: Path, temporary: Path) -> Iterator[None]:
+def _report_errors(path: Path, temporary: Path) -> Iterator[None]:
     """Turn an :class:`OSError` about ``path`` or ``temporary`` into an :class:`OutputError`."""
     try:
         yield

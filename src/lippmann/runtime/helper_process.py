@@ -75,7 +75,7 @@ class HelperProcess:
         with self._lock:
             try:
                 while True:
-                    process, is_new = self._running()
+                    process, is_new = self._start_process()
                     answer = self._answer(process, request, where)
                     if answer is not None:
                         return answer
@@ -125,7 +125,7 @@ class HelperProcess:
             left -= len(part)
         return b"".join(parts)
 
-    def _running(self) -> tuple[subprocess.Popen[bytes], bool]:
+    def _start_process(self) -> tuple[subprocess.Popen[bytes], bool]:
         """The process, and whether it was started for this."""
         if self._process is not None and self._parent == os.getpid():  # a fork does not share it
             if self._process.poll() is None:

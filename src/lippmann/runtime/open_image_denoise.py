@@ -171,12 +171,12 @@ class Filter:
         self._library.oidnReleaseFilter(self._handle)
 
 
-#: The filters that :func:`kept_memory` closes; None outside of it.
+#: The filters that :func:`keep_memory` closes; None outside of it.
 _kept: ContextVar[ExitStack | None] = ContextVar("filters", default=None)
 
 
 @contextmanager
-def kept_memory() -> Iterator[None]:
+def keep_memory() -> Iterator[None]:
     """Keep the memory in which filters work from one run to the next, within the block.
 
     The filters of a device share it, and free it with the last of them. Two runs on a picture of 512 x 512 pixels
@@ -192,7 +192,7 @@ def kept_memory() -> Iterator[None]:
 
 @contextmanager
 def open_filter(device: Device) -> Iterator[Filter]:
-    """A filter on a device, closed after the block or, within :func:`kept_memory`, with that."""
+    """A filter on a device, closed after the block or, within :func:`keep_memory`, with that."""
     with ExitStack() as stack:
         work = Filter(device)
         (_kept.get() or stack).enter_context(closing(work))

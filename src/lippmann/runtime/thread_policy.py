@@ -24,7 +24,7 @@ def run_behind() -> None:
 
 
 @contextmanager
-def kept_policy() -> Iterator[None]:
+def keep_policy() -> Iterator[None]:
     """Leave the scheduling policy of every thread as it was, and give new ones that of the calling thread (Linux).
 
     SVT-AV1, where the user may (as root), puts the thread that opens it into real time (``SCHED_FIFO``, priority 99),

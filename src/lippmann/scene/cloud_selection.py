@@ -89,7 +89,7 @@ class SplatSelection:
         if self.crop is not None:
             splats = _some(cropped(splats, np.array([self.crop[:3], self.crop[3:]])), "crop", scene.name)
         if self.min_opacity is not None:
-            kept = splats.chosen(splats.opacities >= np.float32(self.min_opacity))
+            kept = splats.select(splats.opacities >= np.float32(self.min_opacity))
             splats = _some(kept, "min_opacity", scene.name)
         return replace(scene, description=replace(description, splats=splats))
 

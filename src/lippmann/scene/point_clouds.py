@@ -31,7 +31,7 @@ def draw_cloud(clouds: Sequence[Mesh]) -> tuple[list[Mesh], Width]:
         first += len(cloud.positions)
         for chosen, fitted in ((inside, cloud.fitted), (~inside, False)):
             if chosen.any():
-                drawn = as_mesh(_chosen(cloud, chosen), np.eye(4)[None], width.radius, cloud.material)
+                drawn = as_mesh(_select_vertices(cloud, chosen), np.eye(4)[None], width.radius, cloud.material)
                 meshes.append(replace(drawn, fitted=fitted))
     return meshes, width
 
@@ -72,7 +72,7 @@ def crop_cloud(description: SceneDescription, box: NDArray[np.float64]) -> Scene
     for cloud in _points(description.meshes, description.placements):
         inside = ((cloud.positions >= box[0]) & (cloud.positions <= box[1])).all(axis=1)
         if inside.any():
-            kept.append(_chosen(cloud, inside))
+            kept.append(_select_vertices(cloud, inside))
     if not kept:
         return None
     meshes, width = draw_cloud(kept)
@@ -99,7 +99,7 @@ def _points(meshes: Sequence[Mesh], placements: Mapping[int, Matrix]) -> list[Me
     return clouds
 
 
-def _chosen(cloud: Mesh, chosen: NDArray[np.bool_]) -> Mesh:
+def _select_vertices(cloud: Mesh, chosen: NDArray[np.bool_]) -> Mesh:
     return replace(
         cloud,
         positions=cloud.positions[chosen],

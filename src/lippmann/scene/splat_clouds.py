@@ -113,7 +113,7 @@ def _turned(harmonics: NDArray[np.float32], turn: Numbers) -> NDArray[np.float32
 
 def cropped(splats: Splats, box: Numbers) -> Splats:
     """The splats whose centres lie in a box ``(2, 3)``."""
-    return splats.chosen(((splats.centers >= box[0]) & (splats.centers <= box[1])).all(axis=1))
+    return splats.select(((splats.centers >= box[0]) & (splats.centers <= box[1])).all(axis=1))
 
 
 def typical_points(splats: Splats) -> Numbers:
@@ -121,9 +121,9 @@ def typical_points(splats: Splats) -> Numbers:
 
     Floaters are what lies far outside of where nearly all opacity is; see :data:`_INNER`.
     """
-    splats = splats.chosen(np.flatnonzero(splats.opacities > 0.0)) if (splats.opacities > 0.0).any() else splats
+    splats = splats.select(np.flatnonzero(splats.opacities > 0.0)) if (splats.opacities > 0.0).any() else splats
     step = -(-splats.count // _MOST_TELLING)
-    telling = splats.chosen(np.arange(0, splats.count, step))
+    telling = splats.select(np.arange(0, splats.count, step))
     axes = rotation_matrices(telling.rotations) * telling.scales[:, None, :].astype(np.float64)
     ends = np.concatenate([axes, -axes], axis=2).transpose(0, 2, 1) * _REACH
     points = (telling.centers[:, None, :].astype(np.float64) + ends).reshape(-1, 3)

@@ -25,7 +25,7 @@ from lippmann.studio_app.page_values import (
 from lippmann.studio_app.real_lens import RealEyeMap
 from lippmann.studio_app.render_jobs import KINDS, Job
 from lippmann.studio_app.render_thread import LiveResult, Watcher
-from lippmann.studio_app.session import WITHOUT_FILE, StudioSession, opened_state
+from lippmann.studio_app.session import WITHOUT_FILE, StudioSession, open_state
 from lippmann.studio_app.state import StudioState
 from lippmann.studio_app.state_toml import text_of_state, with_whole_paths
 from lippmann.studio_app.wire import (
@@ -122,7 +122,7 @@ class LiveSocket:
         message = await self._socket.receive()
         if message["type"] == "websocket.disconnect":
             raise WebSocketDisconnect
-        with self._errors_said():
+        with self._report_errors():
             said = parse_message(message.get("text"))
             handlers: dict[str, Callable[[dict[str, Any]], None]] = {
                 "shown": self._acknowledge,
@@ -133,7 +133,7 @@ class LiveSocket:
             handlers[said["type"]](said)
 
     @contextmanager
-    def _errors_said(self) -> Iterator[None]:
+    def _report_errors(self) -> Iterator[None]:
         try:
             yield
         except LippmannError as error:
@@ -144,7 +144,7 @@ class LiveSocket:
         while True:
             await self._looked.wait()
             self._looked.clear()
-            with self._errors_said():
+            with self._report_errors():
                 self._want(self._newest)
             await asyncio.sleep(_VIEW_SECONDS)
 
@@ -221,7 +221,7 @@ class LiveSocket:
         text = said.get("text")
         if not isinstance(text, str):
             raise UsageError("this is no state", rule="the text of a TOML file")
-        state = opened_state(text, self._state)
+        state = open_state(text, self._state)
         self._session.check_files(state)
 
         def tell(error: LippmannError | None) -> None:

@@ -243,7 +243,7 @@ def _is_print(display: Display) -> bool:
     return display.name.startswith("print")
 
 
-def opened_state(text: str, current: StudioState) -> StudioState:
+def open_state(text: str, current: StudioState) -> StudioState:
     """State of a TOML file's text. A scene file is the present one, if that has its name.
 
     Raises

@@ -53,7 +53,7 @@ class ViewerSite:
         if match := _MANIFEST.fullmatch(path):
             return self._manifest(int(match[1]))
         if match := _LIGHT.fullmatch(path):
-            picture = self._version_asked(int(match[1]), request.headers.get("If-Match"))
+            picture = self._require_version(int(match[1]), request.headers.get("If-Match"))
             return json_response(lens_light(picture.display))
         if match := _TILE.fullmatch(path):
             number, layer, column, row = match.groups()
@@ -68,7 +68,7 @@ class ViewerSite:
             raise not_found()
         return self._pictures[number]
 
-    def _version_asked(self, number: int, version: str | None) -> ServedPicture:
+    def _require_version(self, number: int, version: str | None) -> ServedPicture:
         picture = self._picture(number).load_once()
         if version is not None and version != f'"{picture.version}"':
             raise RefusedError(HTTPStatus.PRECONDITION_FAILED, "the file was written anew; reload the page")
@@ -79,7 +79,7 @@ class ViewerSite:
         return json_response(picture.manifest, headers={"ETag": f'"{picture.version}"'})
 
     def _tile(self, number: int, layer: str, column: int, row: int, version: str | None) -> Response:
-        picture = self._version_asked(number, version)
+        picture = self._require_version(number, version)
         try:
             if picture.tile_format == "png":
                 return Response(picture.tiles.png(layer, column, row), "image/png")

@@ -15,7 +15,7 @@ from lippmann.codecs.types import Pixels
 from lippmann.errors import OutputError, UsageError
 from lippmann.quilts.quilt import QuiltLayout
 from lippmann.quilts.quilt_metadata import layout_text
-from lippmann.runtime.thread_policy import kept_policy
+from lippmann.runtime.thread_policy import keep_policy
 
 #: How the frames of an MP4 file are coded; docs/reference/films.md says who plays which.
 Codec = Literal["h264", "hevc", "vp9", "av1", "h264-rgb", "vp9-rgb"]
@@ -199,7 +199,7 @@ def _open(context: Any, encoder: _Encoder, size: tuple[int, int]) -> None:
     context.pix_fmt = encoder.pixels
     context.color_primaries, context.color_trc = _BT709, _SRGB_TRANSFER
     context.colorspace, context.color_range = (_IDENTITY, _FULL) if encoder.is_exact else (_BT709, _LIMITED)
-    with kept_policy():
+    with keep_policy():
         context.open()
 
 

@@ -121,7 +121,7 @@ def test_small_and_flat_splats_far_away_are_met():
 @given(st.integers(1, 60), st.integers(0, 10**6), st.floats(0.0, 5.0))
 def test_order_threads_and_ends_change_nothing_but_what_they_should(count, seed, end):
     splats, (origins, directions) = random_splats(count, 1, seed=seed), random_rays(20, seed=seed)
-    shuffled = splats.chosen(np.random.default_rng(seed).permutation(count))
+    shuffled = splats.select(np.random.default_rng(seed).permutation(count))
     if (splats.opacities > 1 / 255).any():
         colors, left = traced(splats, origins, directions, end)
         again, left_again = traced(shuffled, origins, directions, end, threads=2)
@@ -154,7 +154,7 @@ def test_thousands_of_faint_splats_lie_on_one_ray():
     )
     _, left = traced(splats, np.float32([[0, 0, 4]]), np.float32([[0, 0, -1]]))
     assert left[0] < 1e-4
-    few = splats.chosen(np.arange(1500))
+    few = splats.select(np.arange(1500))
     _, left = traced(few, np.float32([[0, 0, 4]]), np.float32([[0, 0, -1]]))
     assert left[0] == pytest.approx((1 - 1.02 / 255) ** 1500, rel=1e-3)
 

@@ -81,7 +81,7 @@ def test_pictures_are_those_of_the_twin(display, degree):
     assert psnr(image.pixels, true) > 60
     assert image.provenance.subpixels == (display is SLANTED)
     # The twin of a cloud that lacks some splats is another picture.
-    fewer = twin(splats.chosen(np.arange(10, 150)), *light_rays(display)).reshape(true.shape)
+    fewer = twin(splats.select(np.arange(10, 150)), *light_rays(display)).reshape(true.shape)
     assert psnr(image.pixels, fewer) < 50
 
 

@@ -54,7 +54,7 @@ def print_of(printed: PrintOptions) -> Print:
     from lippmann.display.formats.print_sheet import print_of_texts
 
     try:
-        return print_of_texts({_option(key): text for key, text in _given(printed).items()})
+        return print_of_texts({_option(key): text for key, text in _texts_of(printed).items()})
     except DisplayError as error:
         raise DisplayError(error.what, where=f"--{error.where}", rule=error.rule, fix=error.fix) from None
 
@@ -73,7 +73,7 @@ def display_of(name: str, printed: PrintOptions) -> Display:
 
     if name == PRINT:
         return print_of(printed).display()
-    for key in _given(printed):
+    for key in _texts_of(printed):
         rule = f"it applies to --display {PRINT} only"
         raise UsageError(f"does not apply to the display {name}", where=f"--{_option(key)}", rule=rule)
     return load_display(name)
@@ -101,7 +101,7 @@ def planned_display(name: str, printed: PrintOptions) -> tuple[Display, tuple[in
     return display, (pair.width, pair.height)
 
 
-def _given(printed: PrintOptions) -> dict[str, str]:
+def _texts_of(printed: PrintOptions) -> dict[str, str]:
     return {key: text for key, text in vars(printed).items() if text is not None}
 
 

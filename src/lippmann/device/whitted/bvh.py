@@ -159,8 +159,8 @@ def _cuts(boxes: Numbers, start: Whole, stop: Whole) -> tuple[Whole, Numbers]:
     first = np.cumsum(sizes) - sizes
     run = np.repeat(np.arange(len(sizes)), sizes)
     inside = np.arange(len(run)) - first[run]
-    before = _area(_running(boxes, inside))
-    after = _area(_running(boxes[::-1], (sizes[run] - 1 - inside)[::-1]))[::-1]
+    before = _area(_merge_boxes(boxes, inside))
+    after = _area(_merge_boxes(boxes[::-1], (sizes[run] - 1 - inside)[::-1]))[::-1]
     # Cutting before member i costs before[i - 1] * i + after[i] * (size - i).
     cost = np.full(len(run), np.inf)
     cost[1:] = before[:-1] * inside[1:] + after[1:] * (sizes[run] - inside)[1:]
@@ -170,7 +170,7 @@ def _cuts(boxes: Numbers, start: Whole, stop: Whole) -> tuple[Whole, Numbers]:
     return start + np.where((cut > 0) & np.isfinite(best), cut, sizes // 2), best
 
 
-def _running(boxes: Numbers, inside: Whole) -> Numbers:
+def _merge_boxes(boxes: Numbers, inside: Whole) -> Numbers:
     """Box around each member and all before it in its run (``inside`` counts them), by doubling steps."""
     grown = boxes.copy()
     step = 1

@@ -56,7 +56,7 @@ class Splats:
         """Degree of the spherical harmonics, 0 to 4."""
         return COEFFICIENTS.index(self.harmonics.shape[1])
 
-    def chosen(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Splats:
+    def select(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Splats:
         """Those of a mask or of indices."""
         return Splats(
             self.centers[which],

@@ -102,7 +102,7 @@ def cleaned(
     lost = int(len(sound) - sound.sum())
     if lost == len(sound):
         raise SceneError("holds no Gaussian splat whose numbers are all finite", where=where, fix="is it damaged?")
-    return splats.chosen(sound), (
+    return splats.select(sound), (
         f"{lost} of {len(sound)} splats have numbers that are out of range, and are left out",
     )
 
