@@ -56,7 +56,8 @@ def test_type_shape_and_values_of_arrays_count(other):
     assert content_hash(array) != content_hash(other)
 
 
-def test_fields_count_but_not_those_of_its_own():
+def test_fields_count_but_not_those_of_its_own_nor_the_order_of_a_mapping():
+    assert content_hash({"a": 1, "b": 2}) == content_hash({"b": 2, "a": 1})
     assert content_hash(Thing("a", 1, "x")) == content_hash(Thing("a", 1, "y"))
     assert content_hash(Thing("a", 1)) != content_hash(Thing("a", 2))
 

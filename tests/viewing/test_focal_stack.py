@@ -13,7 +13,7 @@ from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
 from lippmann.image.read import open_file
-from lippmann.viewing.focal_stack import focal_stack
+from lippmann.viewing.focal_stack import focal_stack, write_planes
 from lippmann.viewing.refocus import refocus
 
 DISPLAY = Display("square", Panel(40, 30, 0.25), LensArray("square", 1.25), gap=6.0)
@@ -65,6 +65,14 @@ def lippmann(capfd):
         return code, capfd.readouterr()
 
     return call
+
+
+def test_names_of_pictures_in_a_folder_sort_as_their_planes(tmp_path):
+    for count in (10, 11):
+        write_planes(iter(np.zeros((count, 2, 2, 3), np.float32)), range(count), tmp_path / "stack")
+        digits = len(str(count - 1))
+        names = [f"plane_{k:0{digits}}_+{k}mm.png" for k in range(count)]
+        assert sorted(path.name for path in (tmp_path / "stack").glob("plane*")) == names
 
 
 @pytest.mark.long_cases(but=["stack.png"])
