@@ -114,17 +114,6 @@ def test_goals_that_cannot_be_are_refused(lippmann, engine, tmp_path, words, com
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
-def test_pixels_that_were_carried_over_have_had_no_samples(lippmann, engine, tmp_path, small):
-    out = tmp_path / "a.exr"
-    words = ("--method", "lens-view", "--spp", 2, "--maps", tmp_path / "maps")
-    assert lippmann("render", "teapot", "--display", small, *words, "-o", out).code == 0
-    maps = read_picture(out).maps
-    assert set(np.unique(maps["samples"])) == {0, 2}
-    assert np.array_equal(maps["samples"] > 0, maps["status"] == 0)
-    assert (tmp_path / "maps" / "samples.png").exists()
-
-
 # ---- auto -----------------------------------------------------------------------------------------------------------
 
 
