@@ -7,9 +7,11 @@ import math
 import re
 from collections.abc import Collection, Iterable, Mapping
 from numbers import Integral, Real
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from lippmann.errors import DisplayError
+
+T = TypeVar("T")
 
 #: Pixels along one side, far beyond any panel or print; keeps every count exact in all that follows.
 MAXIMUM_COUNT = 1_000_000
@@ -171,6 +173,13 @@ def length(
             raise DisplayError(f"{text!r} is no length", where=key, rule=f"{symbol} must be above zero")
         return spacing
     raise DisplayError.unknown("unit", symbol, [*scales, *per_inch], where=key)
+
+
+def millimetres(
+    value: T, key: str, scales: Mapping[str, float] = MILLIMETRES, per_inch: tuple[str, ...] = ()
+) -> T | float:
+    """:func:`length` of a text; any other value stays as it is, for the constructors to check."""
+    return length(value, key, scales, per_inch) if isinstance(value, str) else value
 
 
 def size(text: str, key: str) -> tuple[float, float]:

@@ -52,7 +52,7 @@ from lippmann.display.formats.recorded_depth import default_aperture
 from lippmann.display.formats.stereo_toml import TABLE as STEREO
 from lippmann.display.formats.stereo_toml import stereo_display
 from lippmann.display.panel import stripe
-from lippmann.display.validation import MILLIMETRES, Arguments, length, positive
+from lippmann.display.validation import MILLIMETRES, Arguments, millimetres, positive
 from lippmann.errors import DisplayError
 from lippmann.runtime.plugins import Door, Extension, Target, function_of
 from lippmann.runtime.regular_file import read_small_text
@@ -404,12 +404,7 @@ def _convert_lengths(values: Arguments, table: str, pixel: float | None) -> dict
         value, key = values.get(name), f"{table}.{name}" if table else name
         scales = {**MILLIMETRES, "px": pixel} if in_pixels and pixel is not None else MILLIMETRES
         if isinstance(value, list):
-            converted[name] = [_length(item, key, scales, per_inch) for item in value]
-        elif isinstance(value, str) and not (name == "viewing_distance" and value == INFINITE):
-            converted[name] = _length(value, key, scales, per_inch)
+            converted[name] = [millimetres(item, key, scales, per_inch) for item in value]
+        elif not (name == "viewing_distance" and value == INFINITE) and name in values:
+            converted[name] = millimetres(value, key, scales, per_inch)
     return converted
-
-
-def _length(value: object, key: str, scales: Mapping[str, float], per_inch: tuple[str, ...]) -> object:
-    """Millimetres of ``"6.8 mm"``; any other type stays as it is, for the constructors to check."""
-    return length(value, key, scales, per_inch) if isinstance(value, str) else value

@@ -21,7 +21,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from typing import TypeVar
 
 from lippmann.display.display import INFINITE
 from lippmann.display.formats.monitor import DEFAULT_CONE, DEFAULT_DISTANCE, Monitor
@@ -34,6 +33,7 @@ from lippmann.display.validation import (
     check_text,
     finite,
     length,
+    millimetres,
     plain_number,
     positive,
     refuse_unknown,
@@ -42,8 +42,6 @@ from lippmann.display.validation import (
 )
 from lippmann.errors import DisplayError
 from lippmann.json_values import JsonObject, JsonValue
-
-T = TypeVar("T")
 
 #: The table's name.
 TABLE = "monitor"
@@ -147,7 +145,7 @@ def _to_toml(value: JsonValue) -> str:
 
 
 def _monitor(values: Arguments, table: Arguments) -> Monitor:
-    pixel = positive(_millimetres(table["pixel_pitch"], "pixel_pitch", ("dpi", "ppi")), "pixel_pitch")
+    pixel = positive(millimetres(table["pixel_pitch"], "pixel_pitch", per_inch=("dpi", "ppi")), "pixel_pitch")
     offsets = table.get("subpixel_offsets", RGB_STRIPE)
     panel = Panel(
         whole_count(table["width"], "width"),
@@ -167,7 +165,7 @@ def _monitor(values: Arguments, table: Arguments) -> Monitor:
         slope=math.inf if slope == INFINITE else slope,
         center=table["center"],
         view_cone=table.get("view_cone", DEFAULT_CONE),
-        viewing_distance=math.inf if distance == INFINITE else _millimetres(distance, "viewing_distance", ()),
+        viewing_distance=math.inf if distance == INFINITE else millimetres(distance, "viewing_distance"),
     )
     monitor.display()  # checks how many pixels a lens covers
     return monitor
@@ -182,8 +180,3 @@ def _lenses_per_inch(pitch: object, pixel: float) -> float:
     if spacing == 0:
         raise DisplayError(f"pitch is {pitch!r}", where="pitch", rule="it must be above zero")
     return INCH / spacing
-
-
-def _millimetres(value: T, key: str, per_inch: tuple[str, ...]) -> T | float:
-    """Millimetres of a string with a unit; any other value stays as it is, for the constructors to check."""
-    return length(value, key, MILLIMETRES, per_inch) if isinstance(value, str) else value

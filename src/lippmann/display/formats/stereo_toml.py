@@ -26,10 +26,9 @@ from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import RGB_STRIPE, Panel
 from lippmann.display.stereo import EYE_DISTANCE, StereoPair
 from lippmann.display.validation import (
-    MILLIMETRES,
     Arguments,
     Table,
-    length,
+    millimetres,
     positive,
     refuse_unknown,
     table_of,
@@ -87,5 +86,4 @@ def _display(values: Arguments, table: Arguments) -> Display:
 
 
 def _length(value: object, key: str) -> float:
-    where = f"{TABLE}.{key}"
-    return positive(length(value, where, MILLIMETRES) if isinstance(value, str) else value, where)
+    return positive(millimetres(value, f"{TABLE}.{key}"), f"{TABLE}.{key}")
