@@ -49,6 +49,20 @@ def test_a_pixels_own_lens_shows_its_point_in_that_pixel(name, z):
         assert np.mean(np.abs(i - j).max(axis=0) == 1) > 0.6
 
 
+def test_weights_make_a_point_of_those_that_two_lenses_show_beside_it():
+    display = DISPLAYS["seed-lenticular"]
+    rng = np.random.default_rng(5)
+    x, slope = rng.uniform(-50, 50, 400), rng.uniform(-0.15, 0.15, 400)
+    z = np.full_like(x, -3.0)
+    point = x - slope * z, np.zeros_like(x), z
+    places = list(LensViews(display, PixelWindow(0, 0, 512, 512)).places(x, 0 * x, slope, point, NUMPY))
+    shown = [shown_at(display, place.u, place.v, z)[3][0] for place in places]
+    between = (shown[0] - point[0]) * (shown[1] - point[0]) < 0
+    assert between.mean() > 0.3
+    mean = sum(place.weight * at for place, at in zip(places, shown, strict=True)) / sum(p.weight for p in places)
+    np.testing.assert_allclose(mean[between], point[0][between], atol=2e-3)
+
+
 def test_cameras_beside_a_ray_show_its_points_where_their_pictures_have_them():
     display = DISPLAYS["slanted"]
     window = PixelWindow(4, 3, 90, 70)

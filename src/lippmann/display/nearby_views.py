@@ -15,10 +15,15 @@ from lippmann.display.view_cone import cone_tangent
 
 Point = tuple[Array, Array, Array]
 
+#: Pixels that are no distance.
+_CLOSE = 1e-3
+
 
 class Place(NamedTuple):
     """Continuous pixel coordinates in a picture, to the right and downwards, and the rectangle of the pixels that
-    belong to the same view: ``left <= column < right``, ``top <= row < bottom``."""
+    belong to the same view: ``left <= column < right``, ``top <= row < bottom``. ``weight`` falls with the
+    distance to the point itself, so that the weighted mean of the points shown is that point if it lies between them.
+    """
 
     u: Array
     v: Array
@@ -26,6 +31,7 @@ class Place(NamedTuple):
     top: Array
     right: Array
     bottom: Array
+    weight: Array
 
 
 class NearbyViews(Protocol):
@@ -78,10 +84,12 @@ class LensViews:
         center_x, center_y = display.lattice.center(i, j, x / scale, y / scale, ops)
         middle = display.pixel_coordinates(center_x * scale, center_y * scale)
         half_width, half_height = (side / 2 - 0.5 for side in micro_image_extent(display))
-        u = ops.minimum(ops.maximum(u, middle[0] - half_width), middle[0] + half_width)
+        near_u = ops.minimum(ops.maximum(u, middle[0] - half_width), middle[0] + half_width)
+        near_v = v
         if display.lens_array.layout != "lenticular":
-            v = ops.minimum(ops.maximum(v, middle[1] - half_height), middle[1] + half_height)
-        return Place(u - window.left, v - window.top, 0, 0, window.width, window.height)
+            near_v = ops.minimum(ops.maximum(v, middle[1] - half_height), middle[1] + half_height)
+        weight = 1 / (abs(u - near_u) + abs(v - near_v) + _CLOSE)
+        return Place(near_u - window.left, near_v - window.top, 0, 0, window.width, window.height, weight)
 
 
 @dataclass(frozen=True)
@@ -111,7 +119,7 @@ class CameraViews:
             above = ops.floor((view + 0.5) / self.columns)
             left = (view - above * self.columns) * self.window.width
             top = (self.rows - 1 - above) * self.window.height
-            yield Place(left + u, top + v, left, top, left + self.window.width, top + self.window.height)
+            yield Place(left + u, top + v, left, top, left + self.window.width, top + self.window.height, 1.0)
 
 
 __all__ = ["CameraViews", "LensViews", "NearbyViews", "Place"]

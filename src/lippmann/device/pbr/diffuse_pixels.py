@@ -142,16 +142,17 @@ class KeyPicture:
         x, y = (mi.Float64(origin[axis]) + mi.Float64(origin[2]) * slopes[axis] for axis in (0, 1))
         phase = others.place(pixel)[0] % self._step if self._step > 1 else mi.UInt32(0)
         off_plane = _OFF_PLANE[0] * dr.abs(mi.Float(in_key[2])) + _OFF_PLANE[1] * self._views.display.gap
-        mean, views = self._color(0), 0
+        mean, total = self._color(0), mi.Float(0)
         least, most = self._color(dr.inf), self._color(0)
-        for u, v, left, top, right, bottom in self._views.places(x, y, slopes[0], tuple(in_key), DEVICE):
+        for u, v, left, top, right, bottom, weight in self._views.places(x, y, slopes[0], tuple(in_key), DEVICE):
             place = mi.Float(u), mi.Float(v)
             inside = mi.Int32(left), mi.Int32(top), mi.Int32(right), mi.Int32(bottom)
             is_known, irradiance, low, high = self._mean(place, inside, phase, point, normal, off_plane, is_known)
             least, most = dr.minimum(least, low), dr.maximum(most, high)
-            mean += irradiance
-            views += 1
-        low, high, mean = (mi.Color3f(part if len(part) == 3 else part.x) for part in (least, most, mean / views))
+            # Else light would move on the surface with each frame that passes it on.
+            mean += mi.Float(weight) * irradiance
+            total += mi.Float(weight)
+        low, high, mean = (mi.Color3f(part if len(part) == 3 else part.x) for part in (least, most, mean / total))
         reflected = mi.Color3f(albedo if len(albedo) == 3 else albedo.x)
         apart = encode(high * reflected, coding) - encode(low * reflected, coding)
         return mi.Vector4f(*mean, dr.select(is_known & (dr.max(apart) < _AGREEMENT), mi.Float(1), 0))
