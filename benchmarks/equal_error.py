@@ -198,7 +198,6 @@ def guided_denoiser(stage: Stage, kind: str, shares: bool = True) -> Any:
         stage.built,
         stage.source,
         stage.display_from_world,
-        seed=3,
         box_filter=True,
         memory=4 << 30,
         threads=CORES,

@@ -126,7 +126,7 @@ def _guides(stage: Stage) -> Any:
     from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
 
     plan = plan_guides(stage.source, TUNING.guide_samples, 4 << 30)
-    return trace_guides(stage.built, stage.source, plan, stage.display_from_world, seed=77)
+    return trace_guides(stage.built, stage.source, plan, stage.display_from_world)
 
 
 def _without_noise(stage: Stage, picture: Picture, guides: Any, effort: Any) -> Picture:

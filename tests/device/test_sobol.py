@@ -61,3 +61,22 @@ def test_one_dimensional_samples_are_stratified():
     stream = SampleStream.of_pixels(mi.UInt32(8), dr.arange(mi.UInt32, 64), mi.UInt32(1))
     values = np.sort(np.array(stream.next_1d(2)))
     assert np.array_equal(np.floor(values * 64), np.arange(64))
+
+
+def lattice(count):
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.device.sobol import lattice_point
+
+    return np.array(lattice_point(dr.arange(mi.UInt32, count), mi.UInt32(count))).T
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 8, 12, 13])
+def test_a_lattice_is_even_and_symmetric_about_the_middle(count):
+    p = lattice(count)
+    assert ((p >= 0) & (p < 1)).all()
+    assert p[:, 0] == pytest.approx((np.arange(count) + 0.5) / count, abs=1e-6)
+    assert p + p[::-1] == pytest.approx(np.ones_like(p), abs=1e-5)
+    gaps = np.diff(np.sort(p[:, 1]), append=p[:, 1].min() + 1)
+    assert gaps.max() < 2 / count + 1e-5

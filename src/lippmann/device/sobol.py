@@ -21,6 +21,8 @@ from lippmann.device.types import Float, Point2f, UInt32
 PIXEL_DIMENSION = 0
 #: Seeds of streams that know nothing of each other differ by multiples of this: the golden ratio in 32 bits, odd.
 SEED_STEP = 0x9E3779B9
+#: Its fraction; multiples of it fill a circle evenly, however many there are.
+GOLDEN_RATIO = (5**0.5 - 1) / 2
 
 
 def hash32(x: UInt32) -> UInt32:
@@ -55,6 +57,17 @@ def _second_dimension(index: UInt32) -> UInt32:
 
 def _unit_float(bits: UInt32) -> Float:
     return mi.Float(bits >> 8) * 2.0**-24
+
+
+def lattice_point(number: UInt32, samples: UInt32) -> Point2f:
+    """Point ``number`` of ``samples`` evenly spaced ones in [0, 1)^2, the same for every pixel.
+
+    Equal steps in the first dimension, Kronecker's sequence of the golden ratio in the second; symmetric about the
+    middle, where a single one lies. Even and odd ones are evenly spaced, too.
+    """
+    from_middle = mi.Float(number) - (mi.Float(samples) - 1) / 2
+    second = 0.5 + from_middle * GOLDEN_RATIO
+    return mi.Point2f(0.5 + from_middle / mi.Float(samples), second - dr.floor(second))
 
 
 @dataclass

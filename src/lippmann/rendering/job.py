@@ -72,7 +72,6 @@ class Job:
             self.session.built,
             self.traced,
             self.display_from_world,
-            seed=self.request.seed,
             box_filter=self.request.box_filter,
             memory=self.session.memory,
             threads=self.session.engine.threads,

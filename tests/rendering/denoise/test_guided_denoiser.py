@@ -5,15 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import lippmann
-from lippmann.display import Display, LensArray, Panel
-from lippmann.display.lens_profile import LensProfile
 from lippmann.rendering.denoise import guided_denoiser as module
 from lippmann.rendering.denoise.guided_denoiser import MARGIN, SurfacePart, denoise_surfaces
-from lippmann.rendering.request.plan import resolve
-from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.session import open_session
-from lippmann.rendering.transport.ray_source import DisplayRays
 
 SHAPE = (200, 260)
 
@@ -68,14 +61,3 @@ def test_where_nothing_is_seen_nothing_is_done(calls):
     np.testing.assert_array_equal(result, color)
     assert result is not color
     assert calls == []
-
-
-@pytest.mark.parametrize(("lens", "halves"), [(None, 4), (LensProfile(2.0, 4.0), 8)])
-def test_guides_behind_whole_lenses_have_more_samples(lens, halves, engine):
-    display = Display("small", Panel(20, 8, 0.1), LensArray("lenticular", 1.0), 2.0, lens=lens)
-    scene = lippmann.load_scene("teapot")
-    session = open_session(scene, resolve(RenderRequest(), scene, display), (20, 8))
-    source = DisplayRays(display, np.eye(4))
-    own = {"seed": 0, "box_filter": True, "memory": 1 << 28, "threads": 1, "kind": "oidn"}
-    first, second = module.GuidedDenoiser(session.built, source, np.eye(4), **own).coverage()
-    assert (first.samples, second.samples) == (halves, halves)

@@ -51,10 +51,10 @@ def batches(session, source, samples, seed=3, window=None, for_denoiser=True):
     return found
 
 
-def guides(session, source, seed=77):
+def guides(session, source):
     from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
 
-    return trace_guides(session.built, source, plan_guides(source, 16, 1 << 28), np.eye(4), seed=seed)
+    return trace_guides(session.built, source, plan_guides(source, 16, 1 << 28), np.eye(4))
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.sobol import named_seed
 from lippmann.display.micro_image_layout import lens_numbers, lens_numbers_in_full_color
 from lippmann.options.choices import Denoiser
 from lippmann.progress import Progress, ProgressCallback, silent
@@ -43,7 +42,7 @@ class GuidedDenoiser:
 
     Parameters
     ----------
-    built, source, display_from_world, seed, box_filter:
+    built, source, display_from_world, box_filter:
         Those of the picture, for tracing its guides.
     memory:
         Bytes that may be used.
@@ -69,7 +68,6 @@ class GuidedDenoiser:
         source: OnePicture | QuiltRays,
         display_from_world: NDArray[np.float64],
         *,
-        seed: int,
         box_filter: bool,
         memory: int,
         threads: int,
@@ -80,7 +78,6 @@ class GuidedDenoiser:
         self._built = built
         self._source = source
         self._display_from_world = display_from_world
-        self._seed = seed
         self._box_filter = box_filter
         self._memory = memory
         self._threads = threads
@@ -164,17 +161,11 @@ class GuidedDenoiser:
     def guides(self) -> Guides:
         """Albedo and normal of what the pixels see."""
         if self._guides is None:
-            source = self._source
-            # Off the lens plane a surface changes all across a lens, and noisy guides would blur it.
-            is_whole = isinstance(source, DisplayRays | WindowRays | SubpixelRays) and source.display.lens is not None
-            samples = REQUEST.usual if is_whole else TUNING.guide_samples
             self._guides = trace_guides(
                 self._built,
-                source,
-                plan_guides(source, samples, self._memory),
+                self._source,
+                plan_guides(self._source, TUNING.guide_samples, self._memory),
                 self._display_from_world,
-                # Samples of their own: with those of one half-buffer the guides would carry its noise into the other.
-                seed=named_seed("guides", self._seed),
                 box_filter=self._box_filter,
                 progress=self._progress,
             )

@@ -1,8 +1,12 @@
-"""Feature buffers of the denoiser (guides): albedo, normal and height, averaged over a pixel's samples."""
+"""Feature buffers of the denoiser (guides): albedo, normal and height, averaged over a pixel's samples.
+
+All pixels have the same evenly spaced points. Random points would put noise into the buffers, which the denoiser takes
+for edges; with equal points neighbours differ by the scene alone, and their rays go side by side.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import drjit as dr
@@ -11,12 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import to_numpy
-from lippmann.device.types import Color3f, Float, Vector3f
+from lippmann.device.sobol import lattice_point
+from lippmann.device.syntax import syntax
+from lippmann.device.types import Color3f, Float, UInt32, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.film.memory_model import LAYERS, Pass, Plan, Tile, cut_wavefronts
+from lippmann.rendering.film.memory_model import LAYERS, Pass, Plan, cut_wavefronts
 from lippmann.rendering.film.wavefront import Coverage, samples_of_tile, to_rows
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
-from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.rendering.transport.ray_source import PixelRays, RaySource
 from lippmann.scene.matrices import inverse, rotation_of
 
 if TYPE_CHECKING:
@@ -48,7 +54,7 @@ class Guides:
 
 
 def plan_guides(source: RaySource, samples: int, memory: int) -> Plan:
-    """Tiles and passes for guides of ``samples`` samples per pixel, within ``memory`` bytes.
+    """Tiles for guides of ``samples`` samples per pixel, within ``memory`` bytes. A lane takes all those of its pixel.
 
     Raises
     ------
@@ -56,7 +62,8 @@ def plan_guides(source: RaySource, samples: int, memory: int) -> Plan:
         If that is too little for one row.
     """
     kept = source.width * source.height * LAYERS
-    return cut_wavefronts(source.width, source.height, samples, channels=source.channels, memory=memory, kept=kept)
+    plan = cut_wavefronts(source.width, source.height, 1, channels=source.channels, memory=memory, kept=kept)
+    return replace(plan, samples=samples)
 
 
 def trace_guides(
@@ -65,15 +72,13 @@ def trace_guides(
     plan: Plan,
     display_from_world: NDArray[np.float64],
     *,
-    seed: int = 0,
     box_filter: bool = True,
     progress: ProgressCallback = silent,
 ) -> Guides:
     """Mean albedo, normal and height of the first surface along a pixel's rays that is neither mirror nor clear glass.
 
-    ``plan`` comes from :func:`plan_guides`; ``box_filter`` is that of the picture. ``seed`` should differ from the
-    picture's: else guides and picture share the same sample positions, and so the same noise. A sub-pixel with rays of
-    its own gets its own channel of the albedo from them; normal and height are the means of all three.
+    ``plan`` comes from :func:`plan_guides`; ``box_filter`` is that of the picture. A sub-pixel with rays of its own
+    gets its own channel of the albedo from them; normal and height are the means of all three.
     """
     surfaces = make_surfaces(built)
     matrix = np.asarray(display_from_world, dtype=np.float64)
@@ -83,25 +88,25 @@ def trace_guides(
     normal = np.zeros_like(albedo)
     height = np.zeros((plan.height, plan.width), dtype=np.float32)
     covered = np.zeros((2, plan.height, plan.width, plan.channels), dtype=np.float32)
-    done = 0
-    for tile, run in plan:
+    samples = plan.samples - plan.samples // 2, plan.samples // 2
+    weights = [dr.opaque(mi.Float, float(weight)) for weight in matrix[2]]
+    for tile in plan.tiles:
         rows = slice(tile.first_row, tile.first_row + tile.rows)
-        sums = _trace_tile(surfaces, source, plan, tile, run, seed, box_filter, matrix[2])
+        # The order of pixels is the same as for a wavefront of paths.
+        pixels, _ = samples_of_tile(source, plan, tile, Pass(0, 1), 0, box_filter)
+        sums = _sum_samples(surfaces, pixels, weights, dr.opaque(mi.UInt32, plan.samples))
+        dr.eval(sums)  # all at once: evaluated one by one, the rays would be traced nine times
         shape = (tile.rows, plan.width, plan.channels)
         colors, normals, heights, *halves = (_in_rows(part, shape) for part in sums)
-        height[rows] += heights.mean(axis=2) / plan.samples
+        height[rows] = heights.mean(axis=2) / plan.samples
         if plan.channels == 3:
             colors = np.diagonal(colors, axis1=2, axis2=3)[:, :, None]
-        albedo[rows] += colors[:, :, 0] / plan.samples
-        normal[rows] += normals.mean(axis=2) @ rotation.T / plan.samples
-        for half, hits in zip(covered, halves, strict=True):
-            half[rows] += hits
-        done += tile.rows * plan.width * plan.channels * run.count
-        progress(Progress("guides", done, plan.work))
-    first = plan.samples // 2
-    samples = first, plan.samples - first
-    coverage = [Coverage(hits / np.float32(max(1, n)), n) for hits, n in zip(covered, samples, strict=True)]
-    return Guides(albedo, normal, height, (coverage[0], coverage[1]))
+        albedo[rows] = colors[:, :, 0] / plan.samples
+        normal[rows] = normals.mean(axis=2) @ rotation.T / plan.samples
+        for half, hits, number in zip(covered, halves, samples, strict=True):
+            half[rows] = hits / max(1, number)
+        progress(Progress("guides", rows.stop, plan.height))
+    return Guides(albedo, normal, height, (Coverage(covered[0], samples[0]), Coverage(covered[1], samples[1])))
 
 
 def _in_rows(values: Float | Vector3f, shape: tuple[int, int, int]) -> FloatArray:
@@ -112,32 +117,25 @@ def _in_rows(values: Float | Vector3f, shape: tuple[int, int, int]) -> FloatArra
     return pixels.reshape(*shape, *lanes.shape[1:])
 
 
-def _trace_tile(
-    surfaces: Surfaces,
-    source: RaySource,
-    plan: Plan,
-    tile: Tile,
-    run: Pass,
-    seed: int,
-    box_filter: bool,
-    z_from_world: NDArray[np.float64],
+@syntax
+def _sum_samples(
+    surfaces: Surfaces, pixels: PixelRays, z_from_world: list[Float], samples: UInt32
 ) -> tuple[Color3f, Vector3f, Float, Float, Float]:
-    """Sums over the samples of one pass, for every pixel and channel in the order of lanes: colours, world-space
-    normals, heights, and hits of any surface by either half of all passes' samples."""
-    lanes = tile.rows * plan.width * plan.channels * run.count
-    # Pixels, streams and the order of lanes are the same as for a wavefront of paths.
-    pixels, stream = samples_of_tile(source, plan, tile, run, seed, box_filter)
-    ray = pixels.ray(stream)
-    albedo, normal, distance, covered = surfaces.features(ray)
-    x, y, z = mi.Point3f(ray.o) + mi.Vector3f(ray.d) * distance
-    weights = [dr.opaque(mi.Float, float(weight)) for weight in z_from_world]
-    # Beyond 100 m the light lines of all lenses are parallel.
-    height = dr.clip(x * weights[0] + y * weights[1] + z * weights[2] + weights[3], -1e5, 1e5)
-    is_first = stream.index < dr.opaque(mi.UInt32, plan.samples // 2)
-    hits = [dr.select(half, mi.Float(1), mi.Float(0)) for half in (covered & is_first, covered & ~is_first)]
-    values = [mi.Float(part) + dr.zeros(mi.Float, lanes) for part in (*albedo, *normal, height, *hits)]
-    # All at once: evaluated one by one, the rays would be traced eight times.
-    dr.eval(values)
-    if run.count > 1:
-        values = [dr.block_sum(part, run.count) for part in values]
-    return mi.Color3f(*values[:3]), mi.Vector3f(*values[3:6]), *values[6:]
+    """Sums over all samples of each lane's pixel: colours, world-space normals, heights, and hits of any surface by
+    the even and by the odd ones. In the kernel: sums of what it has written took longer than the rays."""
+    albedo, normal = mi.Color3f(0), mi.Vector3f(0)
+    height, even_hits, odd_hits = mi.Float(0), mi.Float(0), mi.Float(0)
+    number = mi.UInt32(0)
+    while dr.hint(number < samples, label="guides", exclude=[surfaces, pixels, z_from_world, samples]):
+        ray = pixels.through(lattice_point(number, samples))
+        color, facing, distance, covered = surfaces.features(ray)
+        x, y, z = mi.Point3f(ray.o) + mi.Vector3f(ray.d) * distance
+        # Beyond 100 m the light lines of all lenses are parallel.
+        height += dr.clip(x * z_from_world[0] + y * z_from_world[1] + z * z_from_world[2] + z_from_world[3], -1e5, 1e5)
+        albedo += color
+        normal += facing
+        hits, is_odd = dr.select(covered, mi.Float(1), mi.Float(0)), mi.Float(number & 1)
+        even_hits += hits * (1 - is_odd)
+        odd_hits += hits * is_odd
+        number += 1
+    return albedo, normal, height, even_hits, odd_hits

@@ -122,7 +122,7 @@ class PhysicalSurfaces:
             hit,
             dr.select(hit, mi.Point3f(si.p), 0),
             dr.select(hit, _normal(si, bsdf, hit), 0),
-            dr.select(hit, _albedo(si, bsdf, hit), 0),
+            _albedo(si, bsdf, _central_sample(si, bsdf, hit & ~_has_reflectance(bsdf))[1], hit),
             dr.gather(mi.UInt32, self._numbers, pointer, hit),
         )
 
@@ -174,18 +174,20 @@ class PhysicalSurfaces:
             emission = si.emitter(self._scene).eval(si)
             if dr.hint(self._background is not None, mode="scalar"):
                 emission = dr.select((steps == 0) & ~hit, mi.Color3f(self._background), emission)
-            color = dr.clip(tint * (_albedo(si, bsdf, hit) + emission), 0, 1)
-
-            may_be_specular = _has_specular_lobe(bsdf.flags())
-            bs, weight = _central_sample(si, bsdf, hit & may_be_specular)
-            specular = _has_specular_lobe(bs.sampled_type)
+            # In a branch, so that the processor skips it for a vector of lanes that have met rough surfaces alone.
+            lobe, weight, wo = mi.UInt32(0), mi.Color3f(0), mi.Vector3f(0)
+            if hit & (_has_specular_lobe(bsdf.flags()) | ~_has_reflectance(bsdf)):
+                bs, sampled = _central_sample(si, bsdf, hit)
+                lobe, weight, wo = mi.UInt32(bs.sampled_type), mi.Color3f(sampled), mi.Vector3f(bs.wo)
+            specular = _has_specular_lobe(lobe)
+            color = dr.clip(tint * (_albedo(si, bsdf, weight, hit) + emission), 0, 1)
             continues = hit & specular & (steps < MOST_EVENTS) & (dr.max(weight) > 0)
             albedo = dr.select(active & ~continues, color, albedo)
             normal = dr.select(active & ~continues & hit, mi.Vector3f(_normal(si, bsdf, hit)), normal)
             distance += dr.select(active, dr.select(hit, si.t, ENVIRONMENT_DISTANCE), 0)
             tint *= weight
             steps += 1
-            onward = si.spawn_ray(si.to_world(bs.wo))
+            onward = si.spawn_ray(si.to_world(wo))
             o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
             active &= continues
             pi = self._scene.ray_intersect_preliminary(onward, coherent=False, active=active)
@@ -214,15 +216,18 @@ def _normal(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Normal3f:
     return dr.select(mapped, mi.Normal3f(bsdf.eval_attribute_3("normal", si, mapped)), plain)
 
 
-def _albedo(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Color3f:
-    """Base colour where the surface has one, else diffuse reflectance, else the tint of a specular surface."""
+def _has_reflectance(bsdf: BSDFPtr) -> Bool:
+    """Whether a BSDF knows a base colour or diffuse reflectance."""
+    return bsdf.has_attribute("base_color") | mi.has_flag(bsdf.flags(), mi.BSDFFlags.Diffuse)
+
+
+def _albedo(si: SurfaceInteraction3f, bsdf: BSDFPtr, tint: Color3f, active: Bool) -> Color3f:
+    """Base colour where the surface has one, else diffuse reflectance, else the ``tint`` of a specular surface."""
     has_base = active & bsdf.has_attribute("base_color", active)
-    diffuse = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Diffuse)
-    value = dr.select(diffuse, bsdf.eval_diffuse_reflectance(si, diffuse & ~has_base), 0)
-    specular = active & ~has_base & ~diffuse
-    value = dr.select(specular, _central_sample(si, bsdf, specular)[1], value)
+    diffuse = active & ~has_base & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Diffuse)
+    value = dr.select(diffuse, bsdf.eval_diffuse_reflectance(si, diffuse), tint)
     value = dr.select(has_base, bsdf.eval_attribute_3("base_color", si, has_base), value)
-    return dr.clip(mi.Color3f(value), 0, 1)
+    return dr.select(active, dr.clip(mi.Color3f(value), 0, 1), 0)
 
 
 class WhittedSurfaces:

@@ -72,8 +72,11 @@ class PixelRays:
 
     def ray(self, stream: SampleStream) -> Ray3f:
         """The ray of each lane's sample."""
-        point = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
-        return self._source.rays(*self._at, point)
+        return self.through(stream.next_2d(PIXEL_DIMENSION))
+
+    def through(self, point: Point2f) -> Ray3f:
+        """The ray through a point in [0, 1)^2 of each lane's pixel, or through its centre where all samples are."""
+        return self._source.rays(*self._at, point if self._box_filter else mi.Point2f(0.5))
 
 
 class OnePicture(RaySource):
