@@ -59,29 +59,9 @@ def render_frames(
     from lippmann.sequences.files import saved_sequence
     from lippmann.sequences.forms import INTEGRAL, QuiltForm
     from lippmann.sequences.motion import FRAMES_PER_SECOND
-    from lippmann.viewing.hololuminescent import RATES
-    from lippmann.viewing.video_file import check_animation_path, write_codes
+    from lippmann.viewing.video_file import write_codes
 
-    if (spec.camera_path is not None or spec.turns) and spec.fps is not None and spec.video is None:
-        what = "a turn" if spec.turns else "a camera path"
-        raise UsageError(f"{what} has one pose a frame", where="--fps", fix="leave it out, or add --video")
-    if spec.fps is not None and not 0.001 <= spec.fps <= 1000:
-        raise UsageError(f"{spec.fps:g} frames per second", where="--fps", rule="0.001 to 1000")
-    if spec.eye is not None and spec.video is None:
-        raise UsageError("nobody looks", where="--eye", fix="add --video FILE.mp4, or leave it out")
-    if spec.video is not None:
-        check_animation_path(spec.video, spec.codec)
-    else:
-        for option, given in (("--codec", spec.codec is not None), ("--shows", spec.shows != "eye")):
-            if given:
-                raise UsageError("there is no film", where=option, fix="add --video FILE.mp4, or leave it out")
-    if spec.shows == "hololuminescent" and spec.fps not in RATES:
-        raise UsageError(
-            f"{spec.fps or FRAMES_PER_SECOND:g} frames per second",
-            where="--fps",
-            rule="the player of Hololuminescent displays takes 30 or 60",
-            fix="add --fps 30",
-        )
+    _check(spec)
     request = replace(request, fixed_noise=spec.fixed_noise)
     chosen = frame_range(spec.frames or ":")
     output = files.output
@@ -163,6 +143,34 @@ def render_frames(
         {"output": str(output), "frames": done, "video": None if spec.video is None else str(spec.video)},
         f"{done[0]['output']} to {Path(done[-1]['output']).name}{film}: {len(done)} frames{before}, {seconds:.1f} s",
     )
+
+
+def _check(spec: SequenceOptions) -> None:
+    """Refuse options of a film that go together with no film, or not with this one."""
+    from lippmann.sequences.motion import FRAMES_PER_SECOND
+    from lippmann.viewing.hololuminescent import RATES
+    from lippmann.viewing.video_file import check_animation_path
+
+    if (spec.camera_path is not None or spec.turns) and spec.fps is not None and spec.video is None:
+        what = "a turn" if spec.turns else "a camera path"
+        raise UsageError(f"{what} has one pose a frame", where="--fps", fix="leave it out, or add --video")
+    if spec.fps is not None and not 0.001 <= spec.fps <= 1000:
+        raise UsageError(f"{spec.fps:g} frames per second", where="--fps", rule="0.001 to 1000")
+    if spec.eye is not None and spec.video is None:
+        raise UsageError("nobody looks", where="--eye", fix="add --video FILE.mp4, or leave it out")
+    if spec.video is not None:
+        check_animation_path(spec.video, spec.codec)
+    else:
+        for option, given in (("--codec", spec.codec is not None), ("--shows", spec.shows != "eye")):
+            if given:
+                raise UsageError("there is no film", where=option, fix="add --video FILE.mp4, or leave it out")
+    if spec.shows == "hololuminescent" and spec.fps not in RATES:
+        raise UsageError(
+            f"{spec.fps or FRAMES_PER_SECOND:g} frames per second",
+            where="--fps",
+            rule="the player of Hololuminescent displays takes 30 or 60",
+            fix="add --fps 30",
+        )
 
 
 def open_moving(source: SceneSource, spec: SequenceOptions, request: RenderRequest) -> Motion:
