@@ -117,6 +117,8 @@ def test_what_an_eye_sees_of_the_pattern(lippmann, monitor_file, tmp_path):
         (("stripes", "-d", SHORT, "--center", "nan"), "--center: 'nan' is not a number"),
         (("stripes", "-d", SHORT, "--views", "0"), "0 is out of range"),
         (("stripes", "-d", SHORT, "--step", "1"), "--step: does not apply to stripes"),
+        (("stripes", "-d", SHORT, "--fields", "5"), "--fields: does not apply to stripes"),
+        (("pitch", "-d", SHORT, "--views", "5"), "--views: does not apply to pitch"),
         (("pitch", "-d", SHORT, "--step", "0"), "0 is out of range"),
         (("pitch", "-d", SHORT, "--step", "5"), "use a smaller step or fewer fields"),
         (("pitch", "-d", SHORT, "--fields", "1000"), "1000 is out of range"),

@@ -38,8 +38,10 @@ def pattern(
         str | None, typer.Option("--slope", help="Slope of the lenses, or infinite. Default: the display's.")
     ] = None,
     center: Annotated[str | None, typer.Option("--center", help="Centre in lenses. Default: the display's.")] = None,
-    views: Annotated[int, typer.Option("--views", help="Number of views, for stripes.")] = 3,
-    fields: Annotated[int, typer.Option("--fields", help="Number of fields, for the other patterns.")] = 11,
+    views: Annotated[int | None, typer.Option("--views", help="Number of views, for stripes. Default: 3.")] = None,
+    fields: Annotated[
+        int | None, typer.Option("--fields", help="Number of fields, for the other patterns. Default: 11.")
+    ] = None,
     step: Annotated[
         float | None,
         typer.Option(
@@ -61,9 +63,12 @@ def pattern(
 
     console = Console(quiet, as_json)
     check_output(output, bits)
-    chosen = Pattern(name, views, fields, step)  # type: ignore[arg-type]  # it is checked there
-    if name == "stripes" and step is not None:
-        raise UsageError("does not apply to stripes", where="--step", fix="leave it out")
+    counts = {key: count for key, count in (("views", views), ("fields", fields)) if count is not None}
+    chosen = Pattern(name, step=step, **counts)  # type: ignore[arg-type]  # it is checked there
+    others = {"--fields": fields, "--step": step} if name == "stripes" else {"--views": views}
+    for flag, value in others.items():
+        if value is not None:
+            raise UsageError(f"does not apply to {name}", where=flag, fix="leave it out")
     monitor = _with_values(Monitor.of_display(load_display(display)), pitch, slope, center)
     with console.progress() as progress:
         image = pattern_picture(chosen, monitor, progress=progress)
