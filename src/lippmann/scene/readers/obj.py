@@ -28,7 +28,7 @@ from lippmann.scene.readers.obj_tables import (
     Integers,
     Lines,
     Points,
-    check_range,
+    check_vertices,
     drop_absent,
     read_corners,
     read_table,
@@ -270,7 +270,7 @@ def _assemble(statements: _Statements, where: str) -> tuple[_Geometry, list[str]
     numbers = np.repeat(np.array(statements.faces.numbers, np.int64), sizes)
     counts = (len(positions), len(uvs), len(normals))
     notes = drop_absent(corners, counts)
-    check_range(corners, counts, numbers, where)
+    check_vertices(corners, counts[0], numbers, where)
     positions = near_origin(positions[:, :3], notes)
     triangles, owners = triangulate(positions, corners[:, 0] - 1, sizes)
     cut = corners[triangles] - 1

@@ -136,24 +136,23 @@ def _mixed_corners(flat: Sequence[str], numbers: Integers, where: str) -> Intege
 
 
 def drop_absent(corners: Integers, counts: Sequence[int]) -> list[str]:
-    """Drop the indices into tables that the file lacks, as in OpenSubdiv's shapes, with a note on each table."""
+    """Drop the indices into a table where some name entries that it lacks, with a note on each such table.
+
+    As in OpenSubdiv's shapes, which have none, and in VTK's of several actors, which count the wrong ones.
+    """
     notes = []
     for slot, what in ((1, "texture coordinates"), (2, "normals")):
-        if not counts[slot] and (corners[:, slot] > 0).any():
+        column = corners[:, slot]
+        if (column < 0).any() or (column > counts[slot]).any():
+            notes.append(f"faces name {what} up to {column.max()} of the {counts[slot]} in the file: taken without")
             corners[:, slot] = 0
-            notes.append(f"faces name {what}, but the file has none: taken without")
     return notes
 
 
-def check_range(corners: Integers, counts: Sequence[int], numbers: Integers, where: str) -> None:
-    least = (1, 0, 0)
-    for slot, what in enumerate(("vertex", "texture coordinate", "normal")):
-        column = corners[:, slot]
-        bad = (column < least[slot]) | (column > counts[slot])
-        if bad.any():
-            row = int(np.argmax(bad))
-            raise SceneError(
-                f"face uses {what} {column[row]}",
-                where=f"{where}:{numbers[row]}",
-                rule=f"the file has 1 to {counts[slot]}",
-            )
+def check_vertices(corners: Integers, count: int, numbers: Integers, where: str) -> None:
+    column = corners[:, 0]
+    bad = (column < 1) | (column > count)
+    if bad.any():
+        row = int(np.argmax(bad))
+        what = f"face uses vertex {column[row]}"
+        raise SceneError(what, where=f"{where}:{numbers[row]}", rule=f"the file has 1 to {count}")

@@ -281,7 +281,9 @@ def test_text_and_doubles_and_other_orders_are_read(tmp_path):
     doubles = header([(name, "double") for name in NAMES]) + ROW.astype("<f8").tobytes()
     big = header([(name, "float") for name in NAMES], form="binary_big_endian") + ROW.astype(">f4").tobytes()
     turned = header([(name, "float") for name in reversed(NAMES)]) + ROW[::-1].astype("<f4").tobytes()
-    for number, data in enumerate((text, doubles, big, turned)):
+    faces = b"element face 0\nproperty list uchar int vertex_indices\nend_header"
+    with_no_faces = turned.replace(b"end_header", faces, 1)  # as mesh libraries write
+    for number, data in enumerate((text, doubles, big, turned, with_no_faces)):
         path = tmp_path / f"{number}.ply"
         path.write_bytes(data)
         splats = splats_of(path)

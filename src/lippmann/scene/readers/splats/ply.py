@@ -108,7 +108,10 @@ def _rows_of(data: bytes, header: Header, where: str) -> Mapping[str, Rows]:
     position, length = (0, len(words)) if header.order is None else (header.end, len(data))
     for element in header.elements:
         names = [each.name for each in element.properties]
-        if any(each.count_type is not None for each in element.properties) or len(set(names)) < len(names):
+        has_lists = any(each.count_type is not None for each in element.properties)
+        if has_lists and not element.count:  # faces, which mesh libraries declare wherever there are vertices
+            continue
+        if has_lists or len(set(names)) < len(names):
             raise SceneError(
                 f"'{element.name[:40]}' has a list, or a property twice", where=where, rule="splats do not"
             )
