@@ -18,6 +18,7 @@ from lippmann.scene.readers import depth_photo
 from lippmann.scene.readers.depth_layers import split_layers
 from lippmann.scene.readers.depth_map import read_depth_map
 from lippmann.scene.readers.depth_photo import read_depth_photo
+from lippmann.scene.readers.load import load_scene
 from lippmann.viewing.color_and_depth import (
     depth_codes,
     named,
@@ -77,21 +78,20 @@ def test_pictures_are_read_back_within_a_code(tmp_path, monkeypatch, slope, bits
     assert (color[40, 5] > color[40, 5][::-1]).tolist() == [True, False, False]
     right, left = int(depth[40, -2, 0]), int(depth[40, 1, 0])
     assert (right > left) == (form.white == "near")
-    if kind == ".png":
-        seen = []
+    seen = []
 
-        def watched(inverse, *rest):
-            seen.append(inverse)
-            return split_layers(inverse, *rest)
+    def watched(inverse, *rest):
+        seen.append(inverse)
+        return split_layers(inverse, *rest)
 
-        monkeypatch.setattr(depth_photo, "split_layers", watched)
-        assert len(depth_photo.read_depth_photo(path).meshes) >= 1
-        shares = seen[0] * (1.0 if bits == 8 else 65535.0)
-        shares = shares if form.white == "near" else shares + 2**bits - 1
-        distance = visible_distance(slope, EYE, (64, 64))
-        expected = depth_codes(distance, *range_of(distance), bits, "near")
-        expected = np.repeat(expected[:, ::2], 2, axis=1) if form.half else expected
-        assert np.abs(shares - expected).max() <= 1.0
+    monkeypatch.setattr(depth_photo, "split_layers", watched)
+    load_scene(path)
+    shares = seen[0] * (1.0 if bits == 8 else 65535.0)
+    shares = shares if form.white == "near" else shares + 2**bits - 1
+    distance = visible_distance(slope, EYE, (64, 64))
+    expected = depth_codes(distance, *range_of(distance), bits, "near")
+    expected = np.repeat(expected[:, ::2], 2, axis=1) if form.half else expected
+    assert np.abs(shares - expected).max() <= 1.0
 
 
 @pytest.mark.parametrize("form", [RgbdForm(), RgbdForm(True, "far")])

@@ -55,7 +55,7 @@ def check_response(display: Display, body: bytes) -> Response:
             codes = photograph.srgb_codes()
         if codes.dtype != "uint8" or codes.shape[-1] != 3:
             raise PictureError("it has no colours of 8 bits", where="photograph")
-        line = check_photograph(codes, display, distance).line
+        line = check_photograph(codes, display, distance)
     except LippmannError as error:
         line = str(error)
     except (OSError, SyntaxError) as error:

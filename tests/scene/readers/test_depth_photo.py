@@ -389,7 +389,7 @@ def test_maps_of_other_proportions_are_refused(tmp_path):
 
 
 def test_a_depth_map_is_for_photographs(tmp_path):
-    rule = r"for \.jpg, \.jpeg, \.png, \.webp, \.heic, \.heif, \.hif files"
+    rule = r"for \.jpg, \.jpeg, \.png, \.tif, \.tiff, \.webp, \.heic, \.heif, \.hif files"
     with pytest.raises(UsageError, match=rf"depth_map: teapot is no photograph; {rule}"):
         load_scene("teapot", depth_map=tmp_path / "depth.npy")
 

@@ -92,7 +92,7 @@ _ELSEWHERE = {
     ".xyz": "save molecules as .pdb, by: obabel in.xyz -O out.pdb; clouds of points as .ply, in CloudCompare",
     **{kind: _OPEN_BABEL.format(kind) for kind in (".sdf", ".mol", ".mol2", ".cube", ".gro")},
     **dict.fromkeys((".bcif", ".mmtf"), "take the entry's .cif file from the data bank"),
-    **dict.fromkeys((".tif", ".tiff", ".bmp", ".avif"), "save photographs with depth as .png or .jpg"),
+    **dict.fromkeys((".bmp", ".avif"), "save photographs with depth as .png or .jpg"),
     **dict.fromkeys(FILMS, "take its pictures out: ffmpeg -i in.mp4 frames/%04d.png"),
 }
 

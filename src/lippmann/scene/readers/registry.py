@@ -193,7 +193,7 @@ _OWN = {
         {b'{"data_': ".json"},
     ),
     "photographs": Reader(
-        (".jpg", ".jpeg", ".png", ".webp", ".heic", ".heif", ".hif"),
+        (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".heic", ".heif", ".hif"),
         f"{_HERE}.depth_photo:read_depth_photo",
         options=("depth_map",),
     ),
