@@ -88,7 +88,7 @@ def test_samples_bound_a_quality(lippmann, engine, tmp_path, small):
 def test_one_sample_says_why_it_says_nothing(lippmann, engine, tmp_path, small):
     done = lippmann("render", "teapot", "--display", small, "--spp", 1, "--json", "-o", tmp_path / "a.png")
     assert done.json["estimate"] is None
-    assert "one sample per pixel does not tell" in done.err
+    assert "no estimate of the error: it needs two samples per pixel or more (--spp 2)" in done.err
 
 
 @pytest.mark.slow

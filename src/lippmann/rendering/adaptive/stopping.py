@@ -106,7 +106,7 @@ class Goal:
             if value < asked:
                 shortfalls.append(f"{what} is estimated at {_floor(value):.1f} dB, goal {asked:g} dB")
             elif low < asked - TUNING.tolerance:
-                shortfalls.append(f"{what} is likely there, but may have {_floor(low):.1f} dB, goal {asked:g} dB")
+                shortfalls.append(f"{what} is likely at the goal of {asked:g} dB, but may have {_floor(low):.1f} dB")
         return ", ".join(shortfalls) or "too few samples to be sure"
 
     def _asked(self, estimate: Estimate) -> list[tuple[str, float, float, float]]:
