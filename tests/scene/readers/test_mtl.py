@@ -108,6 +108,12 @@ def test_a_comment_after_a_texture(material, picture):
     assert material("map_Kd wood.png # of the door\n").base_color_texture.image.pixels[0, 0, 0] == 100
 
 
+def test_quotes_around_a_texture(material, picture):
+    picture("old wood.png", np.full((2, 2, 3), 100))
+    found = material('map_Kd -s 1 1 1 "old wood.png" # of the door\n')
+    assert found.base_color_texture.image.pixels[0, 0, 0] == 100
+
+
 def test_a_dot_is_no_texture(material):
     """As Blender writes pictures that were never saved."""
     plain = material("Kd 0.2 0.4 0.6\nmap_Kd .\nmap_Bump . \n")

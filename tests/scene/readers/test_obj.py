@@ -225,6 +225,13 @@ def test_comments_after_names(read):
     assert not scene.notes
 
 
+def test_quotes_around_a_library(read):
+    scene = read(
+        'mtllib "my colours.mtl"\n' + SQUARE + "usemtl a\nf 1 2 3\n", **{"my colours__mtl": "newmtl a\nKd 1 0 0\n"}
+    )
+    assert scene.materials[0].base_color == (1, 0, 0)
+
+
 def test_a_library_with_a_number_sign_in_its_name(read):
     scene = read("mtllib a #1.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\n", **{"a #1__mtl": "newmtl a\nKd 1 0 0\n"})
     assert scene.materials[0].base_color == (1, 0, 0)

@@ -153,9 +153,13 @@ class NamedFiles:
         raise MissingFileError(f"{what} '{name}' not found", where=where, fix=_similar(allowed[0]) if allowed else "")
 
     def find_on_line(self, body: str, *, where: str, what: str) -> Path:
-        """The file that the rest of a line names: all of it, spaces and all, or what stands before a comment."""
+        """The file that the rest of a line names: all of it, spaces and all, or what stands before a comment; quotes
+        around a name, as some exporters write them, are none of it."""
         plain = uncommented(body)
-        return self.find(body if plain == body or is_file(self.folder / body) else plain, where=where, what=what)
+        names = body, plain, plain.strip('"')
+        return self.find(
+            next((name for name in names if is_file(self.folder / name)), names[-1]), where=where, what=what
+        )
 
     def find_folder(self, name: str, *, where: str, what: str, folders: Sequence[Path]) -> Path:
         """The folder that ``name`` means, seen from the first of ``folders`` that has it; errors as of :meth:`find`."""

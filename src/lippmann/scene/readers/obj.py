@@ -387,7 +387,7 @@ def _read_libraries(libraries: Lines, file: str, named: NamedFiles) -> tuple[dic
         where = f"{file}:{number}"
         # One name with spaces, or several names: only the folder can tell.
         plain = uncommented(body)
-        whole = next((name for name in (body, plain) if is_file(named.folder / name)), None)
+        whole = next((name for name in (body, plain, plain.strip('"')) if is_file(named.folder / name)), None)
         for name in [whole] if whole else plain.split():
             looked_for += 1
             if looked_for > _MOST_LIBRARIES:
