@@ -18,7 +18,17 @@ from lippmann.scene.scene import (
     override_light,
 )
 from lippmann.scene.studio_light import BACKDROP, studio
-from lippmann.scene.values.description import Camera, Environment, Instance, Light, Material, Mesh, SceneDescription
+from lippmann.scene.values.description import (
+    Camera,
+    Environment,
+    Image,
+    Instance,
+    Light,
+    Material,
+    Mesh,
+    SceneDescription,
+    Texture,
+)
 
 
 def triangle(positions=((0, 0, 0), (2, 0, 0), (0, 1, 0)), **fields):
@@ -108,6 +118,11 @@ def test_a_note_names_the_studio_where_mirrors_would_show_black():
     assert notes(metallic=1.0, roughness=0.1) == notes(transmission=1.0, roughness=0.0) == (MIRROR_NOTE,)
     assert notes(metallic=1.0, roughness=0.9) == notes(metallic=0.0, roughness=0.1) == ()
     assert notes(studio(), metallic=1.0, roughness=0.1) == ()
+    # Texels of roughness 0.2, one of five and five of nine of them metal.
+    for count, expected in ((1, ()), (5, (MIRROR_NOTE,))):
+        pixels = np.array([[(0, 51, 255)] * count + [(0, 51, 0)] * 4], np.uint8)
+        smooth = Texture(Image("smooth", pixels), srgb=False)
+        assert notes(metallic=1.0, roughness=1.0, metallic_roughness_texture=smooth) == expected
 
 
 def test_mirrors_that_lights_alone_light_mirror_a_studio_a_quarter_as_bright():

@@ -301,12 +301,8 @@ class Scene:
         assert isinstance(self.physical, SceneDescription)
         if not self.physical.lights:
             return False
-        materials = (self.physical.materials[self.physical.meshes[mesh].material] for mesh in self.physical.placements)
-        return any(
-            each.roughness < 0.5 and max(each.metallic, each.transmission) > 0.5
-            for each in materials
-            if each.metallic_roughness_texture is None
-        )
+        materials = {self.physical.meshes[mesh].material for mesh in self.physical.placements}
+        return any(_mirrors(self.physical.materials[each]) for each in materials)
 
     def _irradiance(self) -> float:
         """What the file's lights send to a surface in the scene's middle that faces them all, W/m², mean of colours."""
@@ -395,6 +391,17 @@ def has_lights(description: SceneDescription) -> bool:
         return False
     low, high = bounds_of(description)
     return emitted_luminance(description) >= _DIMMEST * np.pi * float(((high - low) ** 2).sum())
+
+
+def _mirrors(material: Material) -> bool:
+    """Whether a quarter of a surface or more is smooth metal or glass."""
+    roughness, metallic = (np.array([value], np.float32) for value in (material.roughness, material.metallic))
+    texture = material.metallic_roughness_texture
+    if texture is not None:
+        from lippmann.scene.parsing.texture_maps import scalar
+
+        roughness, metallic = roughness * scalar(texture.image, "g"), metallic * scalar(texture.image, "b")
+    return bool(np.mean((roughness < 0.5) & (np.maximum(metallic, material.transmission) > 0.5)) >= 0.25)
 
 
 def light_rotation(options: LightOptions) -> Matrix:
