@@ -121,7 +121,7 @@ def test_an_estimate_survives_its_plain_form():
         ({"integrator": "classic", "pixel_filter": "point"}, "chance"),
         ({"integrator": "path", "pixel_filter": "point"}, None),
         ({"integrator": "classic", "pixel_filter": "box"}, None),
-        ({"integrator": "path", "spp": 1}, "one sample"),
+        ({"integrator": "path", "spp": 1}, "two samples per pixel or more"),
     ],
 )
 def test_pictures_without_an_estimate_say_why(settings, reason):
