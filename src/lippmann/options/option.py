@@ -206,6 +206,11 @@ def default_of(each: Field[Any]) -> Any:
     return each.default
 
 
+def changed_options(options: Options) -> list[str]:
+    """Names of the options whose values are not the defaults."""
+    return [each.name for each, _ in options_of(type(options)) if getattr(options, each.name) != default_of(each)]
+
+
 def kinds_of(kind: Any) -> tuple[Any, ...]:
     """The members of a union, or the one type."""
     return get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)

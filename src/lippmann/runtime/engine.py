@@ -103,7 +103,8 @@ def start(device: DeviceChoice = "auto", threads: int | None = None) -> Engine:
             _set_here = engine.variant
         mi.set_log_level(mi.LogLevel.Error)
         dr.set_log_level(dr.LogLevel.Error)
-        count = min(threads or machine.usable_cores(), machine.usable_cores())
+        cores = machine.usable_cores()
+        count = min(threads or cores, cores)
         if dr.thread_count() != count:
             dr.set_thread_count(count)
         return replace(engine, threads=count)

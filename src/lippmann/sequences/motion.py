@@ -16,7 +16,7 @@ from lippmann.options.light import LightOptions
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.scene import SceneOptions
 from lippmann.scene.matrices import Bounds
-from lippmann.scene.parsing.far_origin import moved_back, traceable_from_world
+from lippmann.scene.parsing.far_origin import move_and_scale, traceable_from_world
 from lippmann.scene.placement import Placement
 from lippmann.scene.readers.load import open_moving, read_scene
 from lippmann.scene.scene import Scene, check_description, find_camera, override_light
@@ -115,7 +115,7 @@ class AnimatedFile(Motion):
         beginning = self._moving.at(0.0)
         # What is moved to the origin or scaled is so by the same at all times.
         self._traceable_from_world = traceable_from_world(beginning)
-        self._first = read_scene(moved_back(beginning, self._traceable_from_world), plain, light)
+        self._first = read_scene(move_and_scale(beginning, self._traceable_from_world), plain, light)
         #: The last frame that was asked for: its placement, its camera and its picture all ask for it.
         self._last: tuple[int, Scene] | None = None
 
@@ -144,7 +144,7 @@ class AnimatedFile(Motion):
         physical = self._first.physical
         assert isinstance(physical, SceneDescription)
         description = replace(
-            moved_back(check_description(self._moving.at(seconds), self._file), self._traceable_from_world),
+            move_and_scale(check_description(self._moving.at(seconds), self._file), self._traceable_from_world),
             multiple_scattering=physical.multiple_scattering,
         )
         return replace(self._first, description=override_light(description, physical.environment, physical.background))

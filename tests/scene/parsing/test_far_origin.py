@@ -8,7 +8,7 @@ import struct
 import numpy as np
 import pytest
 
-from lippmann.scene.parsing.far_origin import moved_near_origin, near_origin
+from lippmann.scene.parsing.far_origin import make_traceable, near_origin
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.values.description import Camera, Instance, Light, Material, Mesh, SceneDescription
 
@@ -180,8 +180,8 @@ def lit_corner(unit):
 
 @pytest.mark.parametrize("unit", [1e-12, 1e-3, 1e12])
 def test_a_scene_of_a_unit_that_cannot_be_traced_is_scaled_with_its_light_and_cameras(unit):
-    plain, scaled = lit_corner(1.0), moved_near_origin(lit_corner(unit))
-    assert moved_near_origin(plain) is plain
+    plain, scaled = lit_corner(1.0), make_traceable(lit_corner(unit))
+    assert make_traceable(plain) is plain
     (camera,) = scaled.cameras
     point, sun = scaled.lights
     world = scaled.instances[0].world_from_mesh[:3, :3] @ scaled.meshes[0].positions.T.astype(np.float64)

@@ -15,7 +15,7 @@ from lippmann.cli.shared.scene_source import SceneSource, display_of
 from lippmann.errors import UsageError
 from lippmann.options.forms import LEFT_OUT
 from lippmann.options.light import LightOptions
-from lippmann.options.option import default_of, flag_of, options_of
+from lippmann.options.option import changed_options, flag_of
 from lippmann.options.outputs import AccessOptions
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.prints import PrintOptions
@@ -117,11 +117,7 @@ def _check_plain(eye: str | None, display: str, placement: PlacementOptions, *, 
     given = ["eye"] if eye is not None else []
     if not is_of_state:
         given += ["display"] if display != _DISPLAY else []
-        given += [
-            each.name
-            for each, _ in options_of(PlacementOptions)
-            if each.name != "camera" and getattr(placement, each.name) != default_of(each)
-        ]
+        given += [name for name in changed_options(placement) if name != "camera"]
     if given:
         rule = "--plain shows the scene without a display"
         raise UsageError("is for a display", where=flag_of(given[0]), rule=rule, fix="leave one of them out")

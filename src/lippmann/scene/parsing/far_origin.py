@@ -43,12 +43,12 @@ def near_origin(positions: NDArray[np.float64], notes: list[str]) -> NDArray[np.
     return positions - offset
 
 
-def moved_near_origin(description: SceneDescription) -> SceneDescription:
+def make_traceable(description: SceneDescription) -> SceneDescription:
     """A scene of meshes with its cameras and lights, brought to coordinates that single precision traces; with a note.
 
     Placements put buildings and terrains far away, whose meshes lie about their own origin; units make scenes tiny.
     """
-    return moved_back(description, traceable_from_world(description))
+    return move_and_scale(description, traceable_from_world(description))
 
 
 def traceable_from_world(description: SceneDescription) -> Matrix | None:
@@ -75,7 +75,7 @@ def traceable_from_world(description: SceneDescription) -> Matrix | None:
     return matrix
 
 
-def moved_back(description: SceneDescription, matrix: Matrix | None) -> SceneDescription:
+def move_and_scale(description: SceneDescription, matrix: Matrix | None) -> SceneDescription:
     """A scene with its cameras and lights, moved and scaled by a matrix (4x4), with notes; as it is without one.
 
     Lengths and the power of light sources follow, so that the picture stays.

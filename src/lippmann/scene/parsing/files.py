@@ -155,8 +155,7 @@ class NamedFiles:
     def find_on_line(self, body: str, *, where: str, what: str) -> Path:
         """The file that the rest of a line names: all of it, spaces and all, or what stands before a comment; quotes
         around a name, as some exporters write them, are none of it."""
-        plain = uncommented(body)
-        names = body, plain, plain.strip('"')
+        names = names_on_line(body)
         return self.find(
             next((name for name in names if is_file(self.folder / name)), names[-1]), where=where, what=what
         )
@@ -176,6 +175,12 @@ class NamedFiles:
     def admits(self, path: Path) -> bool:
         """Whether the scene file may name a file, wherever links lead."""
         return self.anywhere or bool(_lies_in(path, self.folder))
+
+
+def names_on_line(body: str) -> tuple[str, str, str]:
+    """Names that the rest of a line may be: all of it, what stands before a comment, and that without its quotes."""
+    plain = uncommented(body)
+    return body, plain, plain.strip('"')
 
 
 def uncommented(body: str) -> str:

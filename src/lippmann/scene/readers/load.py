@@ -12,13 +12,13 @@ import numpy as np
 from lippmann.codecs.types import FILMS
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.light import LightOptions
-from lippmann.options.option import default_of, options_of, takes
+from lippmann.options.option import changed_options, takes
 from lippmann.options.outputs import AccessOptions
 from lippmann.options.scene import LoadKeywords, SceneOptions, Up
 from lippmann.options.texts import settings_of
 from lippmann.runtime.plugins import Plugin, function_of
 from lippmann.scene.parsing.dicom_files import DICOM, holds_dicom
-from lippmann.scene.parsing.far_origin import moved_near_origin
+from lippmann.scene.parsing.far_origin import make_traceable
 from lippmann.scene.parsing.files import NamedFiles, read_bytes
 from lippmann.scene.readers.registry import READERS, VTK, MovingScene, Reader, ReaderOption, suffixes_with
 from lippmann.scene.readers.splats.sog_folder import holds_sog
@@ -201,7 +201,7 @@ def _selected(scene: Scene, asked: SceneOptions) -> Scene:
 def _note_unused_light(photograph: SceneDescription, asked: SceneOptions, light: LightOptions) -> SceneDescription:
     """A photograph with a note that names the options of light that were given, which it has no use for."""
     unused = [name for name in ("environment", "single_scattering") if getattr(asked, name)]
-    unused += [each.name for each, _ in options_of(LightOptions) if getattr(light, each.name) != default_of(each)]
+    unused += changed_options(light)
     if not unused:
         return photograph
     remark = f"a photograph keeps its own colours, whatever light is given: {', '.join(unused)}"
@@ -273,7 +273,7 @@ def _from_name(source: str | Path, allow_outside: bool, asked: SceneOptions) -> 
         description = function_of(reader.read)(path, **keywords)
     if isinstance(description, SceneDescription):
         description = _upright(_with_remarks(check_description(description, path.name)), suffix, reader, asked.up)
-        description = moved_near_origin(description)
+        description = make_traceable(description)
         return Scene(description.name, description)
     scene = _of_other_kind(description)
     if scene is None:

@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.far_origin import near_origin
-from lippmann.scene.parsing.files import MissingFileError, NamedFiles, decode_text, is_file, read_bytes, uncommented
+from lippmann.scene.parsing.files import (
+    MissingFileError,
+    NamedFiles,
+    decode_text,
+    is_file,
+    names_on_line,
+    read_bytes,
+    uncommented,
+)
 from lippmann.scene.parsing.points_lines import as_material
 from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.point_clouds import describe_cloud
@@ -386,9 +394,9 @@ def _read_libraries(libraries: Lines, file: str, named: NamedFiles) -> tuple[dic
         bodies.add(body)
         where = f"{file}:{number}"
         # One name with spaces, or several names: only the folder can tell.
-        plain = uncommented(body)
-        whole = next((name for name in (body, plain, plain.strip('"')) if is_file(named.folder / name)), None)
-        for name in [whole] if whole else plain.split():
+        names = names_on_line(body)
+        whole = next((name for name in names if is_file(named.folder / name)), None)
+        for name in [whole] if whole else names[1].split():
             looked_for += 1
             if looked_for > _MOST_LIBRARIES:
                 rule = f"at most {_MOST_LIBRARIES} are looked for"
