@@ -111,7 +111,7 @@ def running(folder: Path, state: StudioState | None = None, make: Any = StandIn)
     session.close()
 
 
-def said(socket: ClientConnection, kind: str, seconds: float = 10.0) -> Any:
+def said(socket: ClientConnection, kind: str, seconds: float = 60.0) -> Any:
     """The next message of a type; ``frame`` for bytes."""
     while True:
         message = socket.recv(seconds)

@@ -25,7 +25,7 @@ class Record:
         self.frames, self.errors, self.busy = [], [], []
         self.watcher = Watcher(self.frames.append, self.errors.append, self.busy.append)
 
-    def wait_for(self, holds, seconds=10.0):
+    def wait_for(self, holds, seconds=60.0):
         until = time.monotonic() + seconds
         while not holds(self):
             assert time.monotonic() < until, (self.frames, self.errors)
@@ -70,12 +70,12 @@ def test_the_newest_view_wins(start):
     class Slow(StandIn):
         def frame(self, view):
             begun.set()
-            allowed.wait(10.0)
+            allowed.wait(60.0)
             return super().frame(view)
 
     thread, record = start(Slow)
     thread.want(record.watcher, wanted(1))
-    assert begun.wait(10.0)
+    assert begun.wait(60.0)
     for number in range(2, 200):
         thread.want(record.watcher, wanted(number))
     allowed.set()
@@ -169,7 +169,7 @@ class Turns(StandIn):
         self.made, self.may_begin = [], threading.Event()
 
     def frame_steps(self, view):
-        assert self.may_begin.wait(10.0)
+        assert self.may_begin.wait(60.0)
         for _ in range(self.PARTS - 1 if view.eye is None else 0):
             self.made.append("part")
             yield None
@@ -204,7 +204,7 @@ def test_watchers_take_turns_and_a_panel_gets_its_parts_between(start):
     thread.remove(record.watcher)
     pages = [moving(thread, STATE.view((float(n), 0.0, 300.0), (40, 30))) for n in range(4)]
     panel = moving(thread, STATE.native_view())
-    until = time.monotonic() + 10.0
+    until = time.monotonic() + 60.0
     while not made:
         assert time.monotonic() < until
         time.sleep(0.005)

@@ -162,14 +162,14 @@ def test_facts_are_those_of_the_last_frame_though_an_older_one_came_late(tmp_pat
     class Slow(StandIn):
         def frame(self, view):
             begun.set()
-            assert may_go.wait(10.0)
+            assert may_go.wait(60.0)
             return replace(super().frame(view), placement=placement(10.0 + view.request.placement.turn[0]))
 
     with running(tmp_path, make=Slow) as studio, studio.connect() as socket:
         socket.send(view(STATE, 1))
-        assert begun.wait(10.0)
+        assert begun.wait(60.0)
         socket.send(view(STATE | {"turn": [40, 0, 0]}, 2))
-        until = time.monotonic() + 10.0
+        until = time.monotonic() + 60.0
         while studio.session.state.turn[0] != 40.0:
             assert time.monotonic() < until
             time.sleep(0.005)
@@ -187,11 +187,10 @@ def test_no_frame_is_sent_before_others_were_shown(studio):
         for number in range(1, 30):
             socket.send(view(STATE | {"turn": [number, 0, 0]}, number))
             time.sleep(0.01)
-        frames = []
-        with contextlib.suppress(TimeoutError):
-            while True:
-                frames.append(said(socket, "frame", 0.4))
-        assert len(frames) == 2
+        for _ in range(2):
+            said(socket, "frame")
+        with pytest.raises(TimeoutError):
+            said(socket, "frame", 0.4)
         socket.send(json.dumps({"type": "shown", "frame": 2}))
         newest = said(socket, "frame")
         assert int.from_bytes(newest[8:12], "little") == 29
@@ -453,7 +452,7 @@ def test_a_part_of_a_broken_drop_is_removed_and_its_bytes_given_back(tmp_path):
 
 
 def wait_until(holds):
-    until = time.monotonic() + 10.0
+    until = time.monotonic() + 60.0
     while not holds():
         assert time.monotonic() < until
         time.sleep(0.01)
@@ -631,9 +630,12 @@ def test_pages_are_counted(studio, monkeypatch):
         with pytest.raises(InvalidStatus) as caught:
             stack.enter_context(studio.connect())
         assert caught.value.response.status_code == 503
-    time.sleep(0.2)
-    with studio.connect() as again:
-        assert said(again, "hello")
+
+    def answers():
+        with contextlib.suppress(InvalidStatus), studio.connect() as again:
+            return said(again, "hello")
+
+    wait_until(answers)
 
 
 def test_pages_end_with_the_studio(tmp_path):
@@ -678,14 +680,14 @@ def test_a_frame_is_told_of_with_the_state_of_its_own_page(tmp_path):
     class Slow(StandIn):
         def frame(self, view):
             begun.set()
-            assert may_go.wait(10.0)
+            assert may_go.wait(60.0)
             return super().frame(view)
 
     with running(tmp_path, make=Slow) as studio, studio.connect() as page, studio.connect() as other:
         page.send(view(STATE | {"turn": [30, 0, 0]}))
-        assert begun.wait(10.0)
+        assert begun.wait(60.0)
         other.send(view(STATE | {"turn": [60, 0, 0]}))
-        until = time.monotonic() + 10.0
+        until = time.monotonic() + 60.0
         while studio.session.state.turn[0] != 60.0:
             assert time.monotonic() < until
             time.sleep(0.005)
