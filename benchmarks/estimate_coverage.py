@@ -128,8 +128,7 @@ class Case:
 
     def trace(self, way: str, seed: int, **asked: Any) -> Any:
         """A picture made that way, as the whole program makes it."""
-        from lippmann.rendering.job import Job
-        from lippmann.rendering.methods import trace
+        from lippmann.rendering.methods import Job, trace
 
         method, denoise = WAYS[way]
         request = replace(self.session.request, method=method, denoise=denoise, seed=seed, pixel_filter="box", **asked)

@@ -89,7 +89,7 @@ def _picture(stage: Stage, options: dict[str, Any]) -> Picture:
 
 
 def _job(stage: Stage, options: dict[str, Any]) -> Any:
-    from lippmann.rendering.job import Job
+    from lippmann.rendering.methods import Job
     from lippmann.rendering.request.plan import resolve
 
     session = replace(stage.session, request=resolve(replace(stage.session.request, **options), stage.session.scene))

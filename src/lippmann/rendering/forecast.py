@@ -167,7 +167,7 @@ def forecast(
     session = open_session(scene, request, (width, height), progress=progress)
     placement = session.place(display)
 
-    from lippmann.rendering.job import Job
+    from lippmann.rendering.methods import Job
     from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 
     whole = DisplayRays(display, placement.world_from_display, bool(request.subpixels))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.options.choices import Method
+from lippmann.progress import ProgressCallback
 from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
 from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.denoise.dual_buffer import Denoised, clean_light, remove_excess
@@ -19,20 +21,103 @@ from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 from lippmann.rendering.denoise.outlines import exchange_coverage
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts, PixelErrors
+from lippmann.rendering.film.memory_model import cut_wavefronts
 from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
-from lippmann.rendering.film.wavefront import Frame
-from lippmann.rendering.job import Job, Traced, one_stream
+from lippmann.rendering.film.wavefront import Frame, trace_frame
 from lippmann.rendering.provenance import is_among_mirrors
 from lippmann.rendering.reprojection.point_image import STATUS_LAYER, TRACED
 from lippmann.rendering.request.preconditions import why_no_estimate
+from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.request.tuning import TUNING as REQUEST
-from lippmann.rendering.transport.integrator import ReusableIntegrator
-from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays
+from lippmann.rendering.session import Session
+from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator
+from lippmann.rendering.transport.ray_source import DisplayRays, OnePicture, QuiltRays, SubpixelRays, WindowRays
 
 Floats = NDArray[np.float32]
 
 #: The layer of a picture with the number of samples that each pixel had.
 SAMPLES_LAYER = "samples"
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """A scene, its rays and the integrator to trace them with.
+
+    Attributes
+    ----------
+    session:
+        The scene on the device, the request, and the machine's share.
+    integrator, source:
+        The integrator, and the rays of the picture.
+    display_from_world:
+        ``(4, 4)`` affine map to the display's frame (mm).
+    is_part:
+        Whether the source is a tile of a picture that is assembled and assessed elsewhere.
+    """
+
+    session: Session
+    integrator: Integrator
+    source: OnePicture | QuiltRays
+    display_from_world: NDArray[np.float64]
+    is_part: bool = False
+
+    @property
+    def request(self) -> RenderRequest:
+        """The resolved request."""
+        return self.session.request
+
+    @property
+    def progress(self) -> ProgressCallback:
+        """The callback of progress reports."""
+        return self.session.watch.progress
+
+    @property
+    def sample_source(self) -> OnePicture | QuiltRays:
+        """The source whose samples are summed; for sub-pixels that are denoised, one that keeps all colours."""
+        source = self.source
+        if not isinstance(source, DisplayRays | WindowRays) or not self.request.keeps_colors(source.display):
+            return source
+        return SubpixelRays(source)
+
+    @cached_property
+    def denoiser(self) -> GuidedDenoiser:
+        """The denoiser of the picture, which traces its guides once."""
+        return GuidedDenoiser(
+            self.session.built,
+            self.sample_source,
+            self.display_from_world,
+            box_filter=self.request.box_filter,
+            memory=self.session.memory,
+            threads=self.session.engine.threads,
+            kind=self.request.denoise,
+            shares=self.request.shares_light,
+            progress=self.progress,
+        )
+
+
+@dataclass(frozen=True)
+class Traced:
+    """The result of a job.
+
+    Attributes
+    ----------
+    samples:
+        Samples per pixel.
+    estimate:
+        Estimated PSNR; where it is None, ``notes`` say why.
+    options, seconds:
+        Metadata of the method, and the seconds of its own stages.
+    errors:
+        Squared errors of the pixels; None where they are unknown.
+    """
+
+    frame: Frame
+    samples: int
+    estimate: Estimate | None = None
+    notes: tuple[str, ...] = ()
+    options: dict[str, object] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    errors: PixelErrors | None = None
 
 
 def trace(job: Job) -> Traced:
@@ -58,6 +143,24 @@ def trace_samples(job: Job) -> Traced:
 def trace_unjudged(job: Job, *notes: str) -> Traced:
     """A fixed number of samples without an error estimate; denoised if requested."""
     return denoise_whole(job, one_stream(job, *notes))
+
+
+def one_stream(job: Job, *notes: str) -> Traced:
+    """All samples in one stream: without half-buffers there is no error estimate."""
+    request, source = job.request, job.sample_source
+    plan = cut_wavefronts(
+        source.width, source.height, request.samples, channels=source.channels, memory=job.session.memory
+    )
+    frame = trace_frame(
+        job.integrator,
+        source,
+        plan,
+        seed=request.seed,
+        box_filter=request.box_filter,
+        for_denoiser=request.denoise != "none",
+        progress=job.progress,
+    )
+    return Traced(frame, request.samples, notes=notes)
 
 
 def trace_reused(job: Job) -> Traced:
@@ -147,13 +250,12 @@ def _traced(
     frame = Frame(picture.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
     if errors is not None:
         frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
-    seconds = {} if denoiser is None else {"denoise": denoiser.seconds}
-    options = {} if denoiser is None else _denoiser_options(denoiser)
-    return Traced(frame, batches.samples, estimate, notes, options, seconds, errors)
+    traced = Traced(frame, batches.samples, estimate, notes, errors=errors)
+    return traced if denoiser is None else _with_denoiser(traced, denoiser)
 
 
 def _batches(job: Job) -> FullInBatches:
-    source = job.traced
+    source = job.sample_source
     return FullInBatches(
         job.integrator,
         source,
@@ -222,18 +324,19 @@ def denoise_whole(job: Job, traced: Traced) -> Traced:
     """A traced picture without half-buffers, denoised if requested."""
     if job.request.denoise == "none":
         return traced
-    frame, source, denoiser = traced.frame, job.traced, job.denoiser
+    frame, source, denoiser = traced.frame, job.sample_source, job.denoiser
     noisy = frame.pixels
     if frame.coverage is not None and (further := denoiser.coverage()) is not None:
         noisy = exchange_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)
     # The network runs once, not for each of two halves: its high effort is worth its time from half as many samples on.
     cleaned = remove_excess(clean_light(noisy, frame.specular, denoiser, 2 * traced.samples), frame.excess)
     frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
-    return replace(traced, options=_denoiser_options(denoiser), seconds={"denoise": denoiser.seconds})
+    return _with_denoiser(traced, denoiser)
 
 
-def _denoiser_options(denoiser: GuidedDenoiser) -> dict[str, object]:
-    return {"denoise": "oidn", "denoise_effort": denoiser.used}
+def _with_denoiser(traced: Traced, denoiser: GuidedDenoiser) -> Traced:
+    options = {"denoise": "oidn", "denoise_effort": denoiser.used}
+    return replace(traced, options=options, seconds={"denoise": denoiser.seconds})
 
 
 def _end_notes(goal: Goal, outcome: Outcome) -> tuple[str, ...]:

@@ -63,8 +63,7 @@ def render_picture(
     # Mitsuba may be loaded now that the engine has chosen its libraries.
     from lippmann.image.integral_image import IntegralImage
     from lippmann.rendering.film.aov import plan_layers, trace_layers
-    from lippmann.rendering.job import Job
-    from lippmann.rendering.methods import trace
+    from lippmann.rendering.methods import Job, trace
     from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 
     display_from_world = placement.display_from_world

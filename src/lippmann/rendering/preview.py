@@ -47,8 +47,7 @@ def render_preview(
     session = open_session(scene, request, size, progress=progress)
     pose = scene.camera(camera)
 
-    from lippmann.rendering.job import Job
-    from lippmann.rendering.methods import trace_unjudged
+    from lippmann.rendering.methods import Job, trace_unjudged
     from lippmann.rendering.transport.ray_source import CameraRays, OnePicture
     from lippmann.rendering.transport.whitted_camera import WhittedCameraRays
 

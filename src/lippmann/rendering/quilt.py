@@ -73,8 +73,7 @@ def render_quilt(
 
     from lippmann.device.pbr import BuiltScene
     from lippmann.device.pbr.scene import scene_corners
-    from lippmann.rendering.job import Job
-    from lippmann.rendering.methods import trace
+    from lippmann.rendering.methods import Job, trace
     from lippmann.rendering.transport.ray_source import QuiltRays
 
     display_from_world = placement.display_from_world

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from lippmann.device.pbr.diffuse_pixels import DiffusePixels, KeyPicture
     from lippmann.display.nearby_views import NearbyViews
-    from lippmann.rendering.job import Job, Traced
+    from lippmann.rendering.methods import Job, Traced
     from lippmann.rendering.transport.path import PreparedLight
 
 Floats = NDArray[np.float32]
@@ -83,7 +83,7 @@ def _views_of(job: Job) -> NearbyViews | None:
     source = job.source
     if isinstance(source, QuiltRays):
         return CameraViews(source.display, source.columns, source.rows, source.view_size, source.window)
-    if not isinstance(source, DisplayRays | WindowRays) or job.traced.channels > 1:
+    if not isinstance(source, DisplayRays | WindowRays) or job.sample_source.channels > 1:
         return None
     whole = PixelWindow(0, 0, source.width, source.height)
     return LensViews(source.display, source.window if isinstance(source, WindowRays) else whole)
@@ -91,16 +91,16 @@ def _views_of(job: Job) -> NearbyViews | None:
 
 def _columns(job: Job) -> int:
     """Columns that are traced of each pixel: 3 of sub-pixels in full colour, else 1."""
-    return job.traced.width // job.source.width
+    return job.sample_source.width // job.source.width
 
 
 def _each_column(job: Job, pixels: Floats) -> Floats:
     """What each column that is traced shows of ``pixels`` ``(H, W, 3)``: all colours, or ``(H, 3 W, 1)`` one alone."""
     from lippmann.rendering.transport.ray_source import SubpixelRays
 
-    if not isinstance(job.traced, SubpixelRays):
+    if not isinstance(job.sample_source, SubpixelRays):
         return pixels
-    order = list(job.traced.display.panel.subpixel_order)
+    order = list(job.sample_source.display.panel.subpixel_order)
     return np.ascontiguousarray(pixels[..., order].reshape(len(pixels), -1, 1))
 
 
@@ -110,7 +110,7 @@ def _pixels_of(job: Job) -> DiffusePixels:
     from lippmann.device.pbr.diffuse_pixels import DiffusePixels
     from lippmann.rendering.transport.ray_source import SubpixelRays
 
-    guides, source, built = job.denoiser.guides(), job.traced, job.session.built
+    guides, source, built = job.denoiser.guides(), job.sample_source, job.session.built
     assert guides.height is not None
     assert isinstance(built, BuiltScene)
     albedo = source.own_colors(guides.albedo) if isinstance(source, SubpixelRays) else guides.albedo
@@ -129,7 +129,7 @@ def _known_light(key: KeyPicture, job: Job) -> tuple[Floats, Mask]:
     from lippmann.rendering.sharing.cross_lens import light_of_pixels
     from lippmann.rendering.transport.ray_source import SubpixelRays
 
-    source, albedo = job.traced, job.denoiser.guides().albedo
+    source, albedo = job.sample_source, job.denoiser.guides().albedo
     table = light_of_pixels(partial(key.irradiance, _pixels_of(job), job.request.coding), (*albedo.shape[:2], 4))
     irradiance, is_known = table[..., :3], np.asarray(table[..., 3] > 0)
     if isinstance(source, SubpixelRays):
@@ -142,11 +142,10 @@ def _known_light(key: KeyPicture, job: Job) -> tuple[Floats, Mask]:
 def _trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
     """The picture with ``pixels`` where their light ``is_known``; the others are traced and denoised among them."""
     from lippmann.rendering.film.wavefront import STRIP_ROWS, Coverage
-    from lippmann.rendering.job import Job, one_stream
-    from lippmann.rendering.methods import SAMPLES_LAYER, denoise_whole
+    from lippmann.rendering.methods import SAMPLES_LAYER, Job, denoise_whole, one_stream
     from lippmann.rendering.transport.ray_source import SinglePixelRays, SubpixelRays
 
-    source = job.traced
+    source = job.sample_source
     rows, columns = np.nonzero(~np.repeat(is_known, _columns(job), axis=1))
     order = np.lexsort((rows % STRIP_ROWS, columns, rows // STRIP_ROWS))  # neighbours take much the same paths
     rows, columns = rows[order], columns[order]

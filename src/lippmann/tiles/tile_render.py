@@ -19,8 +19,7 @@ from lippmann.rendering.estimate.psnr import ERROR_LAYER, ErrorSums, PixelErrors
 from lippmann.rendering.film.memory_model import cut_wavefronts
 from lippmann.rendering.film.sample_batches import FullInBatches
 from lippmann.rendering.film.wavefront import RayTotals, trace_frame
-from lippmann.rendering.job import Job
-from lippmann.rendering.methods import SAMPLES_LAYER, trace
+from lippmann.rendering.methods import SAMPLES_LAYER, Job, trace
 from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.session import Session, Stopwatch, open_session
 from lippmann.rendering.transport.integrator import Integrator

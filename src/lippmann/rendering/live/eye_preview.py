@@ -64,7 +64,7 @@ def render_eye_preview(
     # Mitsuba may be loaded now that the engine has chosen its libraries.
     from lippmann.rendering.denoise.dual_buffer import clean_light
     from lippmann.rendering.denoise.guided_denoiser import SurfacePart, denoise_surfaces, effort_of
-    from lippmann.rendering.job import Job, one_stream
+    from lippmann.rendering.methods import Job, one_stream
     from lippmann.rendering.transport.ray_source import DisplayRays, SinglePixelRays
 
     whole = DisplayRays(display, placement.world_from_display, bool(resolved.subpixels))

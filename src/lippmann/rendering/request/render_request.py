@@ -146,8 +146,8 @@ class RenderRequest(MachineOptions, QualityOptions):
         Called with a function that prepares the picture's light and with what this depends on: the scene, its built
         form and the camera's own exposure. Returns that light, or one of an earlier picture. None: prepared anew.
     trace_through:
-        Called with the :class:`~lippmann.rendering.job.Job` and the function that traces it; returns what is traced.
-        None: that function alone.
+        Called with the :class:`~lippmann.rendering.methods.Job` and the function that traces it; returns what is
+        traced. None: that function alone.
     plan:
         The plan that decided the values, with its reasons; None before :mod:`~lippmann.rendering.request.plan`.
     began:
