@@ -16,9 +16,8 @@ from lippmann.options.choices import Method
 from lippmann.progress import ProgressCallback
 from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
 from lippmann.rendering.adaptive.tuning import TUNING
-from lippmann.rendering.denoise.dual_buffer import Denoised, clean_light, remove_excess
+from lippmann.rendering.denoise.dual_buffer import Denoised, clean_light, exchange_coverage, remove_excess
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
-from lippmann.rendering.denoise.outlines import exchange_coverage
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts, PixelErrors
 from lippmann.rendering.film.memory_model import cut_wavefronts
@@ -335,7 +334,7 @@ def denoise_whole(job: Job, traced: Traced) -> Traced:
 
 
 def _with_denoiser(traced: Traced, denoiser: GuidedDenoiser) -> Traced:
-    options = {"denoise": "oidn", "denoise_effort": denoiser.used}
+    options: dict[str, object] = {"denoise": "oidn", "denoise_effort": denoiser.used}
     return replace(traced, options=options, seconds={"denoise": denoiser.seconds})
 
 

@@ -3,7 +3,7 @@
 The samples of a pixel come from ``STREAMS`` independent sample streams. Each stream is divided into equally many
 batches. The samples of one stream are stratified together over the pixel and the emitters, so fewer streams mean less
 variance; the difference between streams measures how much less. This module traces the samples, wavefront by wavefront.
-:mod:`.batched_picture` holds their sums, :mod:`lippmann.rendering.estimate.jackknife` estimates the error.
+:mod:`.batched_picture` holds their sums and estimates the error.
 """
 
 from __future__ import annotations

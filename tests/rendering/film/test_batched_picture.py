@@ -12,7 +12,7 @@ pytestmark = pytest.mark.usefixtures("engine")
 
 def errors(batches, taken=None, transfer="srgb"):
     """Of the means ``batches`` ``(K, pixels)`` of grey pixels, each of ``taken`` samples."""
-    from lippmann.rendering.estimate.jackknife import error_of_batches
+    from lippmann.rendering.film.batched_picture import error_of_batches
 
     taken = [1] * len(batches) if taken is None else taken
     sums = np.repeat(np.asarray(batches)[..., None] * np.asarray(taken)[:, None, None], 3, axis=2)
@@ -62,7 +62,7 @@ def slow_errors(sums, taken):
     "taken", [[1, 1], [2, 2, 1, 1], [3, 3, 2, 2, 3, 2, 2, 2], [1, 1, 0, 0, 1, 0, 0, 0], [8] * 8], ids=str
 )
 def test_errors_are_those_of_the_definition(taken):
-    from lippmann.rendering.estimate.jackknife import error_of_batches
+    from lippmann.rendering.film.batched_picture import error_of_batches
 
     random = np.random.default_rng(3)
     values = random.lognormal(-1, 0.7, (len(taken), 500, 3)) + 30 * (random.random((len(taken), 500, 1)) < 0.02)

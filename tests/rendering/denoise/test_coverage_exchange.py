@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import lippmann
 from lippmann.color.transfer import encode_srgb
-from lippmann.rendering.denoise.outlines import exchange_coverage
+from lippmann.rendering.denoise.dual_buffer import exchange_coverage
 from lippmann.rendering.film.wavefront import Coverage
 
 HEIGHT, WIDTH = 12, 20
