@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import io
 import struct
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -60,6 +60,9 @@ class ExrHeader:
         x and y of red, green, blue and white; None for those of Rec. 709.
     notes:
         What of it is not shown, each in one line.
+    layer:
+        The name, with its dot, of the layer whose channels have the names R, G, B and A here; empty where the file
+        has a picture without a name.
     """
 
     width: int
@@ -69,6 +72,7 @@ class ExrHeader:
     window: tuple[int, int, int, int]
     chromaticities: tuple[float, ...] | None
     notes: tuple[str, ...] = ()
+    layer: str = ""
 
     def rec709(self, pixels: Pixels) -> Pixels:
         """Linear RGB ``(..., 3)`` of the file as that of Rec. 709; colours beyond it are clipped at 0.
@@ -134,10 +138,17 @@ def exr_header(file: BinaryIO, path: Path) -> ExrHeader:
     try:
         (version,) = struct.unpack("<I", _exactly(file, 4))
         if version & (_DEEP | _MULTIPART):
-            raise PictureError("is a deep or multi-part OpenEXR file", where=str(path), rule="one flat part is read")
+            raise PictureError(
+                "is a deep or multi-part OpenEXR file",
+                where=str(path),
+                rule="one flat part is read",
+                fix="save that alone, by oiiotool: 'in.exr --subimage 0 -o out.exr', with --flatten if it is deep",
+            )
         attributes = _attributes(file)
         x0, y0, x1, y1 = struct.unpack("<4i", attributes["dataWindow"][1])
         channels, subsampled = _channel_list(attributes["channels"][1])
+        layer = _picture_layer(channels)
+        channels = {name.removeprefix(layer): kind for name, kind in channels.items()}
         if {"RY", "BY"} & {*channels, *subsampled}:
             what = "has luminance and chroma (Y, RY, BY)"
             raise PictureError(what, where=str(path), rule="R, G and B are read", fix="convert it to RGB")
@@ -164,8 +175,9 @@ def exr_header(file: BinaryIO, path: Path) -> ExrHeader:
         aspect_note(1.0, aspect)
         + unused
         + tuple(f"its channel {name} is subsampled: it is left out" for name in subsampled)
+        + ((f"its layer {layer[:-1]} is taken for the picture",) if layer else ())
     )
-    return ExrHeader(width, height, channels, text, window, chromaticities, notes)
+    return ExrHeader(width, height, channels, text, window, chromaticities, notes, layer)
 
 
 def read_exr(path: Path, header: ExrHeader) -> dict[str, Pixels]:
@@ -192,7 +204,10 @@ def read_exr(path: Path, header: ExrHeader) -> dict[str, Pixels]:
             raise _damaged(path, str(error)) from error
     if not file.parts:
         raise _damaged(path, "its pixels cannot be decoded")
-    return {name: _in_display_window(np.asarray(channel.pixels), header) for name, channel in file.channels().items()}
+    return {
+        name.removeprefix(header.layer): _in_display_window(np.asarray(channel.pixels), header)
+        for name, channel in file.channels().items()
+    }
 
 
 def _in_display_window(plane: Pixels, header: ExrHeader) -> Pixels:
@@ -259,6 +274,13 @@ def _channel_list(raw: bytes) -> tuple[dict[str, str], list[str]]:
         else:
             subsampled.append(name)
     return channels, subsampled
+
+
+def _picture_layer(names: Collection[str]) -> str:
+    """The layer with colours that stands for the missing picture: the only one, or Blender's ``Combined``."""
+    layers = [each[:-1] for each in names if each.endswith(".R") and {f"{each[:-1]}G", f"{each[:-1]}B"} <= {*names}]
+    layers = [each for each in layers if each.endswith("Combined.")] or layers
+    return layers[0] if len(layers) == 1 and not {"R", "Y"} & {*names} else ""
 
 
 def _check_chunks(file: BinaryIO, height: int, compression: int) -> None:

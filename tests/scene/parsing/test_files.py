@@ -90,6 +90,7 @@ def test_text_in_old_and_new_coding():
     assert decode_text("é".encode("latin-1"), "x") == "é"
     assert decode_text("\ufeffv 1 é".encode("utf-16-be"), "x") == "v 1 é"
     assert decode_text("\ufeffv 1 é".encode("utf-16-le"), "x") == "v 1 é"
+    assert decode_text(b"v 1\rv 2\r", "x") == "v 1\nv 2\n"  # as on the old Mac OS
     with pytest.raises(SceneError, match="is not a text file"):
         decode_text(b"v 1\0\0", "x.obj")
     with pytest.raises(SceneError, match="is no text in UTF-16"):

@@ -84,6 +84,37 @@ def test_channels_that_are_no_colour(tmp_path, pixels):
         read_environment(save_exr(tmp_path / "sky.exr", {"Z": np.ascontiguousarray(pixels[..., 0])}))
 
 
+@pytest.mark.parametrize("others", [{}, {"View.DiffCol": 0.5}])
+def test_the_colours_of_a_layer(tmp_path, pixels, others):
+    """As Blender writes its multi-layer files."""
+    layers = {"View.Combined": 1.0, **others}
+    channels = {
+        f"{layer}.{letter}": np.ascontiguousarray(factor * pixels[..., index])
+        for layer, factor in layers.items()
+        for index, letter in enumerate("RGB")
+    }
+    sky = read_environment(save_exr(tmp_path / "sky.exr", channels))
+    assert (sky.pixels == pixels).all()
+    assert sky.notes == ("sky.exr: its layer View.Combined is taken for the picture",)
+
+
+def test_several_layers_of_which_none_is_the_picture(tmp_path, pixels):
+    channels = {f"{layer}.{letter}": np.ascontiguousarray(pixels[..., 0]) for layer in "ab" for letter in "RGB"}
+    with pytest.raises(SceneError, match=r"has the channels a\.B, a\.G, a\.R, b\.B"):
+        read_environment(save_exr(tmp_path / "sky.exr", channels))
+
+
+def test_several_parts_are_refused_with_the_tool_that_takes_one_out(tmp_path, pixels):
+    parts = [OpenEXR.Part({"name": name, "type": OpenEXR.scanlineimage}, {"RGB": pixels}) for name in "ab"]
+    with OpenEXR.File(parts) as file:
+        file.write(str(tmp_path / "sky.exr"))
+    with pytest.raises(
+        SceneError, match=r"multi-part OpenEXR file\); one flat part is read; save that alone"
+    ) as caught:
+        read_environment(tmp_path / "sky.exr")
+    assert "cut short" not in str(caught.value)
+
+
 def test_damaged_and_foreign_files(tmp_path, pixels):
     path = save_exr(tmp_path / "sky.exr", {"RGB": pixels})
     data = path.read_bytes()

@@ -87,6 +87,13 @@ def test_up_of_what_says_it_itself_is_refused():
         ("ring.3dm", "Rhino"),
         ("turn.mp4", "ffmpeg"),
         ("turn.m4v", "ffmpeg"),
+        ("hero.ms3d", r"assimp export in\.ms3d out\.glb"),
+        ("town.i3dm", r"i3dmToGlb -i in\.i3dm"),
+        ("gear.sldprt", "STEP"),
+        ("wing.cgns", "ParaView"),
+        ("party.lfp", "lippmann weave"),
+        ("sky.exr", "--environment"),
+        ("sky.hdr", "--environment"),
     ],
 )
 def test_files_of_other_programs_are_told_how_to_become_gltf(save, name, said):

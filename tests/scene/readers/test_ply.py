@@ -52,6 +52,14 @@ def test_triangles_and_larger_polygons_together(read, data):
     assert mesh.normals is None
 
 
+@pytest.mark.parametrize("form", ["ascii", "binary"])
+def test_lines_that_end_as_on_the_old_mac_os(read, form):
+    start, end, body = (text_file() if form == "ascii" else binary_file()).partition(b"end_header\n")
+    body = body.replace(b"\n", b"\r") if form == "ascii" else body
+    (mesh,) = read((start + end).replace(b"\n", b"\r") + body).meshes
+    assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3], [1, 4, 2]]
+
+
 @pytest.mark.parametrize("order", ["<", ">"])
 def test_equal_polygons_take_the_short_way(read, order):
     faces = [(0, 1, 2), (1, 4, 2)]

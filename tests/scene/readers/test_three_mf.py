@@ -125,6 +125,19 @@ def test_a_picture_that_lets_the_colour_below_through(read):
     np.testing.assert_allclose(texture.image.pixels[0, 0], [0.2, 1.0, 0.2], atol=1e-6)
 
 
+def test_a_base_material_of_opacity_0_is_seen(read):
+    """As SolidWorks writes them."""
+    group = '<basematerials id="5"><base name="a" displaycolor="#0000FF00"/></basematerials>'
+    scene = read(model(group + solid(1, more='pid="5" pindex="0"')))
+    assert (scene.meshes[0].colors == [0, 0, 1, 1]).all()
+    assert scene.notes == ["opacities of 0 of base materials are not shown"]
+
+
+def test_slices_are_not_shown(read):
+    """The mesh beside them may be no more than their box."""
+    assert read(model('<s:slicestack id="3" zbottom="0"/>' + solid(1))).notes == ["slices are not shown"]
+
+
 @pytest.mark.parametrize(
     ("main", "line"),
     [
@@ -136,6 +149,10 @@ def test_a_picture_that_lets_the_colour_below_through(read):
         ("<!DOCTYPE model>" + model(solid(1)), "declares a document type"),
         (model('<object id="1"><components><component objectid="1"/></components></object>'), "without end"),
         (model(solid(1), ""), "has nothing to build"),
+        (
+            model(f'<object id="1"><mesh>{VERTICES}<b:beamlattice/></mesh></object>'),
+            "has nothing to build that is made of triangles; lattices of beams are not shown",
+        ),
     ],
 )
 def test_what_cannot_be_read_is_named(read, main, line):

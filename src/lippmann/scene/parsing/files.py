@@ -75,6 +75,8 @@ def read_bytes(path: Path, most: int = -1) -> bytes:
 def decode_text(data: bytes, where: str) -> str:
     """The text of an OBJ, MTL or similar file: UTF-16 with a byte order mark, UTF-8, else Latin-1 of old exporters.
 
+    Lines that end as on the old Mac OS, by a carriage return alone, end by a line feed.
+
     Raises
     ------
     SceneError
@@ -82,15 +84,19 @@ def decode_text(data: bytes, where: str) -> str:
     """
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         try:
-            return data.decode("utf-16")
+            return _with_line_feeds(data.decode("utf-16"))
         except UnicodeDecodeError:
             raise SceneError("is no text in UTF-16, as which it begins", where=where) from None
     if b"\0" in data[:4096]:
         raise SceneError("is not a text file", where=where, rule="this format is plain text")
     try:
-        return data.decode("utf-8-sig")
+        return _with_line_feeds(data.decode("utf-8-sig"))
     except UnicodeDecodeError:
-        return data.decode("latin-1")
+        return _with_line_feeds(data.decode("latin-1"))
+
+
+def _with_line_feeds(text: str) -> str:
+    return text if "\n" in text else text.replace("\r", "\n")
 
 
 @dataclass(frozen=True)

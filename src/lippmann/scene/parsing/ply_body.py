@@ -60,7 +60,7 @@ def _text_rows(body: bytes) -> list[bytes]:
     """The lines of numbers, without empty ones and remarks."""
     if b"#" in body or b"comment" in body:
         body = _REMARK.sub(b"", body)
-    return [line for line in body.split(b"\n") if line.strip()]
+    return [line for line in body.split(b"\n" if b"\n" in body else b"\r") if line.strip()]
 
 
 def _cut_short(element: Element, count: int, where: str) -> SceneError:

@@ -88,8 +88,9 @@ def read_header(data: bytes, where: str) -> Header:
     comments: list[str] = []
     form = ""
     position, number = 0, 0
+    end_of_line = b"\r" if data[3:4] == b"\r" and data[4:5] != b"\n" else b"\n"  # the former of the old Mac OS
     while True:
-        stop = data.find(b"\n", position)
+        stop = data.find(end_of_line, position)
         if stop < 0:
             raise SceneError("the header has no end", where=where, rule="it ends with 'end_header'")
         line = data[position:stop].decode("latin-1").strip()

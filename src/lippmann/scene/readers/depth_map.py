@@ -100,7 +100,7 @@ def read_depth_map(path: Path) -> DepthMap:
         if suffix == ".exr":
             return of_depth(_exr(path))
     except PictureError as error:
-        raise SceneError(error.what, where=path.name, rule=error.rule) from None
+        raise SceneError(error.what, where=path.name, rule=error.rule, fix=error.fix) from None
     except (ValueError, EOFError, OSError) as error:
         raise SceneError(f"is no depth map ({error})", where=path.name) from None
     return _picture(data, path.name)

@@ -83,7 +83,8 @@ def _read_exr(
         notes = tuple(f"{where}: {note}" for note in header.notes)
         return pixels if len(set(names)) == 1 else header.rec709(pixels), notes
     except PictureError as error:
-        raise _undecodable(error.what, where) from None
+        fix = error.fix or "is it cut short?"
+        raise SceneError(f"cannot be decoded ({error.what})", where=where, rule=error.rule, fix=fix) from None
 
 
 def _read_hdr(data: bytes, where: str, check_size: Callable[[int, int], None]) -> NDArray[np.float32]:
@@ -93,10 +94,6 @@ def _read_hdr(data: bytes, where: str, check_size: Callable[[int, int], None]) -
         return radiance.read_radiance(data, header, where)
     except PictureError as error:
         raise SceneError(error.what, where=where, fix=error.fix) from None
-
-
-def _undecodable(why: str, where: str) -> SceneError:
-    return SceneError(f"cannot be decoded ({why})", where=where, fix="is it cut short?")
 
 
 def _check_size(height: int, width: int, where: str) -> None:

@@ -58,6 +58,11 @@ _CLOUD_COMPARE = "save it as .ply, in CloudCompare for instance"
 _SLICER_3D = "save it as .nii.gz, in 3D Slicer for instance"
 _MAYA = "export it from Maya as FBX, and that from Blender as glTF 2.0 (.glb)"
 _TRIMESH = "convert it, in Python by trimesh: trimesh.load_mesh('a.off').export('a.ply')"
+_ASSIMP = "convert it by Assimp: assimp export in{0} out.glb"
+_TILES = "take the .glb out of it by: npx 3d-tiles-tools {0}ToGlb -i in.{0} -o out.glb"
+_PARAVIEW = "open it in ParaView, then File > Save Data as .vtu"
+_STEP = "export it as STEP, open that in FreeCAD, then File > Export > glTF (.glb)"
+_LYTRO = "decode it by LFToolbox or PlenoptiCam; views become a picture by 'lippmann weave', .mat by 'lippmann import'"
 _OPEN_BABEL = "save it as .pdb or .cif, in Avogadro or by: obabel in{0} -O out.pdb"
 
 #: Files of other programs, and how one that is read is made of them.
@@ -73,15 +78,24 @@ _ELSEWHERE = {
     ".pbrt": "its meshes, mostly .ply files beside it, are read one by one",
     **dict.fromkeys((".wrl", ".x3d", ".x3dv", ".vrml"), "open it in MeshLab, and export it as .ply or .obj"),
     ".off": _TRIMESH,
+    **{kind: _ASSIMP.format(kind) for kind in (".x", ".ac", ".ase", ".b3d", ".lws", ".md2", ".ms3d", ".smd")},
+    ".drc": "convert it by Draco: draco_decoder -i in.drc -o out.ply",
+    **dict.fromkeys((".sldprt", ".sldasm", ".sat", ".x_t", ".jt", ".catpart", ".ipt"), _STEP),
+    **dict.fromkeys((".hip", ".hipnc", ".bgeo"), "in Houdini: export it as .usd"),
+    **dict.fromkeys((".case", ".cgns", ".e", ".exo", ".foam", ".msh", ".xdmf"), _PARAVIEW),
+    **dict.fromkeys((".lfp", ".lfr"), _LYTRO),
+    ".mat": "a light field becomes a picture by 'lippmann import'",
+    ".h5": "save the views of a light field as pictures, and join them by 'lippmann weave'",
+    ".exr": "a sky is for --environment, depth for --depth-map",
     ".vox": "in MagicaVoxel: Export > ply",
-    ".b3dm": "take the .glb out of it by: npx 3d-tiles-tools b3dmToGlb -i in.b3dm -o out.glb",
+    **{f".{kind}": _TILES.format(kind) for kind in ("b3dm", "i3dm", "cmpt")},
     ".vtm": "save its blocks as one data set, in PyVista by: pyvista.read('a.vtm').combine().save('a.vtu')",
     ".pvd": "name one of the files that it lists",
     ".vtkhdf": "save it as .vtu, in PyVista by: pyvista.read('a.vtkhdf').cast_to_unstructured_grid().save('a.vtu')",
     **dict.fromkeys((".nrrd", ".nhdr", ".mha", ".mhd"), _SLICER_3D),
     **dict.fromkeys((".mgz", ".mgh"), "convert it by FreeSurfer: mri_convert in.mgz out.nii.gz"),
     ".mtl": "it holds the materials of an .obj file: name that",
-    ".hdr": "save it as .nii or .nii.gz, which hold header and voxels in one file",
+    ".hdr": "a sky is for --environment; save a volume as .nii, which holds header and voxels in one file",
     ".amf": "save it as .stl in the slicer",
     **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar"), "unpack it, and name the scene file inside"),
     ".zae": "unzip it, open the .dae in Blender, then File > Export > glTF 2.0 (.glb)",

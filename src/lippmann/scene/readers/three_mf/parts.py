@@ -31,6 +31,7 @@ _MODEL = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 _UNREAD = {
     "compositematerials": "mixtures of materials",
     "beamlattice": "lattices of beams",
+    "slicestack": "slices",
 }
 _COLOR = re.compile("#([0-9a-fA-F]{6})([0-9a-fA-F]{2})?")
 
@@ -230,7 +231,10 @@ class _PartReader:
         self._group = self.part.groups[given["id"]] = Group()
 
     def _base(self, given: dict[str, str]) -> None:
-        self._group.values.append(_color(given.get("displaycolor", "#FFFFFF")))
+        red, green, blue, alpha = _color(given.get("displaycolor", "#FFFFFF"))
+        if alpha == 0.0:  # as SolidWorks writes it, of parts that are there
+            self.part.unread["opacities of 0 of base materials"] = None
+        self._group.values.append((red, green, blue, alpha or 1.0))
 
     def _color(self, given: dict[str, str]) -> None:
         self._group.values.append(_color(given["color"]))

@@ -51,7 +51,7 @@ class _Reader:
         for item in start.build:
             self._place(item, np.diag([start.scale, start.scale, start.scale, 1.0]), 0)
         if not self._places:
-            raise self._error("has nothing to build that is made of triangles")
+            raise self._error("; ".join(["has nothing to build that is made of triangles", *self._notes]))
         return SceneDescription(
             self._name,
             self._meshes,
