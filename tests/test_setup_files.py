@@ -13,7 +13,6 @@ import yaml
 
 from lippmann._version import VERSION
 from lippmann.runtime import llvm, llvm_install
-from lippmann.runtime.llvm import Host
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -94,8 +93,8 @@ def test_the_recipe_builds_this_package():
 @pytest.mark.parametrize("system", ["linux", "darwin", "win32"])
 def test_llvm_from_conda_forge_is_that_of_the_doctor(system, tmp_path):
     (tmp_path / "env" / "conda-meta").mkdir(parents=True)
-    host = Host(system, "x86_64", "/env", {}, tmp_path)
-    package = llvm_install.remedy(llvm.OLDEST, llvm.NEWEST_TRIED, host).command[-1]
+    machine = llvm_install.Machine(system, tmp_path / "env", {})
+    package = llvm_install.remedy(llvm.OLDEST, llvm.NEWEST_TRIED, machine).command[-1]
     choice = next(line for line in RECIPE["requirements"]["run"] if isinstance(line, dict))
     assert package in choice["then" if system == "win32" else "else"]
     assert package in PIXI["target"]["win-64" if system == "win32" else "unix"]["dependencies"]

@@ -8,7 +8,7 @@ import pytest
 
 from lippmann.errors import EngineError
 from lippmann.runtime import llvm
-from lippmann.runtime.library_file import elf_head
+from lippmann.runtime.llvm import elf_head
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the libraries made here are Linux's")
 

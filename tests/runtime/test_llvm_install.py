@@ -8,18 +8,16 @@ from pathlib import Path
 import pytest
 
 from lippmann.runtime import llvm_install
-from lippmann.runtime.library_file import Host
-from lippmann.runtime.llvm_install import Remedy, Tools, remedy
+from lippmann.runtime.llvm_install import Machine, Remedy, remedy
 
 OLDEST, NEWEST = 17, 22
 
 
 def remedy_on(
-    system: str, *programs: str, root: bool = False, host: Host | None = None, apt: tuple[str, ...] = ()
+    system: str, *programs: str, root: bool = False, apt: tuple[str, ...] = (), prefix: Path = Path("/venv"), **set: str
 ) -> Remedy:
     paths = {name: f"/bin/{name}" for name in programs}
-    host = host or Host(system, "x86_64", "/venv", {}, Path("/nowhere"))
-    return remedy(OLDEST, NEWEST, host, Tools(paths.get, root, lambda: list(apt)))
+    return remedy(OLDEST, NEWEST, Machine(system, prefix, set, paths.get, root, lambda: list(apt)))
 
 
 @pytest.mark.parametrize(
@@ -69,21 +67,21 @@ def test_no_package_manager():
 )
 def test_a_conda_environment_gets_conda_forge_s_package(tmp_path, system, package):
     (tmp_path / "env" / "conda-meta").mkdir(parents=True)
-    host = Host(system, "x86_64", "/env", {}, tmp_path)
-    found = remedy_on(system, "mamba", "brew", "apt-get", host=host)
+    prefix = tmp_path / "env"
+    found = remedy_on(system, "mamba", "brew", "apt-get", prefix=prefix)
     assert found.command == (
-        *("/bin/mamba", "install", "--yes", "--prefix", "/env", "--channel", "conda-forge"),
+        *("/bin/mamba", "install", "--yes", "--prefix", str(prefix), "--channel", "conda-forge"),
         package,
     )
     assert found.text == f"mamba install --channel conda-forge {package}"
     assert found.obstacle == ""
-    assert "not on the path" in remedy_on(system, host=host).obstacle
+    assert "not on the path" in remedy_on(system, prefix=prefix).obstacle
 
 
 def test_a_pixi_project_is_asked_through_pixi(tmp_path):
     (tmp_path / "env" / "conda-meta").mkdir(parents=True)
-    host = Host("linux", "x86_64", "/env", {"PIXI_PROJECT_MANIFEST": "/p/pixi.toml"}, tmp_path)
-    assert remedy_on("linux", "pixi", "conda", host=host).command == ("/bin/pixi", "add", "libllvm19")
+    found = remedy_on("linux", "pixi", "conda", prefix=tmp_path / "env", PIXI_PROJECT_MANIFEST="/p/pixi.toml")
+    assert found.command == ("/bin/pixi", "add", "libllvm19")
 
 
 def test_the_outcome_of_the_command_is_said(capfd):
@@ -101,6 +99,6 @@ def test_a_program_in_the_working_directory_is_not_taken(tmp_path, monkeypatch):
     program.chmod(0o755)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PATH", ".")
-    assert Tools().find("brew") is None
+    assert Machine().find("brew") is None
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert Tools().find("brew") == str(program)
+    assert Machine().find("brew") == str(program)

@@ -11,11 +11,9 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-
-from lippmann.runtime.library_file import Host
 
 #: LLVM version that is asked for by number.
 VERSION = 19
@@ -49,11 +47,17 @@ class Remedy:
 
 
 @dataclass(frozen=True)
-class Tools:
-    """Facts beside the host on which a remedy depends.
+class Machine:
+    """The facts of a machine on which a remedy depends.
 
     Attributes
     ----------
+    system:
+        ``sys.platform``.
+    prefix:
+        Root of the running Python's environment.
+    environment:
+        Environment variables.
     find:
         The path of a program by its name; None if it is not installed.
     is_root:
@@ -62,38 +66,41 @@ class Tools:
         The names of apt's packages that begin with ``libllvm``.
     """
 
+    system: str = sys.platform
+    prefix: Path = Path(sys.prefix)
+    environment: Mapping[str, str] = field(default_factory=lambda: os.environ)
     find: Callable[[str], str | None] = lambda name: _which(name)
     is_root: bool = field(default_factory=lambda: _is_root())
     apt_packages: Callable[[], list[str]] = lambda: _apt_packages()
 
 
-def remedy(oldest: int, newest: int, host: Host | None = None, tools: Tools | None = None) -> Remedy:
+def remedy(oldest: int, newest: int, machine: Machine | None = None) -> Remedy:
     """The command that installs a library on this system.
 
     Parameters
     ----------
     oldest, newest:
         The major versions that serve.
-    host, tools:
-        The machine; by default this one.
+    machine:
+        By default this one.
     """
-    host, tools = host or Host(), tools or Tools()
-    conda = _conda(host, tools)
+    machine = machine or Machine()
+    conda = _conda(machine)
     if conda is not None:
         return conda
-    if host.system == "darwin":
-        brew = tools.find("brew")
+    if machine.system == "darwin":
+        brew = machine.find("brew")
         where = "" if brew else "Homebrew is not installed; https://brew.sh tells how"
         return Remedy((brew or "brew", "install", "llvm"), "brew install llvm", where)
-    if host.system == "win32":
+    if machine.system == "win32":
         winget = ("install", "--exact", "--id", "LLVM.LLVM")
-        return _of_system("winget", winget, tools, as_root="", missing="winget is not installed")
-    if tools.find("apt-get"):
-        package = _newest_apt_package(tools.apt_packages(), oldest, newest) or f"libllvm{VERSION}"
-        return _of_system("apt-get", ("install", package), tools, run=("install", "--yes", package))
+        return _of_system("winget", winget, machine, as_root="", missing="winget is not installed")
+    if machine.find("apt-get"):
+        package = _newest_apt_package(machine.apt_packages(), oldest, newest) or f"libllvm{VERSION}"
+        return _of_system("apt-get", ("install", package), machine, run=("install", "--yes", package))
     for name, arguments in _LINUX:
-        if tools.find(name):
-            return _of_system(name, arguments, tools)
+        if machine.find(name):
+            return _of_system(name, arguments, machine)
     sentence = f"install the LLVM runtime library, version {oldest} or newer"
     return Remedy((), sentence, "no package manager is known here")
 
@@ -127,29 +134,29 @@ def _newest_apt_package(names: list[str], oldest: int, newest: int) -> str | Non
 def _of_system(
     name: str,
     words: tuple[str, ...],
-    tools: Tools,
+    machine: Machine,
     *,
     run: tuple[str, ...] | None = None,
     as_root: str = "sudo ",
     missing: str = "",
 ) -> Remedy:
-    path = tools.find(name)
-    obstacle = missing if path is None else "" if tools.is_root else "it needs the rights of an administrator"
+    path = machine.find(name)
+    obstacle = missing if path is None else "" if machine.is_root else "it needs the rights of an administrator"
     plain_words = [word for word in words if word not in ("--assumeyes", "--noconfirm", "--non-interactive")]
     return Remedy((path or name, *(run or words)), f"{as_root}{name} {' '.join(plain_words)}", obstacle)
 
 
-def _conda(host: Host, tools: Tools) -> Remedy | None:
+def _conda(machine: Machine) -> Remedy | None:
     """conda-forge's package, where the running Python lies in a conda environment."""
-    if not (host.at(host.prefix) / "conda-meta").is_dir():
+    if not (machine.prefix / "conda-meta").is_dir():
         return None
-    package = f"libllvm-c{VERSION}" if host.system == "win32" else f"libllvm{VERSION}"
-    words = ("install", "--yes", "--prefix", host.prefix, "--channel", "conda-forge", package)
-    named = host.environment.get("CONDA_EXE") or host.environment.get("MAMBA_EXE")
-    tool = next((path for path in (named, *map(tools.find, ("mamba", "conda", "micromamba"))) if path), None)
+    package = f"libllvm-c{VERSION}" if machine.system == "win32" else f"libllvm{VERSION}"
+    words = ("install", "--yes", "--prefix", str(machine.prefix), "--channel", "conda-forge", package)
+    named = machine.environment.get("CONDA_EXE") or machine.environment.get("MAMBA_EXE")
+    tool = next((path for path in (named, *map(machine.find, ("mamba", "conda", "micromamba"))) if path), None)
     text = f"{Path(tool).stem if tool else 'conda'} install --channel conda-forge {package}"
-    if host.environment.get("PIXI_PROJECT_MANIFEST"):
-        pixi = tools.find("pixi")
+    if machine.environment.get("PIXI_PROJECT_MANIFEST"):
+        pixi = machine.find("pixi")
         obstacle = "" if pixi else "pixi is not on the path"
         return Remedy((pixi or "pixi", "add", package), f"pixi add {package}", obstacle)
     return Remedy((tool or "conda", *words), text, "" if tool else "conda is not on the path")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from lippmann.runtime import llvm
-from lippmann.runtime.library_file import VERSION_IN_NAME, Host
+from lippmann.runtime.llvm import VERSION_IN_NAME, Host
 
 #: System, processor, Python's prefix, environment, where the library lies.
 LAYOUTS = {
