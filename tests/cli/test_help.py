@@ -14,7 +14,7 @@ import typer
 from lippmann.cli.app import COMMANDS, GROUPS, app_of, make_app
 from lippmann.cli.shared.command_options import OPTION_GROUPS
 from lippmann.cli.shared.examples import EXAMPLES
-from lippmann.cli.shared.outputs import output_of
+from lippmann.cli.shared.scene_source import output_of
 
 
 def commands(command=None, words=()):

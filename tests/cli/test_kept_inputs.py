@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from lippmann.cli.shared.outputs import check_outputs
+from lippmann.cli.shared.command_options import check_outputs
 from lippmann.errors import OutputError
 
 

@@ -9,7 +9,7 @@ import typer
 
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
-from lippmann.cli.shared.outputs import output_of
+from lippmann.cli.shared.scene_source import output_of
 
 _LAYOUTS = "hci (4D Light Field Benchmark), lftoolbox (.mat), eslf (.png), zarr, views, or a plugin's"
 

@@ -12,8 +12,7 @@ import typer
 from lippmann.cli.shared import options
 from lippmann.cli.shared.command_options import with_options, without
 from lippmann.cli.shared.console import Console
-from lippmann.cli.shared.outputs import output_of
-from lippmann.cli.shared.scene_source import PRINT, print_of, sheet_of
+from lippmann.cli.shared.scene_source import PRINT, output_of, print_of, sheet_of
 from lippmann.errors import UsageError
 from lippmann.options.prints import FinishOptions, PrintOptions
 

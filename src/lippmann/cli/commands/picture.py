@@ -10,7 +10,7 @@ import typer
 from lippmann.cli.commands.quilt import Aspect, Layout, quilt_of
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console, estimate_in_words
-from lippmann.cli.shared.outputs import output_of
+from lippmann.cli.shared.scene_source import output_of
 from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ import typer
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import with_options, without
 from lippmann.cli.shared.console import Console, add_seconds, depth_line, report
-from lippmann.cli.shared.outputs import output_of
-from lippmann.cli.shared.scene_source import SceneSource, display_of
+from lippmann.cli.shared.scene_source import SceneSource, display_of, output_of
 from lippmann.errors import UsageError
 from lippmann.options.forms import LEFT_OUT
 from lippmann.options.light import LightOptions

@@ -13,8 +13,7 @@ from lippmann.cli.commands.interlace import FitOption, fit_note
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import HelpfulCommand, for_form, with_options
 from lippmann.cli.shared.console import Console, add_seconds, depth_line, estimate_in_words, report
-from lippmann.cli.shared.outputs import output_of
-from lippmann.cli.shared.scene_source import SceneSource, sheet_of
+from lippmann.cli.shared.scene_source import SceneSource, output_of, sheet_of
 from lippmann.errors import UsageError
 from lippmann.options.light import LightOptions
 from lippmann.options.outputs import AccessOptions, SequenceOptions

@@ -13,8 +13,7 @@ import typer
 from lippmann.cli.shared import options, standard_streams
 from lippmann.cli.shared.command_options import with_options
 from lippmann.cli.shared.console import Console, add_seconds, remarks, report
-from lippmann.cli.shared.outputs import output_of
-from lippmann.cli.shared.scene_source import SceneSource, display_of, sheet_of
+from lippmann.cli.shared.scene_source import SceneSource, display_of, output_of, sheet_of
 from lippmann.errors import UsageError
 from lippmann.options.light import LightOptions
 from lippmann.options.outputs import AccessOptions, ClusterOptions, SequenceOptions

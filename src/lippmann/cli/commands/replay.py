@@ -13,7 +13,7 @@ from lippmann.cli.commands.quilt import Aspect, Layout, quilt_of
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import only, with_options
 from lippmann.cli.shared.console import Console
-from lippmann.cli.shared.outputs import output_of
+from lippmann.cli.shared.scene_source import output_of
 from lippmann.errors import UsageError
 from lippmann.options.outputs import SequenceOptions
 from lippmann.options.texts import triple

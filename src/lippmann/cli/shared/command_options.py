@@ -12,6 +12,7 @@ again for a page, most of the time that ``--help`` may take. So they are written
 from __future__ import annotations
 
 import inspect
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
@@ -24,8 +25,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from lippmann.cli.shared.examples import EXAMPLES
-from lippmann.cli.shared.outputs import check_outputs
-from lippmann.errors import LippmannError
+from lippmann.errors import LippmannError, OutputError
 from lippmann.options.choices import REUSING
 from lippmann.options.forms import LEFT_OUT, REUSES_NOTHING, Form
 from lippmann.options.option import Option, Options, default_of, kinds_of, options_of
@@ -56,6 +56,8 @@ _RARE = frozenset({"as_json", "correct", "headroom", "quiet", "bits", "maps", "r
 
 #: Commands that may write over what they read: the page of a calibration refines a display's file.
 _MAY_CHANGE = frozenset({"page"})
+#: Options that name what is written.
+_WRITTEN = frozenset({"--output", "--csv", "--map", "--maps", "--export", "--video"})
 
 
 class HelpfulCommand(TyperCommand):
@@ -84,6 +86,40 @@ class HelpfulCommand(TyperCommand):
         if ctx.info_name not in _MAY_CHANGE:
             check_outputs((parameter.opts, ctx.params.get(parameter.name)) for parameter in self.params)
         return super().invoke(ctx)
+
+
+def check_outputs(values: Iterable[tuple[Iterable[str], object]]) -> None:
+    """Refuse a command whose output is one of its inputs, under whatever name: links and hard links count.
+
+    Parameters
+    ----------
+    values:
+        The names of each parameter of the command, and its value; text that names no file is none.
+
+    Raises
+    ------
+    OutputError
+        An output is a file that another parameter names.
+    """
+    read: list[Path] = []
+    written_to: list[Path] = []
+    for names, value in values:
+        (read if _WRITTEN.isdisjoint(names) else written_to).extend(_files(value))
+    for written in written_to:
+        for path in read:
+            if os.path.samefile(written, path):
+                raise OutputError(f"is '{path}', which is read", where=str(written), fix="choose another name")
+
+
+def _files(value: object) -> Iterator[Path]:
+    """The files and folders that there are of those that a value may name."""
+    for each in value if isinstance(value, list | tuple) else (value,):
+        if isinstance(each, str | Path):
+            try:
+                if os.path.exists(each):
+                    yield Path(each)
+            except (OSError, ValueError):  # no file can have such a name
+                continue
 
 
 class HelpfulGroup(TyperGroup):

@@ -1,11 +1,13 @@
-"""The scene, the display and the sheet that a command names, with what its options say of them."""
+"""The scene, the display, the sheet and the output that a command names, with what its options say of them."""
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lippmann.errors import DisplayError, UsageError
+from lippmann.errors import DisplayError, LippmannError, OutputError, UsageError
 from lippmann.options.light import LightOptions
 from lippmann.options.outputs import AccessOptions
 from lippmann.options.prints import FinishOptions, PrintOptions
@@ -139,3 +141,33 @@ def sheet_of(display: Display, finishing: FinishOptions, *, in_frames: bool = Fa
 
 def _option(parameter: str) -> str:
     return parameter.replace("_", "-")
+
+
+def output_of(given: Path | None, source: str | Path, ending: str) -> Path:
+    """The file to write: ``given``, or in the working folder the source's name with ``ending``, such as ``-seen.png``.
+
+    The picture of a photograph ``photo.png`` in this folder is ``photo-native.png``.
+
+    Raises
+    ------
+    OutputError
+        There is such a file already, and it is no picture of this program's.
+    """
+    if given is not None:
+        return given
+    path = Path(f"{Path(source).stem or 'picture'}{ending}")
+    # With a word in its name the file is this program's; a model's plain name may be that of its texture.
+    if ending.startswith(".") and path.exists() and not _is_ours(path):
+        if os.path.exists(source) and path.samefile(source):
+            return path.with_stem(f"{path.stem}-native")
+        raise OutputError("is there, and no picture of Lippmann's", where=str(path), fix="say -o FILE")
+    return path
+
+
+def _is_ours(path: Path) -> bool:
+    from lippmann.image import open_file
+
+    try:
+        return open_file(path).metadata is not None
+    except LippmannError:
+        return False
