@@ -14,7 +14,7 @@ from lippmann.display import load_display
 from lippmann.display.formats.print_sheet import Print
 from lippmann.display.panel import PixelWindow
 from lippmann.image import IntegralImage, read_picture
-from lippmann.image.picture import Provenance
+from lippmann.image.metadata import Provenance
 from lippmann.image.read import open_file
 from lippmann.image.streamed import LargePicture, pixels_of_file
 

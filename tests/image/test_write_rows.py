@@ -9,7 +9,6 @@ from lippmann.codecs import tiff
 from lippmann.color.transfer import dequantize, quantize
 from lippmann.errors import PictureError
 from lippmann.image import IntegralImage, read_picture
-from lippmann.image.metadata import metadata_of
 from lippmann.image.write import can_be_banded, write_rows
 
 
@@ -34,7 +33,7 @@ def test_bands_make_the_same_file(display, tmp_path, monkeypatch, name, bits):
 
     for folder in ("bands", "whole"):
         (tmp_path / folder).mkdir()
-    write_rows(rows, metadata_of(image), tmp_path / "bands" / name, bits=bits)
+    write_rows(rows, image.metadata, tmp_path / "bands" / name, bits=bits)
     image.save(tmp_path / "whole" / name, bits=bits)
     assert content(tmp_path / "bands" / name) == content(tmp_path / "whole" / name)
     assert asked == [(0, 16), (16, 32), (32, 35)]
@@ -48,8 +47,8 @@ def test_bands_make_the_same_file(display, tmp_path, monkeypatch, name, bits):
 def test_what_cannot_be_written_so_is_refused(display, tmp_path):
     image = IntegralImage(np.zeros((9, 12, 3), np.float32), display())
     with pytest.raises(PictureError, match="written whole"):
-        write_rows(lambda first, last: image.rows(first, last), metadata_of(image), tmp_path / "a.png")
+        write_rows(lambda first, last: image.rows(first, last), image.metadata, tmp_path / "a.png")
     with pytest.raises(PictureError, match="not finite"):
-        write_rows(lambda first, last: image.rows(first, last) * np.nan, metadata_of(image), tmp_path / "a.tif")
+        write_rows(lambda first, last: image.rows(first, last) * np.nan, image.metadata, tmp_path / "a.tif")
     assert list(tmp_path.iterdir()) == []
     assert [can_be_banded(name) for name in ("png", "exr", "tiff", "zarr")] == [False, False, True, True]

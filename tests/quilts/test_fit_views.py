@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lippmann.image.picture import Provenance
+from lippmann.image.metadata import Provenance
 from lippmann.quilts.fit_views import fit_views
 from lippmann.quilts.quilt import Quilt, QuiltLayout
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lippmann.display import load_display
-from lippmann.image.picture import Provenance
+from lippmann.image.metadata import Provenance
 from lippmann.quilts.quilt import Quilt, QuiltLayout, quilt_of_display
 from lippmann.sequences.files import SavedFrame
 from lippmann.sequences.films import film_of_quilts

@@ -23,7 +23,6 @@ from lippmann.display import Display
 from lippmann.errors import PictureError
 from lippmann.exchange.cameras import Cameras
 from lippmann.image import IntegralImage, Metadata, Provenance
-from lippmann.image.metadata import metadata_of
 from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.stored_values import Stored, Values
 from lippmann.image.views import view_grid
@@ -196,7 +195,7 @@ def light_field_of(image: IntegralImage, stored: Stored) -> LightField:
         pixels = np.clip(image.pixels, -largest, largest).astype(np.float16)
     mask = micro_images_as_views(permutation.mask, display)[::-1, ::-1]
     maps = {name: split(values) for name, values in image.maps.items()}
-    return LightField(split(pixels), metadata_of(image), maps, mask=None if mask.all() else mask)
+    return LightField(split(pixels), image.metadata, maps, mask=None if mask.all() else mask)
 
 
 def check_shape(shape: tuple[int, ...], where: str) -> None:

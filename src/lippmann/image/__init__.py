@@ -6,10 +6,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from lippmann.image.integral_image import IntegralImage
-    from lippmann.image.metadata import Metadata
+    from lippmann.image.integral_image import IntegralImage, Picture
+    from lippmann.image.metadata import Metadata, Provenance
     from lippmann.image.part_folders import compose, write_micro_images, write_views
-    from lippmann.image.picture import Picture, Provenance
     from lippmann.image.read import PictureFile, open_file, read_metadata, read_picture
     from lippmann.image.streamed import LargePicture, open_picture
     from lippmann.image.write import write_picture
@@ -21,8 +20,8 @@ _HOME = {
     "compose": "lippmann.image.part_folders",
     "write_micro_images": "lippmann.image.part_folders",
     "write_views": "lippmann.image.part_folders",
-    "Picture": "lippmann.image.picture",
-    "Provenance": "lippmann.image.picture",
+    "Picture": "lippmann.image.integral_image",
+    "Provenance": "lippmann.image.metadata",
     "PictureFile": "lippmann.image.read",
     "open_file": "lippmann.image.read",
     "read_metadata": "lippmann.image.read",

@@ -1,10 +1,11 @@
-"""The integral image: the pixels of a panel in memory, with the display that they are for."""
+"""The integral image: the pixels of a panel with the display that they are for, and the interface of such pictures."""
 
 from __future__ import annotations
 
 import base64
 import html
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,12 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from lippmann.display import Display
 from lippmann.display.panel import PixelWindow
-from lippmann.errors import PictureError
-from lippmann.image.encoding import display_codes
+from lippmann.errors import PictureError, UsageError
+from lippmann.image.encoding import display_codes, linear_values
+from lippmann.image.metadata import Metadata, Provenance, check_placement
 from lippmann.image.micro_images import Permutation, micro_images_as_views
-from lippmann.image.picture import Picture, Provenance, checked_placement
-from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored
-from lippmann.image.views import Resampling, exact_view_shape, resampled_views
+from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, Values
+from lippmann.image.views import Resampling, exact_view_shape, resampled_views, view_grid
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -29,6 +30,88 @@ _MAP_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 
 #: Width of the picture that a notebook shows, in pixels.
 _NOTEBOOK_WIDTH = 512
+
+
+class Picture(ABC):
+    """The pixels of a panel: :class:`~lippmann.image.IntegralImage` in memory, or
+    :class:`~lippmann.image.LargePicture` in a file that is decoded piece by piece.
+
+    Attributes
+    ----------
+    display:
+        Display of the picture; its panel has ``W x H`` pixels.
+    world_from_display:
+        ``(4, 4)`` affine map from the display frame (mm) to the scene.
+    provenance:
+        How the picture was made.
+    maps:
+        Layers beside the RGB by name, ``(H, W)`` or ``(H, W, 2 to 4)``.
+    stored:
+        Type of the values in the picture's file; ``float32`` if it has none.
+    """
+
+    display: Display
+    world_from_display: Matrix
+    provenance: Provenance
+    maps: Mapping[str, Layer]
+    stored: Stored
+
+    @abstractmethod
+    def window(self, window: PixelWindow) -> Values:
+        """``(rows, columns, 3)`` values of a rectangle as the picture holds them: linear floats or codes."""
+
+    @abstractmethod
+    def take(self, row: Indices, column: Indices, channels: slice = slice(0, 3)) -> FloatArray:
+        """Linear RGB ``(..., channels)`` of single pixels; ``row`` and ``column`` broadcast to ``(...)``."""
+
+    def held_rows(self, first: int, last: int) -> Values:
+        """``(last - first, W, 3)`` values of whole rows as the picture holds them: linear floats or codes."""
+        return self.window(PixelWindow(0, first, self.display.panel.width, last - first))
+
+    def rows(self, first: int, last: int) -> FloatArray:
+        """``(last - first, W, 3)`` linear RGB of whole rows."""
+        return linear_values(self.held_rows(first, last), self.provenance.transfer)
+
+    @property
+    def metadata(self) -> Metadata:
+        """Display, placement and provenance, as a file carries them."""
+        return Metadata(self.display, self.world_from_display, self.provenance)
+
+    @property
+    def views_are_exact(self) -> bool:
+        """Whether the views are a permutation of the pixels; otherwise they are resampled."""
+        return view_grid(self.display).exact
+
+    @property
+    def views_note(self) -> str:
+        """A sentence on how the views deviate from exact ones; empty if they do not."""
+        return view_grid(self.display).note
+
+    def replay(
+        self,
+        eye: tuple[float, float, float] | None = None,
+        *,
+        size: tuple[int, int] | None = None,
+        filter: Resampling = "nearest",
+        subpixels: bool | None = None,
+        optics: bool = False,
+    ) -> FloatArray:
+        """Linear RGB ``(height, width, 3)`` that an eye at ``eye`` (mm, display frame) sees.
+
+        Parameters, defaults and errors are those of :func:`lippmann.viewing.replay.replay`; with ``optics`` those of
+        :func:`lippmann.viewing.optical_replay.replay_optics`, which takes the place of ``filter`` and ``subpixels``.
+        """
+        from lippmann.viewing.replay import replay
+
+        if optics:
+            from lippmann.viewing.optical_replay import replay_optics
+
+            if (filter, subpixels) != ("nearest", None):
+                rule = "the lens says which sub-pixels are seen, and how much of each"
+                parameter = "subpixels" if filter == "nearest" else "filter"
+                raise UsageError("given beside optics", parameter=parameter, rule=rule, fix="leave it out")
+            return replay_optics(self, eye, size=size)
+        return replay(self, eye, size=size, filter=filter, subpixels=subpixels)
 
 
 class Parts(TypedDict, total=False):
@@ -84,7 +167,7 @@ class IntegralImage(Picture):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pixels", _checked_pixels(self.pixels, self.display))
-        object.__setattr__(self, "world_from_display", checked_placement(self.world_from_display))
+        object.__setattr__(self, "world_from_display", check_placement(self.world_from_display))
         size = self.pixels.shape[:2]
         maps = {name: _checked_map(name, values, size) for name, values in self.maps.items()}
         object.__setattr__(self, "maps", maps)

@@ -22,10 +22,9 @@ from lippmann.display.micro_image_layout import row_blocks
 from lippmann.display.panel import PixelWindow
 from lippmann.errors import OutputError, PictureError
 from lippmann.image.encoding import STORED, FormatName, converted_values, encode_values, linear_values
-from lippmann.image.integral_image import IntegralImage
-from lippmann.image.metadata import KEY, Metadata, from_dict, metadata_of, parse_json
+from lippmann.image.integral_image import IntegralImage, Picture
+from lippmann.image.metadata import KEY, Metadata, from_dict, parse_json
 from lippmann.image.micro_images import Permutation, micro_images_as_views
-from lippmann.image.picture import Picture
 from lippmann.image.read import open_file
 from lippmann.image.stored_values import Layer, Stored, Values
 from lippmann.image.views import (
@@ -241,7 +240,7 @@ def _write_parts(
             encode_values(temporary / file, name, {**layers, "": values}, transfer=transfer)
             progress(report)
         manifest = {
-            **metadata_of(picture).to_dict(),
+            **picture.metadata.to_dict(),
             "kind": kind,
             "stored": stored,
             "order": _ORDER[kind],

@@ -20,8 +20,7 @@ from lippmann.display import Display, load_display
 from lippmann.errors import PictureError
 from lippmann.image.encoding import STORED, TEXT_KEY, FormatName, layers_of_channels, linear_values, mirrored_in_file
 from lippmann.image.integral_image import IntegralImage
-from lippmann.image.metadata import Metadata, from_text, is_quilt_text
-from lippmann.image.picture import Provenance
+from lippmann.image.metadata import Metadata, Provenance, from_text, is_quilt_text
 from lippmann.image.stored_values import Layer, Stored, Values
 from lippmann.runtime.engine_lock import cached_property
 from lippmann.runtime.machine import check_input

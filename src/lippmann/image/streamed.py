@@ -13,8 +13,8 @@ from lippmann.display import Display
 from lippmann.display.panel import PixelWindow
 from lippmann.errors import PictureError
 from lippmann.image.encoding import is_mirrored, linear_values, mirrored_in_file
-from lippmann.image.integral_image import IntegralImage
-from lippmann.image.picture import Picture, Provenance
+from lippmann.image.integral_image import IntegralImage, Picture
+from lippmann.image.metadata import Provenance
 from lippmann.image.read import PictureFile, opaque_colors, open_file
 from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, Values
 

@@ -26,8 +26,8 @@ from lippmann.image.encoding import (
     profile_in_file,
     tiles_of_rows,
 )
-from lippmann.image.metadata import Metadata, metadata_of, to_text
-from lippmann.image.picture import Picture
+from lippmann.image.integral_image import Picture
+from lippmann.image.metadata import Metadata, to_text
 from lippmann.image.stored_values import FloatArray, Layer, Stored, Values
 from lippmann.runtime.atomic_write import check_folder_writable, check_writable, remark, replacing, replacing_folder
 
@@ -95,7 +95,7 @@ def write_picture(picture: Picture, path: Path, *, bits: int | None = None, icc:
     """
     target, panel = format_for(path, bits, source=picture.stored), picture.display.panel
     size, transfer = (panel.width, panel.height), picture.provenance.transfer
-    _write(path, target, picture.held_rows, size, transfer, metadata_of(picture), picture.maps, icc=icc)
+    _write(path, target, picture.held_rows, size, transfer, picture.metadata, picture.maps, icc=icc)
 
 
 def write_rows(rows: Rows, metadata: Metadata, path: Path, *, bits: int | None = None, icc: bytes = b"") -> None:

@@ -23,7 +23,7 @@ from lippmann.display import Display
 from lippmann.display.stereo import PairWidth, StereoPair
 from lippmann.errors import PictureError, UsageError
 from lippmann.image.encoding import display_codes, linear_values
-from lippmann.image.picture import Provenance
+from lippmann.image.metadata import Provenance
 from lippmann.image.stored_values import FloatArray, Stored, Values
 
 #: Least and largest side of a quilt in pixels, and the largest number of columns or rows.

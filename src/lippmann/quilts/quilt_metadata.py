@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 from lippmann.display import Display
 from lippmann.errors import LippmannError, PictureError
-from lippmann.image.metadata import KEY, QUILT_KEY, VERSION, parse_json
-from lippmann.image.picture import Provenance
+from lippmann.image.metadata import KEY, QUILT_KEY, VERSION, Provenance, parse_json
 from lippmann.quilts.quilt import Quilt, QuiltLayout, checked_layout
 
 

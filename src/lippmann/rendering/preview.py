@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.image.picture import Provenance
+from lippmann.image.metadata import Provenance
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.provenance import provenance_of
 from lippmann.rendering.request.plan import resolve

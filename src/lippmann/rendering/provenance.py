@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann._version import VERSION
-from lippmann.image.picture import Provenance
+from lippmann.image.metadata import Provenance
 from lippmann.options.choices import LIGHT
 from lippmann.options.option import Options
 from lippmann.options.quality import QualityOptions

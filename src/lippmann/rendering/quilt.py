@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.display.view_cone import view_window
-from lippmann.image.picture import Provenance
+from lippmann.image.metadata import Provenance
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.picture import placed_options
 from lippmann.rendering.provenance import provenance_of

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lippmann.display import Display
-from lippmann.image.picture import Provenance
+from lippmann.image.metadata import Provenance
 from lippmann.image.write import format_for
 from lippmann.journal.fingerprint import content_hash, in_words
 from lippmann.journal.frame_journal import ENDING, FrameJournal

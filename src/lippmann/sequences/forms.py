@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 
 from lippmann.display import Display
 from lippmann.image import IntegralImage
-from lippmann.image.picture import Provenance
+from lippmann.image.metadata import Provenance
 from lippmann.image.read import read_metadata
 from lippmann.progress import ProgressCallback
 from lippmann.quilts.files import write_quilt

@@ -32,7 +32,7 @@ from lippmann.sequences.motion import Motion, open_motion
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
-    from lippmann.image.picture import Provenance
+    from lippmann.image.metadata import Provenance
     from lippmann.quilts.quilt import Quilt
     from lippmann.tiles.tiled_render import Rendered, Runner
 

@@ -19,7 +19,7 @@ from dataclasses import replace
 from typing import NamedTuple, cast
 
 from lippmann.display import Display
-from lippmann.image.picture import Provenance
+from lippmann.image.metadata import Provenance
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.sequences.cuts import Moment, is_cut, is_light_at_rest
 from lippmann.sequences.flicker import Figures

@@ -27,8 +27,7 @@ from lippmann.image.encoding import (
     linear_values,
     profile_in_file,
 )
-from lippmann.image.metadata import Metadata, to_text
-from lippmann.image.picture import Provenance
+from lippmann.image.metadata import Metadata, Provenance, to_text
 from lippmann.image.stored_values import FloatArray, Layer, Values
 from lippmann.image.write import can_be_banded, check_output, format_for, replacing_output, write_rows
 from lippmann.journal.tile_file import DamagedTile, TileResult

@@ -12,7 +12,7 @@ import numpy as np
 
 from lippmann.display import NUMPY, Display
 from lippmann.errors import UsageError
-from lippmann.image.picture import Picture
+from lippmann.image.integral_image import Picture
 from lippmann.image.stored_values import FloatArray
 from lippmann.optics.eye_light import EyeLight, eye_light, panel_frame
 from lippmann.runtime.machine import usable_cores

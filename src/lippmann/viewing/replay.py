@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import NUMPY, Display
 from lippmann.errors import UsageError
-from lippmann.image.picture import Picture
+from lippmann.image.integral_image import Picture
 from lippmann.image.stored_values import FloatArray
 
 Eye = tuple[float, float, float]

@@ -18,7 +18,7 @@ from lippmann.codecs.stereo_pairs import encode_jps, encode_mpo
 from lippmann.color.transfer import Transfer, quantize
 from lippmann.display.stereo import EYE_DISTANCE
 from lippmann.errors import UsageError
-from lippmann.image.picture import Picture
+from lippmann.image.integral_image import Picture
 from lippmann.image.stored_values import FloatArray
 from lippmann.runtime.atomic_write import replacing
 from lippmann.runtime.regular_file import check_kind, unreadable

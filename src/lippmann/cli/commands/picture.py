@@ -15,7 +15,7 @@ from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
     from lippmann.image import PictureFile
-    from lippmann.image.picture import Provenance
+    from lippmann.image.metadata import Provenance
     from lippmann.quilts.quilt import Quilt
 
 Format = Annotated[
@@ -116,7 +116,7 @@ def _quilt_values(path: Path, quilt: Quilt) -> dict[str, Any]:
 
 
 def _quilt_lines(path: Path, quilt: Quilt) -> list[str]:
-    from lippmann.image.picture import Provenance
+    from lippmann.image.metadata import Provenance
 
     (width, height), (view_width, view_height) = quilt.size, quilt.view_size
     aspect = "" if quilt.layout.aspect is None else f", aspect {quilt.layout.aspect:g}"

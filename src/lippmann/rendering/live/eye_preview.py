@@ -13,6 +13,7 @@ from lippmann.display.visible_pixels import EyeMap, Floats, Vector
 from lippmann.options.choices import POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
+from lippmann.rendering.film.memory_model import cut_wavefronts
 from lippmann.rendering.picture import placed_options
 from lippmann.rendering.preview import Preview
 from lippmann.rendering.provenance import provenance_of
@@ -64,18 +65,25 @@ def render_eye_preview(
     # Mitsuba may be loaded now that the engine has chosen its libraries.
     from lippmann.rendering.denoise.dual_buffer import clean_light
     from lippmann.rendering.denoise.guided_denoiser import SurfacePart, denoise_surfaces, effort_of
-    from lippmann.rendering.methods import Job, one_stream
+    from lippmann.rendering.denoise.tuning import TUNING as DENOISE
+    from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
+    from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.transport.ray_source import DisplayRays, SinglePixelRays
 
     whole = DisplayRays(display, placement.world_from_display, bool(resolved.subpixels))
     source = SinglePixelRays(whole, visible.column, visible.row, visible.channel)
     integrator = session.integrator(whole, placement.display_from_world, placement.exposure)
-    job = Job(session, integrator, source, placement.display_from_world)
-    frame = one_stream(job).frame
+    plan = cut_wavefronts(source.width, source.height, samples, channels=source.channels, memory=session.memory)
+    box_filter = plain.box_filter
+    frame = trace_frame(integrator, source, plan, seed=plain.seed, box_filter=box_filter, progress=progress)
     picture = visible.arrange(frame.pixels[0])
     options: dict[str, object] = {}
     if denoises:
-        effort, guides = effort_of(request.denoise, samples), job.denoiser.guides()
+        plan = plan_guides(source, DENOISE.guide_samples, session.memory)
+        guides = trace_guides(
+            session.built, source, plan, placement.display_from_world, box_filter=box_filter, progress=progress
+        )
+        effort = effort_of(request.denoise, samples)
         buffers = frame.pixels, guides.albedo, guides.normal
         noisy, albedo, normal = (visible.arrange_for_denoiser(values[0]) for values in buffers)
         surfaces = SurfacePart.of(normal)
