@@ -437,6 +437,7 @@ DECIDES = ("request", "preparation", "adaptive", "methods", "session", "picture"
 DECORATORS = {
     "cli.shared.command_options",
     "device.syntax",
+    "options.option",
     "runtime.engine_lock",
     "runtime.row_threads",
 }

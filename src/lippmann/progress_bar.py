@@ -11,7 +11,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback, silent
 
 #: Seconds between two plain lines where output is not a terminal.
@@ -113,16 +112,8 @@ class PlainProgress:
 
 @contextmanager
 def show_progress(progress: ProgressCallback | None) -> Iterator[ProgressCallback]:
-    """The callback that was given; without one a bar in terminals and notebooks, and nothing elsewhere.
-
-    Raises
-    ------
-    UsageError
-        What was given cannot be called.
-    """
+    """The callback that was given; without one a bar in terminals and notebooks, and nothing elsewhere."""
     if progress is not None:
-        if not callable(progress):
-            raise UsageError(f"{progress!r}", parameter="progress", rule="it is called with a Progress, or is None")
         yield progress
     elif sys.stderr.isatty() or in_notebook():
         with bar() as callback:

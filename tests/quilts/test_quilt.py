@@ -161,3 +161,10 @@ def test_a_pair_is_known_by_its_name(tmp_path):
         assert ending_of_name(path) == ending
         assert names_layout(path) == bool(ending)
     assert layout_of_name(tmp_path / "a_half_2x1.png") == (2, 1, None)
+
+
+@pytest.mark.parametrize("number", [-1, 6])
+def test_a_view_that_there_is_not_is_refused(number):
+    quilt = Quilt(np.zeros((8, 12, 3), np.float32), QuiltLayout(3, 2, 1.0))
+    with pytest.raises(UsageError, match=f"number: {number}; views are 0 to 5"):
+        quilt.view(number)

@@ -17,6 +17,7 @@ from lippmann.exchange.registry import EXPORTS, LAYOUTS, Export, Layout
 from lippmann.exchange.view_folder import is_composable
 from lippmann.image import IntegralImage, compose
 from lippmann.image.stored_values import Stored
+from lippmann.options.option import checked
 from lippmann.progress import ProgressCallback, silent
 from lippmann.runtime.plugins import Plugin, function_of
 from lippmann.runtime.regular_file import unreadable
@@ -103,6 +104,7 @@ def is_folder(layout: str) -> bool:
     return not _layout(layout).ending
 
 
+@checked
 def export_image(
     image: IntegralImage,
     path: Path,
@@ -162,6 +164,7 @@ def export_image(
     return Exported(light_field.stored, light_field.shape, tuple(_notes(image, layout)))
 
 
+@checked
 def import_image(
     path: Path, layout: str | None = None, *, display: Display | None = None, progress: ProgressCallback = silent
 ) -> tuple[IntegralImage, tuple[str, ...]]:

@@ -22,6 +22,7 @@ from lippmann.image.metadata import Metadata, Provenance, check_placement
 from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, Values
 from lippmann.image.views import Resampling, exact_view_shape, resampled_views, view_grid
+from lippmann.options.option import checked
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -235,7 +236,7 @@ class IntegralImage(Picture):
         PictureError
             If the shape is not that of the display's micro-images.
         """
-        return cls(Permutation(display).join(np.asarray(micro_images, dtype=np.float32)), display, **parts)
+        return cls(Permutation(display).join(_numbers("micro-images", micro_images)), display, **parts)
 
     @classmethod
     def from_views(cls, views: ArrayLike, display: Display, **parts: Unpack[Parts]) -> IntegralImage:
@@ -248,7 +249,7 @@ class IntegralImage(Picture):
         PictureError
             If the shape is not that of the display's views, or the display's views are resampled.
         """
-        values, expected = np.asarray(views, dtype=np.float32), exact_view_shape(display)
+        values, expected = _numbers("views", views), exact_view_shape(display)
         if values.shape[:4] != expected:
             rule = f"those of the display {display.name} have {expected}"
             raise PictureError(f"the views have the shape {values.shape[:4]}", rule=rule)
@@ -274,6 +275,7 @@ class IntegralImage(Picture):
 
         return refocus(self, plane, size=size)
 
+    @checked
     def save(self, path: str | Path, bits: int | None = None, *, icc: bytes = b"") -> None:
         """Write a PNG, OpenEXR, TIFF or Zarr file.
 
@@ -295,7 +297,7 @@ class IntegralImage(Picture):
 
     def with_pixels(self, pixels: ArrayLike, **parts: Unpack[Parts]) -> IntegralImage:
         """A copy with other ``pixels``, ``(H, W, 3)`` linear RGB, and other ``parts``; errors as of the class."""
-        return replace(self, pixels=np.asarray(pixels, dtype=np.float32), **parts)
+        return replace(self, pixels=_numbers("pixels", pixels), **parts)
 
     @property
     def stats(self) -> dict[str, object]:
@@ -340,12 +342,16 @@ class IntegralImage(Picture):
         return f'<figure><img alt="" src="data:image/png;base64,{picture}"/><figcaption>{caption}</figcaption></figure>'
 
 
+def _numbers(name: str, values: object) -> FloatArray:
+    try:
+        return np.asarray(values, dtype=np.float32)
+    except (TypeError, ValueError) as error:
+        raise PictureError(f"the {name} are no array of numbers ({error})") from None
+
+
 def _checked_pixels(pixels: object, display: Display) -> FloatArray:
     panel = display.panel
-    try:
-        values: FloatArray = np.asarray(pixels, dtype=np.float32)
-    except (TypeError, ValueError) as error:
-        raise PictureError(f"the pixels are no array of numbers ({error})") from None
+    values = _numbers("pixels", pixels)
     if values.ndim != 3 or values.shape[2] != 3:
         raise PictureError(f"the pixels have the shape {values.shape}", rule="it must be (height, width, 3)")
     if values.shape[:2] != (panel.height, panel.width):

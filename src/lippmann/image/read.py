@@ -22,6 +22,7 @@ from lippmann.image.encoding import STORED, TEXT_KEY, FormatName, layers_of_chan
 from lippmann.image.integral_image import IntegralImage
 from lippmann.image.metadata import Metadata, Provenance, from_text, is_quilt_text
 from lippmann.image.stored_values import Layer, Stored, Values
+from lippmann.options.option import checked
 from lippmann.runtime.engine_lock import cached_property
 from lippmann.runtime.machine import check_input
 from lippmann.runtime.regular_file import check_kind, unreadable
@@ -195,6 +196,7 @@ def read_metadata(path: str | Path, *, display: Display | str | PathLike[str] | 
     return open_file(path).metadata_for(display)
 
 
+@checked
 def open_file(path: str | Path) -> PictureFile:
     """Open a picture file and read its header: format, size, type of the values, layers and metadata.
 

@@ -20,6 +20,7 @@ from lippmann.metrics.paper import PaperFigures
 from lippmann.metrics.silhouettes import SilhouetteShare, depth_of, source_of
 from lippmann.metrics.structural_similarity import ViewSimilarity
 from lippmann.metrics.view_metrics import ViewSums
+from lippmann.options.option import checked
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.engine_lock import cached_property
 
@@ -178,6 +179,7 @@ class Comparison:
             }
 
 
+@checked
 def compare(reference: Picture, test: Picture, progress: ProgressCallback = silent) -> Comparison:
     """Compare two pictures of the same display, in memory or read piece by piece.
 

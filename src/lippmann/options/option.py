@@ -5,6 +5,8 @@ class (:mod:`lippmann.cli.shared.command_options`), a keyword of the calls that 
 and a setting of the studio and its files. It has the same name everywhere, with ``-`` for ``_`` on the command line.
 
 Annotations of such classes are types, not texts: their modules do without ``from __future__ import annotations``.
+
+Arguments of a call that are no options are :func:`checked` by their annotations.
 """
 
 import inspect
@@ -14,10 +16,14 @@ import textwrap
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
+from functools import wraps
 from numbers import Integral, Real
+from operator import index
+from pathlib import Path
 from typing import Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
 
 from lippmann.errors import UsageError
+from lippmann.printable import shorten
 
 T = TypeVar("T", bound="Options")
 
@@ -232,7 +238,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 def takes(*kinds: type[Options], without: tuple[str, ...] = (), **defaults: Any) -> Callable[[F], F]:
     """Say in a function's signature and docstring which options its ``**options`` are: those of the dataclasses.
 
-    ``defaults`` are those that the function has in place of theirs.
+    ``defaults`` are those that the function has in place of theirs. Its other arguments are :func:`checked`.
     """
 
     def decorate(function: F) -> F:
@@ -255,6 +261,97 @@ def takes(*kinds: type[Options], without: tuple[str, ...] = (), **defaults: Any)
         )
         before, _, after = inspect.cleandoc(function.__doc__ or "").partition("**options:\n")
         function.__doc__ = f"{before}{entries}{after.partition(chr(10))[2]}"
-        return function
+        return checked(function)
 
     return decorate
+
+
+# ---- Arguments that are no options ---------------------------------------------------------------------------------
+
+
+def checked(function: F) -> F:
+    """Refuse arguments of ``function`` that are none of the kinds that their annotations name.
+
+    Values become that kind: NumPy's numbers Python's, and texts paths where no text is named before them. Annotations
+    are read as written, in modules that import ``annotations`` from ``__future__``. A parameter whose annotation names
+    any other type than :data:`_KINDS` is left to the function, and so are options, which have checks of their own.
+    """
+    parameters = inspect.signature(function).parameters
+    written = {name: "bool" if each.annotation is bool else each.annotation for name, each in parameters.items()}
+    kinds = {name: text.split(" | ") for name, text in written.items() if isinstance(text, str)}
+    known = {name: each for name, each in kinds.items() if _KINDS.keys() >= {*each}}
+
+    @wraps(function)
+    def call(*values: Any, **named: Any) -> Any:
+        first = [_checked(name, value, known.get(name)) for name, value in zip(parameters, values, strict=False)]
+        others = {name: _checked(name, value, known.get(name)) for name, value in named.items()}
+        return function(*first, *values[len(first) :], **others)
+
+    return call  # type: ignore[return-value]
+
+
+def _checked(name: str, value: Any, kinds: list[str] | None) -> Any:
+    if kinds is None:
+        return value
+    for kind in kinds:
+        try:
+            return _KINDS[kind][1](value)
+        except (LookupError, TypeError, ValueError):
+            continue
+    words = [_KINDS[kind][0] for kind in kinds]
+    rule = " or ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
+    raise UsageError(shorten(value), parameter=name, rule=f"must be {rule}")
+
+
+def _instance(name: str) -> Callable[[Any], Any]:
+    """A value of the class of this name: by its name, as the library's own classes are not to be loaded here."""
+
+    def as_it_is(value: Any) -> Any:
+        if name not in {each.__name__ for each in type(value).__mro__}:
+            raise TypeError
+        return value
+
+    return as_it_is
+
+
+def _function(value: Any) -> Any:
+    if not callable(value):
+        raise TypeError
+    return value
+
+
+def _number(value: Any) -> float:
+    if not isinstance(value, Real):
+        raise TypeError
+    return float(value)
+
+
+def _numbers(value: Any) -> list[float]:
+    if not len(value):
+        raise ValueError
+    return [_number(each) for each in value]
+
+
+def _pair(value: Any) -> tuple[int, int]:
+    first, second = value
+    return index(first), index(second)
+
+
+#: What is said of a kind, by the name that annotations have for it, and what reads a value or raises.
+_KINDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
+    "None": ("None", _instance("NoneType")),
+    "bool": ("True or False", {True: True, False: False}.__getitem__),
+    "int": ("a whole number", index),
+    "float": ("a number", _number),
+    "bytes": ("bytes", _instance("bytes")),
+    "str": ("a text", _instance("str")),
+    "Path": ("a path", Path),
+    "tuple[int, int]": ("two whole numbers", _pair),
+    "Sequence[float]": ("numbers, at least one", _numbers),
+    **dict.fromkeys(("ProgressCallback", "Runner"), ("a function", _function)),
+    **{
+        name: (f"a {name}", _instance(name))
+        for name in ("Display", "LargePicture", "Picture", "Quilt", "TransferFunction")
+    },
+    **{name: (f"an {name}", _instance(name)) for name in ("Environment", "IntegralImage")},
+}

@@ -23,6 +23,7 @@ from lippmann.image.part_folders import MANIFEST
 from lippmann.image.read import MOST_PIXELS, opaque_colors, open_file
 from lippmann.image.stored_values import Stored, Values
 from lippmann.image.write import format_for, replacing_output
+from lippmann.options.option import checked
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import (
     MOST_SIDE,
@@ -60,6 +61,7 @@ def is_quilt(path: Path) -> bool:
     return metadata_of_text(text, str(path)) is not None
 
 
+@checked
 def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
     """Read a quilt: PNG, OpenEXR, TIFF, JPEG, WebP, AVIF, BMP, PPM, GIF or TGA; transparent parts lie on black.
 
@@ -99,6 +101,7 @@ def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
     return Quilt(values, layout, stored, metadata.provenance, metadata.display, file.notes)
 
 
+@checked
 def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: ProgressCallback = silent) -> Quilt:
     """Read a quilt from a folder with one picture per view.
 
@@ -165,6 +168,7 @@ def _linear_quilt(quilt: Quilt, views: int) -> Quilt:
     return linear
 
 
+@checked
 def write_quilt(quilt: Quilt, path: Path, *, bits: int | None = None) -> Quilt:
     """Write a quilt to a file.
 

@@ -25,6 +25,7 @@ from lippmann.errors import PictureError, UsageError
 from lippmann.image.encoding import display_codes, linear_values
 from lippmann.image.metadata import Provenance
 from lippmann.image.stored_values import FloatArray, Stored, Values
+from lippmann.options.option import checked
 
 #: Least and largest side of a quilt in pixels, and the largest number of columns or rows.
 LEAST_SIDE, MOST_SIDE, MOST_TILES = 256, 16384, 32
@@ -201,8 +202,17 @@ class Quilt:
         right, up = number % self.layout.columns, number // self.layout.columns
         return right * width, self.size[1] - (up + 1) * height
 
+    @checked
     def view(self, number: int) -> FloatArray:
-        """``(height, width, 3)`` linear RGB of a view, 0 that of the leftmost camera."""
+        """``(height, width, 3)`` linear RGB of a view, 0 that of the leftmost camera.
+
+        Raises
+        ------
+        UsageError
+            There is no such view.
+        """
+        if not 0 <= number < self.layout.views:
+            raise UsageError(f"{number}", parameter="number", rule=f"views are 0 to {self.layout.views - 1}")
         return linear_values(self.view_values(number), self.provenance.transfer)
 
     def view_values(self, number: int) -> Values:

@@ -28,6 +28,7 @@ from lippmann.image.stored_values import FloatArray
 from lippmann.image.write import write_rows
 from lippmann.options.choices import Correction
 from lippmann.options.correction import check_correction
+from lippmann.options.option import checked
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import Quilt
 from lippmann.runtime.engine_lock import cached_property
@@ -45,6 +46,7 @@ _BLOCK, _VIEW_BLOCK = 1 << 18, 1 << 24
 ASPECT_TOLERANCE = 0.02
 
 
+@checked
 def weave(
     quilt: Quilt,
     display: Display,
@@ -104,6 +106,7 @@ def weave(
     return IntegralImage(pixels, display, provenance=weave_provenance(quilt, choice, scene, options, notes))
 
 
+@checked
 def weave_to_file(
     quilt: Quilt,
     display: Display,

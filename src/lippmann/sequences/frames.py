@@ -16,6 +16,7 @@ import numpy as np
 
 from lippmann.display import Display, load_display
 from lippmann.errors import SceneError, UsageError
+from lippmann.options.option import checked
 from lippmann.options.placement import Mode, PlacementOptions
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.request.render_request import RenderRequest
@@ -196,6 +197,7 @@ def render_sequence(
     return render_frames(motion, target, numbers, where, RenderRequest.of(options), INTEGRAL, progress)
 
 
+@checked
 def render_quilt_sequence(
     motion: Motion,
     display: Display | str | Path = "portrait",

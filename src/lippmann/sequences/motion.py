@@ -13,6 +13,7 @@ import numpy as np
 from lippmann.display import Display
 from lippmann.errors import UsageError
 from lippmann.options.light import LightOptions
+from lippmann.options.option import checked
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.scene import SceneOptions
 from lippmann.scene.matrices import Bounds
@@ -192,6 +193,7 @@ class Flight(Motion):
         return self._scene.bounds
 
 
+@checked
 def open_motion(
     source: str | Path,
     *,

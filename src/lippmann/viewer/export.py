@@ -10,6 +10,7 @@ from pathlib import Path
 from lippmann.display import Display
 from lippmann.errors import UsageError
 from lippmann.image import Picture
+from lippmann.options.option import checked
 from lippmann.runtime.atomic_write import replacing
 from lippmann.viewer.lens_light import lens_light
 from lippmann.viewer.manifest import manifest, tile_size
@@ -35,6 +36,7 @@ def check_exportable(display: Display) -> None:
         )
 
 
+@checked
 def export_page(pictures: Sequence[tuple[str, Picture]], path: Path) -> None:
     """Write one HTML file that shows one picture, or two with a divider between them.
 

@@ -15,6 +15,7 @@ from lippmann.image.integral_image import IntegralImage
 from lippmann.image.stored_values import FloatArray
 from lippmann.image.streamed import LargePicture
 from lippmann.image.write import format_for, write_plain_picture
+from lippmann.options.option import checked
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.atomic_write import check_folder_writable, check_writable, replacing, replacing_folder
 from lippmann.viewing.refocus import focal_planes
@@ -24,6 +25,7 @@ from lippmann.viewing.video_file import check_animation_path, film_suffixes, is_
 _FRAMES_PER_SECOND = 8.0
 
 
+@checked
 def focal_stack(
     image: IntegralImage | LargePicture,
     planes: Sequence[float],

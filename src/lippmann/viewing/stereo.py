@@ -20,6 +20,7 @@ from lippmann.display.stereo import EYE_DISTANCE
 from lippmann.errors import UsageError
 from lippmann.image.integral_image import Picture
 from lippmann.image.stored_values import FloatArray
+from lippmann.options.option import checked
 from lippmann.runtime.atomic_write import replacing
 from lippmann.runtime.regular_file import check_kind, unreadable
 from lippmann.viewing.replay import Eye, Filter, checked_eye, default_eye, replay
@@ -56,6 +57,7 @@ DUBOIS_RIGHT = np.array(
 )
 
 
+@checked
 def replay_stereo(
     image: Picture,
     head: Eye | None = None,
