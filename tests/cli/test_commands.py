@@ -38,7 +38,8 @@ def test_render_prints_the_depth_range_beside_what_the_display_resolves(lippmann
     done = lippmann("render", "teapot", "--spp", 1, "--integrator", "direct", "-o", tmp_path / "a.png")
     assert done.code == 0
     assert "mm behind" in done.err
-    assert "display resolves" in done.err
+    # What `displays` says, too: rays are recorded from 10 mm in front on.
+    assert "display resolves from 54.4 mm behind to 10.0 mm in front" in done.err
 
 
 @pytest.mark.long

@@ -52,9 +52,9 @@ def test_depth_is_that_of_the_picture():
     foreseen = lippmann.plan("teapot", SHEET, spp=1)
     image = lippmann.render("teapot", SHEET, spp=1, layers=True)
     assert foreseen.depth_range == tuple(image.provenance.options["depth_range"])
-    far, near = foreseen.resolvable_range
-    # N g, with 8 pixels to a lens 3 mm away.
-    assert (far, near) == pytest.approx((-24.0, 24.0), rel=1e-6)
+    far, near = foreseen.depth_budget
+    # N g behind, with 8 pixels to a lens 3 mm away; in front, recorded rays begin 15 mm away.
+    assert (far, near) == pytest.approx((-24.0, 15.0), rel=1e-6)
     depth = image.maps["depth"]
     beyond = np.isfinite(depth) & ((depth < far) | (depth > near))
     assert foreseen.blurred_share == pytest.approx(beyond.mean(), abs=0.03)

@@ -140,7 +140,7 @@ class TestFit:
         placed = place(box(6, 6, 8), display(aperture=0.0))
         back, front = placed.depth_range
         assert (back, front) == (pytest.approx(-50), pytest.approx(0, abs=1e-9))
-        assert placed.resolvable_range == (-50, 50)
+        assert placed.depth_budget == display(aperture=0.0).depth_budget[::-1] == (-50, 0)
         # Views a quarter to either side show its back 12.5 mm to the other.
         side = FILL * 75 - 2 * 12.5
         assert np.ptp(in_display(placed, corners(box(6, 6, 8))), axis=0)[:2] == pytest.approx([side] * 2)

@@ -53,8 +53,8 @@ class Forecast:
         Number of frames; ``rays`` and ``seconds`` are of all of them, the rest is of each.
     spp:
         Samples per pixel, or per sub-pixel where these have rays of their own.
-    depth_range, resolvable_range:
-        Lowest and highest z of the scene and of what the display resolves, in mm of the display frame.
+    depth_range, depth_budget:
+        Lowest and highest z of the scene and of what the display records and resolves, in mm of the display frame.
     view_cone, fused_gain:
         Degrees over which an eye sees the display's own views; how many times as much depth the same panel would
         resolve in :data:`lippmann.display.view_cone.FUSED_CONE`.
@@ -90,7 +90,7 @@ class Forecast:
     spp: int
     placement: str
     depth_range: tuple[float, float]
-    resolvable_range: tuple[float, float]
+    depth_budget: tuple[float, float]
     view_cone: float
     fused_gain: float
     comfort: str
@@ -115,7 +115,7 @@ class Forecast:
         return {
             "picture": f"{self.scene} for {self.display}, {width}x{height} pixels{of_frames}{of_subpixels}",
             "scene": depths_in_words(*self.depth_range),
-            "resolved": f"{depths_in_words(*self.resolvable_range)}, {cone_in_words(self.view_cone, self.fused_gain)}",
+            "resolved": f"{depths_in_words(*self.depth_budget)}, {cone_in_words(self.view_cone, self.fused_gain)}",
             **({"comfort": self.comfort} if self.comfort else {}),
             "blur": f"{100 * self.blurred_share:.0f} % of the pixels see what lies beyond; "
             f"a pixel's light spreads over {self.blur[0]:.1f} lenses at the back, {self.blur[1]:.1f} at the front",
@@ -198,7 +198,7 @@ def forecast(
         spp=request.samples,
         placement=placement.mode,
         depth_range=placement.depth_range,
-        resolvable_range=placement.resolvable_range,
+        depth_budget=placement.depth_budget,
         view_cone=view_cone(display),
         fused_gain=depth_gain_of_fused_cone(display),
         comfort=comfort_in_words(display, *placement.depth_range),
@@ -314,7 +314,7 @@ class _Probe:
 
         plan = plan_layers(self._pixels, session.memory)
         depth = trace_layers(session.built, self._pixels, plan, placement.display_from_world)["depth"]
-        far, near = placement.resolvable_range
+        far, near = placement.depth_budget
         is_beyond: NDArray[np.bool_] = np.isfinite(depth) & ((depth < far) | (depth > near))
         return float(is_beyond.mean())
 

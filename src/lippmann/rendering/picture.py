@@ -165,7 +165,7 @@ def placed_options(request: RenderRequest, placement: Placement) -> dict[str, ob
         **({"tone_map": request.tone_map} if request.tone_map != "none" else {}),
         **({} if request.clamp_indirect is None else {"clamp_indirect": request.clamp_indirect}),
         "depth_range": list(placement.depth_range),
-        "resolvable_range": list(placement.resolvable_range),
+        "depth_budget": list(placement.depth_budget),
     }
 
 

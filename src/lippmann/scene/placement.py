@@ -43,15 +43,16 @@ class Placement:
     ``world_from_display`` is ``scale * rotation * depth`` with a translation, 4x4; its scale is in world units per
     millimetre, and ``depth`` stretches z alone, where the scene's depth is compressed, or leans it, where a camera's
     lens is shifted. ``depth_range`` is (back, front): the lowest and highest z of the scene's bounding box in
-    millimetres of the display frame; ``resolvable_range`` the same for what the display resolves. ``warnings`` say, one
-    line each, what was compressed, and what will be blurred, cut or outside. ``exposure`` is that of the camera that
-    places the display, in stops. ``may_cut`` holds the options of a placement by which the panel's edge may cut what
-    stands in front of it; None where all of the scene lies within the panel, or is to be cut as a photograph.
+    millimetres of the display frame; ``depth_budget`` the same for what the display records and resolves
+    (:attr:`lippmann.display.Display.depth_budget`). ``warnings`` say, one line each, what was compressed, and what will
+    be blurred, cut or outside. ``exposure`` is that of the camera that places the display, in stops. ``may_cut`` holds
+    the options of a placement by which the panel's edge may cut what stands in front of it; None where all of the scene
+    lies within the panel, or is to be cut as a photograph.
     """
 
     world_from_display: Matrix
     depth_range: tuple[float, float]
-    resolvable_range: tuple[float, float]
+    depth_budget: tuple[float, float]
     mode: Mode
     warnings: tuple[str, ...] = ()
     exposure: float = 0.0
@@ -208,7 +209,7 @@ def stand(
     if bounds_in is not None:
         corners = box_corners(bounds_in(display_from_world))
     back, front = float(corners[:, 2].min()), float(corners[:, 2].max())
-    near, far = display.resolvable_depth
+    near, far = display.depth_budget
     warnings = (*warnings, *_find_warnings(corners, display))
     return Placement(world_from_display, (back, front), (far, near), mode, warnings)
 

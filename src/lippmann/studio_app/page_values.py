@@ -62,7 +62,7 @@ def facts_of_view(display: Display, placement: Placement, exposure: float) -> di
     return {
         "depth": {
             "scene": _pair(placement.depth_range),
-            "sharp": _pair(placement.resolvable_range),
+            "sharp": _pair(placement.depth_budget),
             "strains": display.stereo is not None,
         },
         "warnings": [_in_words(line) for line in placement.warnings],
