@@ -139,13 +139,15 @@ def _faces_inward(geometry: Geometry) -> bool:
     """
     if geometry.faces.shape[1] < 3:
         return False
-    corners = geometry.positions[geometry.faces].astype(np.float64)
-    middles = corners.mean(axis=1)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    positions = geometry.positions - geometry.positions.min(axis=0)
+    positions /= positions.max() or 1.0  # squares of squares of what is left are single-precision numbers
+    first, second, third = (positions[geometry.faces[:, corner]] for corner in range(3))
+    normals = np.cross(second - first, third - first)
     areas = np.linalg.norm(normals, axis=1)
     total = areas.sum()
+    middles = (first + second + third) / 3.0
     outward = middles - areas @ middles / total if total else middles
-    return bool((normals * outward).sum() < -_INWARD * (areas * np.linalg.norm(outward, axis=1)).sum())
+    return bool(np.vdot(normals, outward) < -_INWARD * (areas @ np.linalg.norm(outward, axis=1)))
 
 
 def _is_fitted(mesh: Fields) -> bool:
