@@ -42,3 +42,18 @@ def test_glowing_surfaces_before_black_are_something(engine):
     preview = api.preview(scene, (32, 32), spp=1, tone_map="none")
     assert preview.pixels.max() > 1
     assert not any("empty" in note for note in preview.provenance.notes)
+
+
+@pytest.mark.slow
+def test_colours_of_their_own_before_an_environment_are_something(engine):
+    """They send no rays on, which an environment's bound goes by."""
+    from lippmann import api
+    from lippmann.scene.values.description import Environment, Instance, Material, Mesh, SceneDescription
+
+    corners = np.float32([[-1, -1, 0], [1, -1, 0], [0, 1, 0]])
+    mesh = Mesh("t", corners, np.array([[0, 1, 2]], np.uint32), 0)
+    scene = SceneDescription("unlit", [mesh], [Material(unlit=True)], [Instance(0, np.eye(4))])
+    sky = Environment(np.random.default_rng(1).random((4, 8, 3), np.float32))
+    small = api.load_display("seed-lenticular").resized(16, 16)
+    notes = api.render(api.load_scene(scene, environment=sky), small, spp=1).provenance.notes
+    assert not any("nearly empty" in note for note in notes)

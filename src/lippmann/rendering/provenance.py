@@ -87,8 +87,9 @@ def _warn_of_emptiness(session: Session, frame: Frame, has_pixels: bool) -> tupl
     scene = getattr(session.built, "mitsuba", None)
     if background is None and scene is not None and scene.environment() is None:
         background = (0.0, 0.0, 0.0)
-    if not has_pixels and background is not None and max(background) == 0.0:
-        return ()  # neither colours nor rays would tell emitters from the background: paths end at both
+    by_rays = background is None or not has_pixels
+    if by_rays and (session.scene.keeps_its_colors or (background is not None and max(background) == 0.0)):
+        return ()  # neither colours nor rays would tell what glows from the background: paths end at both
     return warn_of_emptiness(visible_share(frame.pixels if has_pixels else None, background, frame.rays))
 
 

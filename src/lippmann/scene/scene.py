@@ -228,6 +228,11 @@ class Scene:
         return self.lies_off_surfaces and not has_surfaces
 
     @property
+    def keeps_its_colors(self) -> bool:
+        """Whether no light changes anything: the colours of unlit surfaces, splats and volumes are their own."""
+        return self.is_unlit or self.is_off_surfaces_alone
+
+    @property
     def in_studio(self) -> bool:
         """Whether the built-in studio lights the scene, for want of other light."""
         return self.studio and not self.has_lights

@@ -19,6 +19,7 @@ SPLATS = Splats(
 )
 TRIANGLE = Mesh("t", np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.uint32([[0, 1, 2]]), 0)
 ALONE = SceneDescription("alone", splats=SPLATS)
+UNLIT = SceneDescription("unlit", [TRIANGLE], [Material(unlit=True)], [Instance(0, np.eye(4))])
 BOTH = SceneDescription("both", [TRIANGLE], [Material()], [Instance(0, np.eye(4))], splats=SPLATS)
 
 
@@ -57,8 +58,15 @@ def test_surfaces_beside_splats_have_noise():
         (BOTH, {"denoise": "oidn"}, "denoise: oidn goes by the edges of surfaces"),
         (BOTH, {"caustics": "photons"}, "caustics: photons land on surfaces"),
         (ALONE, {"exposure": 1.0}, "exposure: 1; must be 0"),
+        (ALONE, {"clamp_indirect": 1.0}, "alone: clamp_indirect: it has no indirect light"),
+        (UNLIT, {"clamp_indirect": 1.0}, "unlit: clamp_indirect: it has no indirect light"),
+        (UNLIT, {"caustics": "photons"}, "unlit: caustics: photons of no emitter land on it"),
     ],
 )
 def test_what_splats_do_not_have_is_refused(description, options, said):
     with pytest.raises(UsageError, match=said):
         resolved(description, **options)
+
+
+def test_surfaces_beside_splats_have_indirect_light():
+    assert resolved(BOTH, clamp_indirect=1.0).clamp_indirect == 1.0

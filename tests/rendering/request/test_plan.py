@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lippmann.display import load_display
+from lippmann.errors import UsageError
 from lippmann.options.choices import ASKED
 from lippmann.rendering.denoise.guided_denoiser import effort_of
 from lippmann.rendering.request.plan import resolve
@@ -290,3 +291,18 @@ def test_a_final_picture_works_for_a_quality_where_it_can(form, values, expected
 def test_a_photograph_is_final_with_one_ray():
     planned = resolve(RenderRequest(effort="final"), unlit(fills_panel=True), load_display("seed-lenticular"))
     assert (planned.spp, planned.quality, planned.denoise) == (1, None, "none")
+
+
+@pytest.mark.parametrize(
+    ("asked", "named"),
+    [
+        ({"environment": "studio"}, "environment"),
+        ({"single_scattering": True}, "single_scattering"),
+        ({"light": {"light_strength": 2.0}, "environment": "none"}, "environment and light_strength"),
+    ],
+)
+def test_classic_models_refuse_other_light_and_materials_than_the_files(asked, named):
+    scene = load_scene("small-balls", **asked)
+    with pytest.raises(UsageError, match=f"integrator: {named} beside classic; .* of the file alone"):
+        resolve(RenderRequest(integrator="classic"), scene)
+    assert resolve(RenderRequest(integrator="path"), scene).integrator == "path"

@@ -1,6 +1,7 @@
 """Any scene, from a file, a name or an object."""
 
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from lippmann.scene.readers.registry import READERS
 from lippmann.scene.scene import STUDIO_NOTE
 from lippmann.scene.studio_light import BACKDROP, studio
 from lippmann.scene.values.description import Environment, Instance, Material, Mesh, SceneDescription
+from lippmann.scene.values.splats import Splats
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 PLY = (
@@ -258,3 +260,16 @@ def test_outside_files_need_leave(save, tmp_path):
     with pytest.raises(SceneError, match=r"a\.obj:1: material library '\.\./m\.mtl' lies outside"):
         load_scene(path)
     assert load_scene(path, allow_outside=True).description.materials[0].base_color == (1, 0, 0)
+
+
+@pytest.mark.parametrize("is_unlit", [True, False])
+def test_light_that_changes_nothing_is_said(is_unlit):
+    splats = Splats(*(np.ones((1, *shape), np.float32) for shape in ((3,), (3,), (4,), (), (1, 3))))
+    unlit = replace(triangle(), materials=[Material(unlit=True)])
+    thing = unlit if is_unlit else SceneDescription("cloud", splats=splats)
+    scene = load_scene(thing, single_scattering=True, light={"light_turn": (30, 0)})
+    assert scene.notes[-1] == (
+        "the scene keeps its own colours, whatever light is given: single_scattering, light_turn"
+    )
+    assert not any("microfacets" in note for note in scene.notes)
+    assert not any("whatever light" in note for note in load_scene(thing, environment="none").notes)

@@ -27,8 +27,8 @@ from lippmann.options.choices import (
     ToneMap,
 )
 from lippmann.options.forms import Form
-from lippmann.options.light import LightOptions
-from lippmann.rendering.request.preconditions import check, check_off_surfaces
+from lippmann.options.option import changed_options
+from lippmann.rendering.request.preconditions import check, check_scene
 from lippmann.rendering.request.render_request import Choice, RenderPlan, RenderRequest, default_depth
 from lippmann.rendering.request.tuning import TUNING
 from lippmann.runtime import machine
@@ -47,8 +47,7 @@ def make_plan(
     UsageError, PictureError
         An option of the request does not fit the scene.
     """
-    if scene.lies_off_surfaces:
-        check_off_surfaces(request, scene)
+    check_scene(request, scene)
     integrator = _integrator(request, scene)
     seen = None if form == "quilt" else display
     is_seen_whole = seen is not None and seen.lens is not None and request.pixel_filter != "point"
@@ -213,11 +212,12 @@ def _integrator(request: RenderRequest, scene: Scene) -> Choice[Integrator]:
 
 
 def _depth(request: RenderRequest, scene: Scene, integrator: Integrator) -> Choice[int]:
-    if integrator == "classic" and scene.light != LightOptions():
+    asked = {line.partition(" ")[0] for line in scene.settings} & {"environment", "single_scattering"}
+    if integrator == "classic" and (asked := {*asked, *changed_options(scene.light)}):
         raise UsageError(
-            "the light is to be another than the file's",
+            f"{' and '.join(sorted(asked))} beside classic",
             parameter="integrator",
-            rule="classic light models know no other direction and strength",
+            rule="classic light models know the light and the materials of the file alone",
             fix='use integrator="path"',
         )
     if request.depth is not None:

@@ -54,14 +54,29 @@ def check(request: RenderRequest, form: Form, display: Display | None) -> None:
     )
 
 
-def check_off_surfaces(request: RenderRequest, scene: Scene) -> None:
-    """Refuse options that scenes of Gaussian splats or volumes do not support, as their light lies on no surface.
+def check_scene(request: RenderRequest, scene: Scene) -> None:
+    """Refuse options that have no meaning in the scene: that of lights, where none changes it, and those of surfaces.
 
     Raises
     ------
     UsageError
-        The request asks for a surface property, for pooling or denoising, or for an exposure.
+        The request asks for caustics or for less indirect light where nothing is lit; or, of Gaussian splats or a
+        volume, whose light lies on no surface, for a surface property, for pooling or denoising, or for an exposure.
     """
+    is_own, own = scene.keeps_its_colors, "all in this scene has a colour of its own, whatever light is given"
+    refusals = _of_surfaces(request, scene) if scene.lies_off_surfaces else []
+    photons, clamps = request.caustics == "photons", request.clamp_indirect is not None
+    _refuse(
+        [
+            *refusals,
+            (is_own and photons, "photons of no emitter land on it", "caustics", own, _LEAVE),
+            (is_own and clamps, "it has no indirect light", "clamp_indirect", own, _LEAVE),
+        ],
+        where=scene.name,
+    )
+
+
+def _of_surfaces(request: RenderRequest, scene: Scene) -> list[_Refusal]:
     what = "Gaussian splats" if scene.has_splats else "a volume"
     rule = f"this scene has {what}, and light that lies on none"
     exposed = scene.is_off_surfaces_alone and request.exposure not in ("auto", 0.0)
@@ -69,17 +84,14 @@ def check_off_surfaces(request: RenderRequest, scene: Scene) -> None:
     shares = f"{request.method} shares the light of surfaces"
     is_property = request.integrator not in ("auto", *POOLED_LIGHT)
     denoises = request.denoise not in ("auto", "none")
-    _refuse(
-        [
-            (request.method not in ("auto", "full"), shares, "method", rule, _FULL),
-            (is_property, f"{request.integrator} is told of surfaces", "integrator", rule, _LEAVE),
-            (request.layers, "are told of surfaces", "layers", rule, _LEAVE),
-            (denoises, f"{request.denoise} goes by the edges of surfaces", "denoise", rule, _LEAVE),
-            (request.caustics == "photons", "photons land on surfaces", "caustics", rule, _LEAVE),
-            (exposed, format_value(request.exposure), "exposure", no_light, _LEAVE),
-        ],
-        where=scene.name,
-    )
+    return [
+        (request.method not in ("auto", "full"), shares, "method", rule, _FULL),
+        (is_property, f"{request.integrator} is told of surfaces", "integrator", rule, _LEAVE),
+        (request.layers, "are told of surfaces", "layers", rule, _LEAVE),
+        (denoises, f"{request.denoise} goes by the edges of surfaces", "denoise", rule, _LEAVE),
+        (request.caustics == "photons", "photons land on surfaces", "caustics", rule, _LEAVE),
+        (exposed, format_value(request.exposure), "exposure", no_light, _LEAVE),
+    ]
 
 
 def why_no_estimate(request: RenderRequest) -> str | None:

@@ -196,10 +196,10 @@ def read_scene(
         return replace(scene, studio=studio)
     # The classic light models know neither surroundings nor microfacets: who asks for them gets the physical form.
     description = override_light(scene.physical, sky, color)
-    if asked.single_scattering:
-        description = _single_scattering(description)
-    if scene.fills_panel and isinstance(description, SceneDescription):
+    if scene.keeps_its_colors and isinstance(description, SceneDescription):
         description = _note_unused_light(description, asked, light or LightOptions())
+    elif asked.single_scattering:
+        description = _single_scattering(description)
     return replace(scene, description=description, studio=studio)
 
 
@@ -212,14 +212,18 @@ def _selected(scene: Scene, asked: SceneOptions) -> Scene:
     return VolumeSelection(of_volume, asked.transfer_function, asked.window).of(scene)
 
 
-def _note_unused_light(photograph: SceneDescription, asked: SceneOptions, light: LightOptions) -> SceneDescription:
-    """A photograph with a note that names the options of light that were given, which it has no use for."""
-    unused = [name for name in ("environment", "single_scattering") if getattr(asked, name)]
-    unused += changed_options(light)
+def _note_unused_light(scene: SceneDescription, asked: SceneOptions, light: LightOptions) -> SceneDescription:
+    """A scene that nothing lights, with a note that names the options of light that were given; it has no use for them.
+
+    An environment is seen beside it, but for photographs, which fill the panel.
+    """
+    ignored = ("environment", "single_scattering") if scene.fills_panel else ("single_scattering",)
+    unused = [*(name for name in ignored if getattr(asked, name)), *changed_options(light)]
     if not unused:
-        return photograph
-    remark = f"a photograph keeps its own colours, whatever light is given: {', '.join(unused)}"
-    return replace(photograph, notes=(*photograph.notes, remark))
+        return scene
+    what = "a photograph" if scene.fills_panel else "the scene"
+    remark = f"{what} keeps its own colours, whatever light is given: {', '.join(unused)}"
+    return replace(scene, notes=(*scene.notes, remark))
 
 
 def _single_scattering(description: SceneDescription | MitsubaSource) -> SceneDescription:
