@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -17,7 +18,6 @@ from lippmann.rendering.adaptive.stopping import Goal, goal_of, reach
 from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.psnr import Estimate, PixelErrors
-from lippmann.rendering.film.memory_model import MOST_BATCHES
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 
@@ -69,13 +69,26 @@ def test_the_quality_is_reached_without_wasting_samples(slope):
     assert len(renderer.counts) <= 9
 
 
-@pytest.mark.parametrize("first", [2, 4, 16])
-def test_the_first_round_is_given_and_later_ones_end_at_multiples_of_the_batches(first):
+@pytest.mark.parametrize("first", [2, 3, 16])
+def test_the_first_round_is_given_and_later_ones_give_both_streams_as_much(first):
     renderer = Noise(error=0.2)
     run(Goal(quality=40), renderer, first=first)
     assert renderer.counts[0] == first
-    assert all(samples % 4 == 0 for samples in renderer.counts[1:])
-    assert all(samples % MOST_BATCHES == 0 for samples in renderer.counts[2:])
+    assert all(samples % 2 == 0 for samples in renderer.counts[1:])
+
+
+@pytest.mark.parametrize("slope", [0.6, 1.0])
+def test_default_pictures_that_differ_little_take_much_the_same_samples(slope):
+    goal = Goal(TUNING.clean, spp=24, is_promise=False)
+    taken = []
+    for lacking in np.arange(0.0, 4.0, 0.1):
+        # With three samples it lacks so many dB of being clean.
+        renderer = Noise(error=10 ** ((lacking - TUNING.clean) / 10) * 3**slope, slope=slope)
+        run(goal, renderer, first=3, slope=slope)
+        taken.append(renderer.samples)
+    assert taken[0] == 3
+    assert max(taken) > 6
+    assert max(after / before for before, after in pairwise(taken)) <= 1.5
 
 
 def test_no_round_multiplies_the_samples_by_more_than_the_most():

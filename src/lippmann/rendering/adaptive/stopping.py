@@ -1,8 +1,9 @@
 """The loop of a picture: trace, denoise, estimate, decide, until the goal is reached.
 
 A round brings the samples to as many as the estimate says are needed, but to no more than a few times those before:
-early estimates are rough, and what is overshot is lost. All micro-images get the same samples: one that seems good
-already may only not have met the light that few paths find, and would stay wrong.
+early estimates are rough, and what is overshot is lost. A default picture that lacks less than the least round is done,
+so that pictures that look alike, such as the key frames of a film, get much the same samples. All micro-images get the
+same samples: one that seems good already may only not have met the light that few paths find, and would stay wrong.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.psnr import Estimate, PixelErrors
-from lippmann.rendering.film.memory_model import MOST_BATCHES
+from lippmann.rendering.film.batched_picture import STREAMS
 from lippmann.rendering.request.render_request import RenderRequest
 
 if TYPE_CHECKING:
@@ -187,30 +188,29 @@ def reach(
         assessment = clock() - started
         left = goal.seconds_left(clock() - began)
         missing = goal.missing(estimate)
-        if goal.has_quality and missing <= 0:
+        growth = 10 ** (min(missing, 100.0) / (10 * slope)) if goal.has_quality else math.inf
+        if growth <= (1.0 if goal.is_promise else TUNING.least_growth):
             return Outcome("quality", estimate, errors)
         if sampler.samples >= goal.most:
             return Outcome("samples", estimate, errors)
-        needed = _next_total(sampler.samples, missing if goal.has_quality else math.inf, slope)
+        needed = _next_total(sampler.samples, growth)
         samples = min(needed, goal.most) - sampler.samples
         samples = min(samples, _affordable(left - assessment, sampler))
         if samples < 1:
             return Outcome("time", estimate, errors)
         if goal.has_quality:
-            expected = min(goal.most, sampler.samples * 10 ** (max(missing, 0) / (10 * slope)))
+            expected = min(goal.most, sampler.samples * growth)
         seconds = min(left, (expected - sampler.samples) * _seconds_per_sample(sampler) if expected else left)
         note = goal.describe(estimate)
 
 
-def _next_total(samples: int, missing: float, slope: float) -> int:
-    """Samples per pixel after the next round: as many as the missing dB are expected to take, within its growth limits.
+def _next_total(samples: int, growth: float) -> int:
+    """Samples per pixel after the next round, which asks for ``growth`` times as many, within its limits.
 
-    A multiple of the number of batches, so that all of them get the same.
+    An even number, so that both streams get the same.
     """
-    growth = 10 ** (min(missing, 100.0) / (10 * slope))
     target = samples * min(TUNING.most_growth, max(TUNING.least_growth, growth))
-    step = MOST_BATCHES if samples >= MOST_BATCHES // 2 else MOST_BATCHES // 2
-    return max(step * round(target / step), step * (samples // step + 1))
+    return STREAMS * math.ceil(target / STREAMS)
 
 
 def _affordable(seconds: float, sampler: FullInBatches) -> int:
