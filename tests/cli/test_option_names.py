@@ -16,7 +16,19 @@ from lippmann.errors import UsageError
 assert make_app  # whose module says which commands there are
 SOURCE = Path(package.__file__).parent
 #: Parameters of the library that no command has.
-OF_THE_LIBRARY = {"form", "effort", "stereo", "pick", "framed_by", "height", "row_step", "placement", "pupil"}
+OF_THE_LIBRARY = {
+    "form",
+    "effort",
+    "stereo",
+    "pick",
+    "framed_by",
+    "height",
+    "row_step",
+    "placement",
+    "pupil",
+    "light",
+    "progress",
+}
 #: Files whose texts are for other programs: pip, a style sheet's variables, Dask's own command, Blender, commands that
 #: are run.
 OTHER_PROGRAMS = {
@@ -32,7 +44,7 @@ OTHER_PROGRAMS = {
     "runtime/llvm_install.py",
 }
 #: Whole commands, named as such.
-COMMANDS = re.compile(r"lippmann (?:export|compare)[\w `-]*--\w+|``--json``")
+COMMANDS = re.compile(r"lippmann (?:export|compare|weave)[\w `-]*--\w+|``--json``")
 
 
 def library():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -66,6 +68,32 @@ def test_each_eye_sees_the_panel_from_its_own_place(lippmann, balls, tmp_path, t
     assert found[-1, "blue"][0] < found[1, "blue"][0] - 2
 
 
+def test_a_camera_of_a_deep_scene_takes_both_pictures_from_closer_places(lippmann, balls, tmp_path):
+    import trimesh
+
+    scene = trimesh.load(balls)
+    scene.camera = trimesh.scene.Camera(resolution=(1600, 900), fov=(53, 31))
+    scene.camera_transform = trimesh.transformations.translation_matrix((0.0, 0.0, 580.0))
+    (tmp_path / "seen.glb").write_bytes(trimesh.exchange.gltf.export_glb(scene))
+    # Without a focus, the middle of the scene lies in the lens plane, 600 mm from the camera.
+    words = ("--place", "camera", "--shift", "0,0,-250", "--integrator", "albedo", "--spp", 4, "--threads", 1)
+    words += "--target", "odyssey-3d", "--size", "960x540", "-o", tmp_path / "seen.png"
+    done = lippmann("quilt", "render", tmp_path / "seen.glb", *words)
+    assert done.code == 0, done.err
+    apart = float(re.search(r"the two pictures are taken ([\d.]+) mm apart instead of 63", done.err)[1])
+    assert 20 < apart < 40
+    assert "comfortable to look at" not in done.err
+    display = load_display("odyssey-3d")
+    with Image.open(tmp_path / "seen_half_2x1.png") as pair:
+        halves = {-1: pair.crop((0, 0, 480, 540)), 1: pair.crop((480, 0, 960, 540))}
+        found = {(side, color): places(half, color) for side, half in halves.items() for color in BALLS}
+    for color, (x, _, world) in BALLS.items():
+        z = world + 20 - 250
+        for side in (-1, 1):
+            at = side * apart / 2 + (x - side * apart / 2) * 600 / (600 - z)
+            assert found[side, color][0] == pytest.approx((at / display.size_mm[0] + 0.5) * 480, abs=0.6)
+
+
 def test_our_own_reader_knows_the_eyes(lippmann, balls, tmp_path):
     words = ("--integrator", "albedo", "--spp", 1, "--threads", 1, "--quiet", "-o", tmp_path / "seen.png")
     assert lippmann("quilt", "render", balls, "-d", "odyssey-3d", "--size", "480x270", *words).code == 0
@@ -109,11 +137,17 @@ def test_a_plan_is_of_the_pair_that_is_asked_for(lippmann, balls):
         (("plan", "--target", "odyssey-3d", "--size", "20x30cm"), "--size: '20x30cm' is no size"),
         (("plan", "--target", "odyssey-3d", "--size", "3840x2160", "--lpi", "60"), "--lpi: does not apply to the"),
         (("plan", "--target", "portrait", "--size", "3360x3360"), "--size: does not apply to the display portrait"),
-        (("render", "--target", "odyssey-3d"), "--display: odyssey-3d takes no native pixels; an eye-tracked monitor"),
-        (("render", "--target", "odyssey-3d", "-o", "a.zarr"), "--display: odyssey-3d takes no native pixels"),
+        (("render", "--target", "odyssey-3d"), "--target: odyssey-3d takes no native pixels; an eye-tracked monitor"),
+        (
+            ("render", "--display", "odyssey-3d", "--target=odyssey-3d", "-o", "a.zarr"),
+            "--display: odyssey-3d takes no native pixels",
+        ),
         (("quilt", "render", "--target", "odyssey-3d", "--size", "999x999"), "it is 999 x 999 pixels; pairs for"),
         (("quilt", "render", "--target", "odyssey-3d", "--views", "8x6"), "--views: 8x6; odyssey-3d shows one view"),
-        (("quilt", "render", "--target", "oddyssey-3d"), "unknown display 'oddyssey-3d', did you mean 'odyssey-3d'?"),
+        (
+            ("quilt", "render", "--target", "oddyssey-3d"),
+            "--target: unknown display 'oddyssey-3d', did you mean 'odyssey-3d'?",
+        ),
         (("quilt", "render", "--target", "odyssey-3d", "-o", "a_2x1.png"), "a_2x1.png: the name says another quilt"),
         (("quilt", "render", "--target", "odyssey-3d", "-o", "a_qs8x6a0.75.png"), "the quilt's ends in _half_2x1.png"),
     ],

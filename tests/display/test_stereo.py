@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from lippmann.display import load_display
-from lippmann.display.stereo import StereoPair, depth_of_disparity, disparity
+from lippmann.display.stereo import (
+    StereoPair,
+    comfortable_share,
+    depth_of_disparity,
+    disparity,
+    parallax,
+    perceived_height,
+)
 from lippmann.errors import DisplayError
 
 MONITORS = ["displayxr", "elf-sr", "lume-pad", "odyssey-3d", "spatiallabs"]
@@ -34,10 +41,37 @@ def test_nothing_is_too_far_where_parallel_eyes_see_less():
     assert depth_of_disparity(1, 1, 5000, 63)[1] == -math.inf
 
 
+def test_parallax_by_hand():
+    # Sight lines of eyes 60 mm apart at 600 mm to a point 300 mm behind the panel cut it 20 mm apart, uncrossed.
+    assert parallax(-300, 600) == pytest.approx(20 / 60)
+    assert parallax(0, 600) == 0
+    assert parallax(300, 600) == pytest.approx(-1)
+    assert parallax(-math.inf, 600) == 1
+
+
+@pytest.mark.parametrize(
+    ("back", "front", "expected"),
+    [
+        (-100, 50, 1.0),  # comfortable as it is
+        (-300, 50, parallax(-119.949, 600) / parallax(-300, 600)),
+        (-100, 250, parallax(85.756, 600) / parallax(250, 600)),
+        (-math.inf, 0, parallax(-119.949, 600)),
+        (-20, -10, 1.0),
+    ],
+)
+def test_eyes_come_closer_until_depth_is_comfortable(back, front, expected):
+    share = comfortable_share(back, front, 600, 63)
+    assert share == pytest.approx(expected, rel=1e-5)
+    # Eyes of full distance perceive the smaller parallax at these heights.
+    seen = [disparity(perceived_height(z, 600, share), 600, 63) for z in (back, front)]
+    assert max(map(abs, seen)) == pytest.approx(1) if share < 1 else max(map(abs, seen)) <= 1
+
+
 @pytest.mark.parametrize("name", MONITORS)
-def test_neighbouring_pixels_shine_one_eye_distance_apart(name):
-    display = load_display(name)
-    distance, eyes = display.viewing_distance, display.stereo.eyes
+@pytest.mark.parametrize("share", [1.0, 0.4])
+def test_neighbouring_pixels_shine_one_eye_distance_apart(name, share):
+    display = load_display(name).with_closer_eyes(share)
+    distance, eyes = display.viewing_distance, share * display.stereo.eyes
     column = np.arange(0, display.panel.width, 97)
     x, y = display.panel_point(column + 0.5, np.full(len(column), 0.5))
     (ox, _, oz), (dx, _, dz) = display.light_ray(x, y)

@@ -69,9 +69,9 @@ def test_names_are_read(tmp_path, name, layout):
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("teapot.png", "does not say how many views.*--layout 8x6, or 2x1 of a pair"),
-        ("teapot_3x4_1920x1080.png", "--layout 3x4"),
-        ("teapot 12BY5.jpg", "--layout 12x5"),
+        ("teapot.png", 'does not say how many views.*layout="8x6", or layout="2x1" of a pair'),
+        ("teapot_3x4_1920x1080.png", 'layout="3x4"'),
+        ("teapot 12BY5.jpg", 'layout="12x5"'),
         ("x_qs8x.png", "does not say how many views"),
         ("x_qs0x6a0.75.png", "0 columns and 6 rows"),
         ("x_qs33x6a0.75.png", "33 columns and 6 rows; there are 1 to 32"),

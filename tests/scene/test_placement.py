@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from lippmann.display import Display, LensArray, Panel, list_displays, load_display
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.placement import PlacementOptions
+from lippmann.scene.camera_placement import VisibleDepth
 from lippmann.scene.fit_placement import FILL, POP_OUT
-from lippmann.scene.matrices import rotation
+from lippmann.scene.matrices import rotation, translation
 from lippmann.scene.placement import options_of_sequence, place, placement_of
 from lippmann.scene.values.description import Camera
 
@@ -507,6 +508,71 @@ class TestDisplayFrame:
         (warning,) = place(deep, monitor, options=options(place="display")).warnings
         assert "from -120 to 85.8 mm it is comfortable to look at: flatten it to 66 %, or shift it" in warning
         assert place(deep, monitor, options=options(place="display", depth_scale=0.65)).warnings == ()
+
+
+class TestEyesOfACamera:
+    """Of a monitor that a camera places, the two pictures are taken so close together that depth is comfortable."""
+
+    MONITOR = load_display("odyssey-3d")
+    # The eye is 600 units from the focus, so that units are millimetres.
+    CAMERA = Camera("main", translation((0.0, 0.0, 600.0)), fov_y=0.5, aspect=16 / 9, focus_distance=600.0)
+
+    def placed(self, bounds, probe=None, *, is_unbounded=False, **fields):
+        asked = options(place="camera", **fields)
+        return place(bounds, self.MONITOR, cameras=[self.CAMERA], options=asked, probe=probe, is_unbounded=is_unbounded)
+
+    def test_deep_scenes_are_comfortable_by_themselves(self):
+        deep = box(100, 100, 400, center=(0, 0, -200))
+        placement = self.placed(deep)
+        # 400 mm behind: 0.4 of the eye distance; 119.9 mm, the most that is comfortable, 0.1666.
+        assert placement.eye_share == 0.41
+        (line,) = placement.warnings
+        assert line.startswith("the two pictures are taken 25.8 mm apart instead of 63, for comfortable depth")
+        back, front = placement.depth_range
+        far, _ = placement.depth_budget
+        assert far < back < 0.98 * far
+        assert front == pytest.approx(0)
+        # The camera's own picture stays as it is.
+        np.testing.assert_allclose(placement.world_from_display, self.placed(deep, depth_scale=1.0).world_from_display)
+        assert placement.traced(self.MONITOR).gap == pytest.approx(self.MONITOR.gap / 0.41)
+
+    def test_whoever_asks_for_all_of_the_depth_is_told_of_the_strain(self):
+        placement = self.placed(box(100, 100, 400, center=(0, 0, -200)), depth_scale=1.0)
+        assert placement.eye_share == 1.0
+        assert placement.traced(self.MONITOR) is self.MONITOR
+        assert placement.depth_range[0] == pytest.approx(-400)
+        assert "seen double" in placement.warnings[0]
+
+    def test_a_shallow_scene_keeps_the_eyes_as_they_are(self):
+        placement = self.placed(box(100, 100, 100))
+        assert placement.eye_share == 1.0
+        assert placement.warnings == ()
+
+    def test_what_lies_round_the_viewer_unseen_does_not_count(self):
+        around = box(2000, 2000, 2000, center=(0, 0, 900))
+        views = []
+
+        def probe(view):
+            views.append(view)
+            return VisibleDepth(560.0, 690.0)
+
+        placement = self.placed(around, probe)
+        # From the viewer's eye, in millimetres, through the panel's rectangle.
+        view = views[-1]
+        np.testing.assert_allclose(view.world_from_camera, translation((0.0, 0.0, 600.0)), atol=1e-9)
+        assert (2 * 600 * view.half_width, 2 * 600 * view.half_height) == pytest.approx(self.MONITOR.size_mm)
+        assert placement.eye_share == 1.0
+        assert placement.depth_range == pytest.approx((-100, 40))
+
+    def test_planes_without_end_count_as_far_as_they_are_seen(self):
+        placement = self.placed(box(100, 100, 100), lambda view: VisibleDepth(560.0, 6000.0), is_unbounded=True)
+        # The box alone is comfortable.
+        assert placement.eye_share == 0.18
+
+    def test_a_panel_under_lenses_has_no_pair_of_eyes(self):
+        deep = box(100, 100, 400, center=(0, 0, -200))
+        panel, asked = load_display("portrait"), options(place="camera")
+        assert place(deep, panel, cameras=[self.CAMERA], options=asked).eye_share == 1.0
 
 
 @pytest.mark.parametrize(

@@ -205,17 +205,17 @@ def run(words: list[str], *, debug: bool = False) -> int:
             return stopped()
         if debug or not isinstance(error, Exception):
             raise
-        return _report_error(error)
+        return _report_error(error, words)
     # Typer makes an exit code of most Ctrl-C.
     if code == INTERRUPTED:
         return stopped()
     return code if isinstance(code, int) else 0
 
 
-def _report_error(error: Exception) -> int:
+def _report_error(error: Exception, words: list[str]) -> int:
     """The exit code of an error, which is told in one line."""
     if isinstance(error, LippmannError):
-        line = in_options(error)
+        line = in_options(error, words)
         left = "" if "--resume" in line else _left()
         return _leave(f"{line}; {left}" if left else line, error.exit_code)
     if isinstance(error, _ComplaintError):

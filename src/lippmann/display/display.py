@@ -440,6 +440,12 @@ class Display:
         """The same optics in front of ``width`` x ``height`` pixels."""
         return replace(self, panel=replace(self.panel, width=width, height=height))
 
+    def with_closer_eyes(self, share: float) -> Display:
+        """An eye-tracked monitor whose two pictures are taken from this share of the distance between the eyes."""
+        gap, pixels = self.gap / share, 2.0 * self.panel.pixel_pitch
+        pitch = pixels * self.viewing_distance / (self.viewing_distance + gap)
+        return replace(self, gap=gap, lens_array=replace(self.lens_array, pitch=pitch))
+
     def summary(self) -> JsonObject:
         """Key figures of the display, as plain values for a table or JSON.
 

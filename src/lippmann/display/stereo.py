@@ -84,6 +84,27 @@ def depth_of_disparity(crossed: float, uncrossed: float, distance: float, eyes: 
     return distance - 0.5 * eyes / math.tan(near), distance - 0.5 * eyes / math.tan(far) if far > 0.0 else -math.inf
 
 
+def parallax(z: float, distance: float) -> float:
+    """Distance on the panel between the two pictures of a point, uncrossed above 0, as a share of the eye distance."""
+    return 1.0 - distance / (distance - z)
+
+
+def perceived_height(z: float, distance: float, share: float) -> float:
+    """Height at which a point at height ``z`` is seen whose pictures are taken from ``share`` of the eye distance.
+
+    The parallax of all points is as much smaller, as K is in :func:`disparity`; lengths in mm.
+    """
+    return distance - distance / (1.0 - share * parallax(z, distance))
+
+
+def comfortable_share(back: float, front: float, distance: float, eyes: float) -> float:
+    """Share of the eye distance, at most 1, at which a scene from z = ``back`` to ``front`` mm is comfortable."""
+    near, far = depth_of_disparity(COMFORTABLE, COMFORTABLE, distance, eyes)
+    wanted = (parallax(z, distance) for z in (front, back))
+    most = (parallax(z, distance) for z in (near, far))
+    return min(1.0, *(limit / found for limit, found in zip(most, wanted, strict=True) if limit * found > 0.0))
+
+
 def _vergence(distance: float, eyes: float) -> float:
     """Angle in degrees between the sight lines of two eyes to a point straight ahead."""
     return 2.0 * math.degrees(math.atan2(0.5 * eyes, distance))

@@ -46,7 +46,8 @@ class PlacementOptions(Options):
         Factor on the size at which the scene appears.
     depth_scale:
         Factor on its depth, about the lens plane, above 0. None: when fitting, what compresses the depth into what the
-        display resolves, at most 1; otherwise 1.
+        display resolves, at most 1; otherwise 1, and the two pictures for an eye-tracked monitor that a camera places
+        are taken so close together that the depth is comfortable.
     pop_out:
         Share of the scene's depth to lie in front of the lens plane, 0 to 1; with a camera, of the depth that it
         sees. None: a third when fitting, as the camera focuses otherwise.

@@ -347,8 +347,8 @@ def layout_of_name(path: Path, *, to_write: bool = False) -> QuiltLayout:
     match = QUILT_NAME.search(path.stem)
     if match is None:
         size = _SIZE.search(path.stem)
-        layout = "x".join(size.groups()) if size else "8x6, or 2x1 of a pair"
-        fix = f"say the columns and rows of views: --layout {layout}"
+        layout = f'layout="{"x".join(size.groups())}"' if size else 'layout="8x6", or layout="2x1" of a pair'
+        fix = f"say the columns and rows of views: {layout}"
         if to_write:
             fix = f"of 8 columns and 6 rows: {path.stem.partition('_qs')[0]}_qs8x6a0.75{path.suffix}"
         raise PictureError("the name does not say how many views there are", where=str(path), rule=_CONVENTION, fix=fix)

@@ -13,10 +13,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lippmann.display import Display
-from lippmann.display.stereo import COMFORTABLE, EYE_DISTANCE, depth_of_disparity, disparity
+from lippmann.display.stereo import (
+    COMFORTABLE,
+    EYE_DISTANCE,
+    comfortable_share,
+    depth_of_disparity,
+    disparity,
+    perceived_height,
+)
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.placement import Mode, PlacementOptions
-from lippmann.scene.camera_placement import DepthProbe, frame_whole, place_by_camera, remove_scale
+from lippmann.scene.camera_placement import CameraView, DepthProbe, frame_whole, place_by_camera, remove_scale
 from lippmann.scene.extent import box, box_corners, thin_axis
 from lippmann.scene.matrices import (
     Bounds,
@@ -48,6 +55,8 @@ class Placement:
     be blurred, cut or outside. ``exposure`` is that of the camera that places the display, in stops. ``may_cut`` holds
     the options of a placement by which the panel's edge may cut what stands in front of it; None where all of the scene
     lies within the panel, or is to be cut as a photograph.
+    Of an eye-tracked monitor that a camera places ``depth_range`` is that of what is seen, and ``eye_share`` the share
+    of the distance between the eyes from which its two pictures are taken; below 1 the eyes perceive less depth.
     """
 
     world_from_display: Matrix
@@ -57,6 +66,11 @@ class Placement:
     warnings: tuple[str, ...] = ()
     exposure: float = 0.0
     may_cut: PlacementOptions | None = None
+    eye_share: float = 1.0
+
+    def traced(self, display: Display) -> Display:
+        """The display by whose lenses rays are traced."""
+        return display if self.eye_share == 1.0 else display.with_closer_eyes(self.eye_share)
 
     @property
     def display_from_world(self) -> Matrix:
@@ -186,7 +200,13 @@ def place(
         display_from_world = _resize(np.eye(4), options)
     display_from_world = translation(options.shift) @ display_from_world
     where = inverse(display_from_world)
-    placement = stand(where, bounds, display, mode=mode, bounds_in=bounds_in, warnings=warnings)
+    share, seen = 1.0, None
+    if mode == "camera" and display.stereo is not None:
+        share, seen = _share_of_eyes(where, bounds, display, bounds_in, probe, is_unbounded=is_unbounded)
+        share = share if options.depth_scale is None else 1.0
+    placement = stand(
+        where, bounds, display, mode=mode, bounds_in=bounds_in, warnings=warnings, eye_share=share, seen=seen
+    )
     is_whole = mode == "fit" and (fills_panel or (options.scale <= 1.0 and not any(options.shift)))
     return replace(placement, exposure=exposure, may_cut=None if is_whole else options)
 
@@ -199,19 +219,64 @@ def stand(
     mode: Mode,
     bounds_in: Callable[[Matrix], Bounds] | None = None,
     warnings: Sequence[str] = (),
+    eye_share: float = 1.0,
+    seen: tuple[float, float] | None = None,
 ) -> Placement:
     """The placement of a display at a given place, with the depth range of the scene and warnings.
 
-    Parameters as of :func:`place`; ``warnings`` come first among those of the placement.
+    Parameters as of :func:`place`; ``warnings`` come first among those of the placement. ``seen`` are the back and
+    front of what is seen of the scene, in mm, where they are known.
     """
-    display_from_world = inverse(world_from_display)
-    corners = transform_points(display_from_world, box_corners(bounds))
-    if bounds_in is not None:
-        corners = box_corners(bounds_in(display_from_world))
-    back, front = float(corners[:, 2].min()), float(corners[:, 2].max())
+    corners = _corners_in(inverse(world_from_display), bounds, bounds_in)
+    back, front = seen or (float(corners[:, 2].min()), float(corners[:, 2].max()))
+    if eye_share != 1.0:
+        back, front = (
+            perceived_height(min(z, display.aperture_distance), display.viewing_distance, eye_share)
+            for z in (back, front)
+        )
+        eyes = eyes_of_viewer(display)
+        closer = f"the two pictures are taken {eye_share * eyes:.3g} mm apart instead of {eyes:g}"
+        warnings = (*warnings, f"{closer}, for comfortable depth: depth_scale=1 shows all of it, a strain")
     near, far = display.depth_budget
-    warnings = (*warnings, *_find_warnings(corners, display))
-    return Placement(world_from_display, (back, front), (far, near), mode, warnings)
+    warnings = (*warnings, *_find_warnings(corners, (back, front), display))
+    return Placement(world_from_display, (back, front), (far, near), mode, warnings, eye_share=eye_share)
+
+
+def _corners_in(frame_from_world: Matrix, bounds: Bounds, bounds_in: Callable[[Matrix], Bounds] | None) -> Bounds:
+    """Corners of the scene's box in a frame."""
+    if bounds_in is None:
+        return transform_points(frame_from_world, box_corners(bounds))
+    return box_corners(bounds_in(frame_from_world))
+
+
+def _share_of_eyes(
+    world_from_display: Matrix,
+    bounds: Bounds,
+    display: Display,
+    bounds_in: Callable[[Matrix], Bounds] | None,
+    probe: DepthProbe | None,
+    *,
+    is_unbounded: bool,
+) -> tuple[float, tuple[float, float]]:
+    """Share of the eye distance at which what a camera sees is comfortable, and the back and front of that in mm.
+
+    The camera's picture stays as it is, which flattening would change. The share is whole percents: the kernels of live
+    pictures are made for it.
+    """
+    distance, eyes = display.viewing_distance, eyes_of_viewer(display)
+    heights = _corners_in(inverse(world_from_display), bounds, bounds_in)[:, 2]
+    back, front = float(heights.min()), float(heights.max())
+    is_deep = is_unbounded or not _lies_within((COMFORTABLE, COMFORTABLE), display, back, front)
+    if probe is not None and is_deep:
+        width, height = display.size_mm
+        from_viewer = world_from_display @ translation((0.0, 0.0, distance))
+        visible = probe(CameraView(from_viewer, 0.5 * width / distance, 0.5 * height / distance, is_parallel=False))
+        if visible is not None:
+            # Planes without end reach beyond the box, and a box round the viewer beyond what is seen.
+            back, front = min(back, distance - visible.far), min(front, distance - visible.near)
+    front = min(front, display.aperture_distance)
+    share = comfortable_share(back, front, distance, eyes)
+    return max(math.floor(100.0 * share), 1) / 100.0, (back, front)
 
 
 def face_viewer(
@@ -293,8 +358,10 @@ def _resize(display_from_world: Matrix, options: PlacementOptions) -> Matrix:
     return np.asarray(depth_scaling(options.depth_scale or 1.0) @ resized, np.float64)
 
 
-def _find_warnings(corners: Bounds, display: Display) -> list[str]:
+def _find_warnings(corners: Bounds, depths: tuple[float, float], display: Display) -> list[str]:
+    """Lines on a scene's box in the display's frame, whose depth is seen as ``depths`` (back, front)."""
     low, high = corners.min(axis=0), corners.max(axis=0)
+    back, front = depths
     near, far = display.resolvable_depth
     warnings = []
     if high[2] > display.aperture_distance + 1e-6:
@@ -302,12 +369,12 @@ def _find_warnings(corners: Bounds, display: Display) -> list[str]:
             f"the scene reaches {high[2]:.3g} mm in front of the lens plane; recorded rays begin at "
             f"{display.aperture_distance:g} mm, what lies nearer is cut off"
         )
-    if double := fusion_warning(display, float(low[2]), float(high[2])):
+    if double := fusion_warning(display, back, front):
         warnings.append(double)
-    elif display.stereo is not None and (high[2] > near + 1e-6 or low[2] < far - 1e-6):
+    elif display.stereo is not None and (front > near + 1e-6 or back < far - 1e-6):
         warnings.append(
-            f"the scene reaches from {low[2]:.3g} to {high[2]:.3g} mm; from {far:.3g} to {near:.3g} mm it is "
-            f"comfortable to look at: flatten it to {100 / max(low[2] / far, high[2] / near):.2g} %, or shift it"
+            f"the scene reaches from {back:.3g} to {front:.3g} mm; from {far:.3g} to {near:.3g} mm it is "
+            f"comfortable to look at: flatten it to {100 / max(back / far, front / near):.2g} %, or shift it"
         )
     if display.stereo is None and (high[2] > near + 1e-6 or low[2] < far - 1e-6):
         warnings.append(

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -102,6 +102,7 @@ class Stand:
     first_pose: Matrix | None = None
     warnings: tuple[str, ...] | None = None
     may_cut: PlacementOptions | None = None
+    eye_share: float = 1.0
 
     def __call__(self, frame: int) -> Placement:
         scene = self.motion.scene(frame)
@@ -110,7 +111,8 @@ class Stand:
         if self.first_pose is not None:
             camera = cast(Camera, self.motion.camera(frame, self.camera))
             where, exposure = _pose(camera) @ np.linalg.inv(self.first_pose) @ self.first, camera.exposure
-        found = stand(where, scene.bounds, self.display, mode=self.mode, bounds_in=scene.bounds_in)
+        bounds, box = scene.bounds, scene.bounds_in
+        found = stand(where, bounds, self.display, mode=self.mode, bounds_in=box, eye_share=self.eye_share)
         found = replace(found, exposure=exposure, may_cut=self.may_cut)
         return found if self.warnings is None else replace(found, warnings=self.warnings)
 
@@ -125,7 +127,7 @@ def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> S
     """
     own = motion.placement(display, options)
     if own is not None:
-        return Stand(motion, display, own.mode, own.world_from_display, warnings=own.warnings, may_cut=own.may_cut)
+        return _stand_as(own, motion, display, warnings=own.warnings)
     camera = motion.camera(0, options.camera)
     if camera is None and options.place == "camera":
         cameras = motion.scene(0).cameras
@@ -135,15 +137,20 @@ def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> S
         camera = motion.camera(0, options.camera)
     if camera is None:
         placement = place(motion.bounds(), display, cameras=motion.scene(0).facing_cameras, options=options)
-        return Stand(motion, display, placement.mode, placement.world_from_display, may_cut=placement.may_cut)
+        return _stand_as(placement, motion, display)
     if options.place not in (None, "camera"):
         raise UsageError(
             f"placement '{options.place}' beside a flight", parameter="place", rule="the display follows the camera"
         )
     following = replace(options, place="camera", camera=camera.name)
     placement = place(motion.bounds(), display, cameras=(camera,), options=following)
-    where, first_pose = placement.world_from_display, _pose(camera)
-    return Stand(motion, display, "camera", where, options.camera, first_pose, may_cut=placement.may_cut)
+    return _stand_as(placement, motion, display, camera=options.camera, first_pose=_pose(camera))
+
+
+def _stand_as(placement: Placement, motion: Motion, display: Display, **values: Any) -> Stand:
+    """The stand of a first placement."""
+    where, may_cut = placement.world_from_display, placement.may_cut
+    return Stand(motion, display, placement.mode, where, may_cut=may_cut, eye_share=placement.eye_share, **values)
 
 
 def render_sequence(

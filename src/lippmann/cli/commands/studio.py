@@ -24,7 +24,10 @@ Model = Annotated[
     str | None, typer.Argument(help="Scene file, or a bundled scene's name; by default the teapot.", show_default=False)
 ]
 DisplayChoice = Annotated[
-    str | None, typer.Option("--display", help="Name, TOML file or short form of the display.", show_default=False)
+    str | None,
+    typer.Option(
+        "--display", "-d", "--target", help="Name, TOML file or short form of the display.", show_default=False
+    ),
 ]
 State = Annotated[
     Path | None, typer.Option("--state", help="State that the studio saved (.toml); options win over it.")

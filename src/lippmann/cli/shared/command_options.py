@@ -14,7 +14,7 @@ from __future__ import annotations
 import inspect
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import Field, dataclass, field
 from functools import cache
@@ -291,24 +291,25 @@ _HELP_ALL = inspect.Parameter(
 
 
 #: Parameters whose options have other names than they have.
-_OTHERWISE = {
-    "layout": "--as",
-    "grid": "--views",
+_OTHERWISE: dict[str, Sequence[str]] = {
+    "layout": ["--as"],
+    "grid": ["--views"],
 }
 #: ``name="value"``, ``name=True``, ``name=3.5`` or, for any value, ``name=...``.
 _SETTING = re.compile(r"\b([a-z_]+)=(?:\"([^\"]*)\"|(\.\.\.|[\w+-]+(?:\.\w+)*))")
 
 
-def in_options(error: LippmannError) -> str:
-    """The line that says ``error`` on the command line."""
-    where = ": ".join(part for part in (error.where, option_of(error.parameter)) if part)
-    words = {name: translated(getattr(error, name)) for name in ("what", "rule", "fix")}
-    return str(LippmannError(words["what"], where=where, rule=words["rule"], fix=words["fix"]))
+def in_options(error: LippmannError, words: Sequence[str] = ()) -> str:
+    """The line that says ``error`` on the command line; of an option's names it says the one among ``words``."""
+    where = ": ".join(part for part in (error.where, option_of(error.parameter, words)) if part)
+    texts = {name: translated(getattr(error, name)) for name in ("what", "rule", "fix")}
+    return str(LippmannError(texts["what"], where=where, rule=texts["rule"], fix=texts["fix"]))
 
 
-def option_of(parameter: str) -> str:
-    """The option of a parameter; its own name where it has none."""
-    return _option(parameter) or parameter
+def option_of(parameter: str, words: Sequence[str] = ()) -> str:
+    """The option of a parameter, by its name among ``words`` where it has several; its own name where it has none."""
+    said = {word.partition("=")[0] for word in words}
+    return next((name for name in _names(parameter) if name in said), _option(parameter) or parameter)
 
 
 def translated(text: str) -> str:
@@ -338,20 +339,24 @@ _makers: list[Callable[[], typer.Typer]] = []
 
 
 def _option(parameter: str) -> str | None:
-    """The option of a parameter, of the command at hand where it has one: to load all commands takes time."""
-    return next((known[parameter] for make in _makers if parameter in (known := _options(make))), None)
+    return next(iter(_names(parameter)), None)
+
+
+def _names(parameter: str) -> Sequence[str]:
+    """Long names of a parameter's option, of the command at hand where it has one: to load all commands takes time."""
+    return next((known[parameter] for make in _makers if parameter in (known := _options(make))), ())
 
 
 @cache
-def _options(make_app: Callable[[], typer.Typer]) -> Mapping[str, str]:
-    """Options by the names of their parameters; arguments by theirs, in capitals."""
-    names: dict[str, str] = {}
+def _options(make_app: Callable[[], typer.Typer]) -> Mapping[str, Sequence[str]]:
+    """Names of options by those of their parameters; arguments by theirs, in capitals."""
+    names: dict[str, Sequence[str]] = {}
     for command in _commands(typer.main.get_command(make_app())):
         for parameter in command.params:
             if parameter.name is not None:
                 long = [option for option in parameter.opts if option.startswith("--")]
-                names.setdefault(parameter.name, long[0] if long else parameter.name.upper())
-    return names | _OTHERWISE
+                names.setdefault(parameter.name, long or [parameter.name.upper()])
+    return _OTHERWISE | names
 
 
 def _commands(command: Any) -> Iterator[Any]:

@@ -270,7 +270,7 @@ def _of_plugin(name: str, path: Path) -> Display | None:
         known = [each for each in door.claims() if not each.startswith(".")]
         names = dict.fromkeys([*known, *(preset.removeprefix(_FAMILY) for preset in door.own[_OWN].presets)])
         rule = "'lippmann displays' lists those known; a .toml file, or a Looking Glass's visual.json, is one, too"
-        raise DisplayError.unknown("display", name, names, rule=rule, fix=door.problems)
+        raise DisplayError.unknown("display", name, names, parameter="display", rule=rule, fix=door.problems)
     if plugin is None or not plugin.distribution:
         return None
     if name in plugin.value.presets:

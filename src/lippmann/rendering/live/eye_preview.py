@@ -70,7 +70,7 @@ def render_eye_preview(
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.transport.ray_source import DisplayRays, SinglePixelRays
 
-    whole = DisplayRays(display, placement.world_from_display, bool(resolved.subpixels))
+    whole = DisplayRays(placement.traced(display), placement.world_from_display, bool(resolved.subpixels))
     source = SinglePixelRays(whole, visible.column, visible.row, visible.channel)
     integrator = session.integrator(whole, placement.display_from_world, placement.exposure)
     plan = cut_wavefronts(source.width, source.height, samples, channels=source.channels, memory=session.memory)

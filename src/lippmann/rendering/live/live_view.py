@@ -110,6 +110,11 @@ class PlacedView:
     placed: PlacedDisplay
     pixels: PixelSet
 
+    @property
+    def traced(self) -> Display:
+        """The display by whose lenses rays are traced."""
+        return self.placement.traced(self.display)
+
     def light_up(self, exposure: float) -> None:
         """Set the scene's light and exposure to those of this view, if another view was traced in between."""
         if self.kernels.lit_for is self:

@@ -131,7 +131,7 @@ class LiveRenderer:
         with exclusive():
             stand = self._stand(kernels, display, view, _moving(view.request), seconds)
             exposure = kernels.expose(display, stand.request, stand.placement, measure=False)
-            tracer = kernels.tracer(display, stand.request)
+            tracer = kernels.tracer(stand.traced, stand.request)
             count, step = len(stand.pixels.column), min(TRANSPORT.lanes, kernels.most_lanes)
             values, heights = np.empty((count, 3), np.float32), np.empty(count, np.float32)
         for start in range(0, count, step):
