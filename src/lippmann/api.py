@@ -15,7 +15,6 @@ Everything else hangs on what they return.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -111,11 +110,9 @@ def render(
 
     rendered: Callable[..., IntegralImage] = render_picture
     if correct != "none" or headroom:
-        from lippmann.corrected import render_corrected
-        from lippmann.options.correction import check_correction
+        from lippmann.corrected import corrected_renderer
 
-        check_correction(correct, headroom)
-        rendered = partial(render_corrected, headroom=headroom)
+        rendered = corrected_renderer(correct, headroom)
 
     request = _request(placement, options)
     with show_progress(progress) as report:

@@ -6,7 +6,9 @@ as wide.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -15,7 +17,8 @@ from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
 from lippmann.image.stored_values import FloatArray
 from lippmann.optics.correction import PARTS, LensCorrection, judged_rows
-from lippmann.options.choices import PROPERTIES
+from lippmann.options.choices import PROPERTIES, Correction
+from lippmann.options.correction import check_correction
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.picture import render_picture
 from lippmann.rendering.request.plan import resolve
@@ -23,6 +26,18 @@ from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.scene import Scene
+
+
+def corrected_renderer(correct: Correction, headroom: float) -> Callable[..., IntegralImage]:
+    """:func:`render_corrected` with a headroom, in the place of :func:`lippmann.rendering.picture.render_picture`.
+
+    Raises
+    ------
+    UsageError
+        As :func:`lippmann.options.correction.check_correction`.
+    """
+    check_correction(correct, headroom)
+    return partial(render_corrected, headroom=headroom)
 
 
 @exclusive()

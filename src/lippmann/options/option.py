@@ -212,9 +212,11 @@ def default_of(each: Field[Any]) -> Any:
     return each.default
 
 
-def changed_options(options: Options) -> list[str]:
-    """Names of the options whose values are not the defaults."""
-    return [each.name for each, _ in options_of(type(options)) if getattr(options, each.name) != default_of(each)]
+def changed_options(options: Options, assumed: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Values by name of the options that differ from the defaults, or from what is ``assumed`` in their place."""
+    usual = {each.name: default_of(each) for each, _ in options_of(type(options))} | dict(assumed or {})
+    values = {each.name: getattr(options, each.name) for each, _ in options_of(type(options))}
+    return {name: value for name, value in values.items() if value != usual[name]}
 
 
 def kinds_of(kind: Any) -> tuple[Any, ...]:

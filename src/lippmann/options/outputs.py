@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from lippmann.errors import UsageError
-from lippmann.options.option import Options, option
+from lippmann.options.option import Options, changed_options, option
 
 #: The part of each frame that a film shows.
 Shows = Literal["eye", "native", "rgbd", "rgbd-half", "hololuminescent"]
@@ -85,10 +85,9 @@ class SequenceOptions(Options):
             return True
         if self.frames is not None:
             return True
-        for name in ("fps", "animation", "camera_path", "fixed_noise", "video", "eye", "codec", "shows"):
-            if getattr(self, name) not in (None, False, "", "eye"):
-                fix = 'add frames="0:48", or turntable=48'
-                raise UsageError("has no meaning for a single picture", parameter=name, fix=fix)
+        for name in changed_options(self):
+            fix = 'add frames="0:48", or turntable=48'
+            raise UsageError("has no meaning for a single picture", parameter=name, fix=fix)
         return False
 
     def with_film(self, output: Path) -> tuple["SequenceOptions", Path]:
@@ -129,7 +128,6 @@ class ClusterOptions(Options):
         UsageError
             A TLS file is given without one.
         """
-        for name in ("tls_ca", "tls_cert", "tls_key"):
-            if self.cluster is None and getattr(self, name) is not None:
-                raise UsageError("applies to a cluster only", parameter=name, fix='add cluster="tls://HOST:8786"')
+        for name in changed_options(self) if self.cluster is None else ():
+            raise UsageError("applies to a cluster only", parameter=name, fix='add cluster="tls://HOST:8786"')
         return self.cluster is not None

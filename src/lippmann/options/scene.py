@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypedDict
+from typing import TYPE_CHECKING, Literal, TypedDict
 
 from lippmann.options import texts
 from lippmann.options.option import Options, option
@@ -106,12 +106,6 @@ class SceneOptions(Options):
     single_scattering: bool = _scene(
         False, "Shade rough metal and glass exactly by glTF's formulas, which lose light between microfacets."
     )
-
-    @property
-    def given(self) -> dict[str, Any]:
-        """The options that are not left at their default."""
-        plain = type(self)()
-        return {name: value for name, value in vars(self).items() if value is not getattr(plain, name)}
 
 
 class SceneKeywords(TypedDict, total=False):

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 from lippmann.errors import UsageError
-from lippmann.options.option import Options, default_of, kinds_of, options_of
+from lippmann.options.option import Options, changed_options, kinds_of, options_of
 from lippmann.printable import shorten
 
 
@@ -41,15 +41,17 @@ def toml_of(value: object) -> str:
 
 def settings_of(options: Options) -> list[str]:
     """Options as a picture's metadata hold them: ``name = value`` in TOML, without defaults and folders of files."""
-    lines = []
-    for each, its in options_of(type(options)):
-        value = getattr(options, each.name)
-        if value is None or (isinstance(value, type(default_of(each))) and value == default_of(each)):
-            continue
-        if its.is_file and isinstance(value, (str, Path)):
-            value = Path(value).name
-        lines.append(f"{each.name} = {toml_of(value)}")
-    return lines
+    files = {each.name for each, its in options_of(type(options)) if its.is_file}
+    values = {
+        name: Path(value).name if name in files and isinstance(value, (str, Path)) else value
+        for name, value in changed_options(options).items()
+    }
+    return lines_of(values)
+
+
+def lines_of(values: Mapping[str, object]) -> list[str]:
+    """Settings as TOML, a line each; None, which TOML cannot say, is left out."""
+    return [f"{name} = {toml_of(value)}" for name, value in values.items() if value is not None]
 
 
 def from_plain(kind: Any, value: object) -> Any:

@@ -13,7 +13,7 @@ import numpy as np
 from lippmann.display import Display
 from lippmann.errors import UsageError
 from lippmann.options.light import LightOptions
-from lippmann.options.option import checked
+from lippmann.options.option import changed_options, checked
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.scene import SceneOptions
 from lippmann.scene.matrices import Bounds
@@ -103,7 +103,7 @@ class AnimatedFile(Motion):
         light: LightOptions | None = None,
         allow_outside: bool = False,
     ) -> None:
-        for name in asked.given:
+        for name in changed_options(asked):
             if name not in _OF_MOVING:
                 raise UsageError("is for scenes at rest", parameter=name, fix="leave it out")
         if not (math.isfinite(fps) and fps > 0.0):

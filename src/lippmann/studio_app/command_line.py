@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from lippmann.options.light import LightOptions
-from lippmann.options.option import default_of, options_of
+from lippmann.options.option import changed_options, default_of, options_of
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.quality import QualityOptions
 from lippmann.options.scene import SceneOptions
@@ -44,12 +44,9 @@ def words_of_state(state: StudioState) -> list[str]:
 
 def option_values(state: StudioState) -> Mapping[str, str | bool | list[str]]:
     """The options of a render by name, as they are typed; switches are bool. What commands assume is left out."""
-    values: dict[str, str | bool | list[str]] = {}
-    for each, _ in sorted(options_of(StudioState), key=lambda entry: entry[0].name != "display"):
-        value = getattr(state, each.name)
-        if each.name not in _OTHERS and value is not None and value != _ASSUMED.get(each.name, default_of(each)):
-            values[each.name] = _typed(value)
-    return values
+    given = changed_options(state, _ASSUMED)
+    first = {name: given[name] for name in ("display",) if name in given}
+    return {name: _typed(value) for name, value in (first | given).items() if name not in _OTHERS and value is not None}
 
 
 def _typed(value: object) -> str | bool | list[str]:

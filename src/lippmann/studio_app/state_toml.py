@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from lippmann.errors import UsageError
-from lippmann.options.option import default_of, options_of
-from lippmann.options.texts import from_plain, toml_of
+from lippmann.options.option import changed_options, options_of
+from lippmann.options.texts import from_plain, lines_of
 from lippmann.runtime.regular_file import read_small_text
 from lippmann.studio_app.state import FILES, StudioState
 
@@ -91,15 +91,10 @@ def text_of_state(state: StudioState, folder: Path | None = None) -> str:
 
     ``folder`` is where the file will lie: names of files in it or below it are told from there.
     """
-    lines = []
-    for each, _ in sorted(options_of(StudioState), key=lambda entry: entry[0].name not in _FIRST):
-        value = getattr(state, each.name)
-        if value is None or (value == default_of(each) and each.name not in _FIRST):
-            continue
-        if folder is not None and each.name in FILES:
-            value = _relative_name(value, folder)
-        lines.append(f"{each.name} = {toml_of(value)}")
-    return "\n".join(lines) + "\n"
+    values = {name: getattr(state, name) for name in _FIRST} | changed_options(state)
+    if folder is not None:
+        values |= {name: _relative_name(values[name], folder) for name in FILES if values.get(name) is not None}
+    return "\n".join(lines_of(values)) + "\n"
 
 
 def with_whole_paths(state: StudioState) -> StudioState:

@@ -14,6 +14,7 @@ from lippmann.cli.shared.command_options import with_options, without
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.scene_source import PRINT, output_of, print_of, sheet_of
 from lippmann.errors import UsageError
+from lippmann.options.option import changed_options, flag_of
 from lippmann.options.prints import FinishOptions, PrintOptions
 
 if TYPE_CHECKING:
@@ -142,10 +143,9 @@ def _display(name: str | None, printed: PrintOptions, *, turned: bool) -> Displa
     if name in (None, PRINT):
         sheet = print_of(printed)
         return (replace(sheet, size=sheet.size[::-1]) if turned else sheet).display()
-    for option, value in {**vars(printed), "lenses": "across" if turned else None}.items():
-        if value is not None:
-            rule = f"it applies to prints, and --display {name} is given"
-            raise UsageError("does not apply", where=f"--{option.replace('_', '-')}", rule=rule)
+    for option in (*changed_options(printed), *(("lenses",) if turned else ())):
+        rule = f"it applies to prints, and --display {name} is given"
+        raise UsageError("does not apply", where=flag_of(option), rule=rule)
     from lippmann.display import load_display
 
     return load_display(name)

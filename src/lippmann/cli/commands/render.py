@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -101,13 +100,11 @@ def render(
     rendered: Callable[..., IntegralImage] = render_picture
     traced = target
     if correct != "none" or headroom:
-        from lippmann.corrected import finer_display, render_corrected
-        from lippmann.options.correction import check_correction
+        from lippmann.corrected import corrected_renderer, finer_display
 
-        check_correction(correct, headroom)
+        rendered, traced = corrected_renderer(correct, headroom), finer_display(target)
         if moving or maps is not None:
             _refuse_correction("frames" if moving else "--maps", "leave one of them out")
-        rendered, traced = partial(render_corrected, headroom=headroom), finer_display(target)
     on_cluster = bool(on)
     if moving:
         from lippmann.cli.commands.cluster import runner_of

@@ -13,6 +13,7 @@ from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import only, with_options
 from lippmann.cli.shared.console import Console
 from lippmann.errors import UsageError
+from lippmann.options.option import changed_options
 from lippmann.options.outputs import AccessOptions
 from lippmann.options.quality import MachineOptions
 from lippmann.options.scene import SceneOptions
@@ -118,6 +119,6 @@ def _state(path: Path | None, model: str | None, display: str | None, asked: Sce
     from lippmann.studio_app.state import StudioState
     from lippmann.studio_app.state_toml import read_state
 
-    names = {"scene": model, "display": display, **asked.given}
+    names = {"scene": model, "display": display, **changed_options(asked)}
     given = {name: str(value) for name, value in names.items() if value is not None}
     return replace(StudioState() if path is None else read_state(path), **given)  # type: ignore[arg-type]

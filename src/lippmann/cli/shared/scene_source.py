@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from lippmann.errors import DisplayError, LippmannError, OutputError, UsageError
 from lippmann.options.light import LightOptions
+from lippmann.options.option import changed_options, flag_of
 from lippmann.options.outputs import AccessOptions
 from lippmann.options.prints import FinishOptions, PrintOptions
 from lippmann.options.scene import SceneOptions
@@ -56,7 +57,7 @@ def print_of(printed: PrintOptions) -> Print:
     from lippmann.display.formats.print_sheet import print_of_texts
 
     try:
-        return print_of_texts({_option(key): text for key, text in _texts_of(printed).items()})
+        return print_of_texts({key.replace("_", "-"): text for key, text in changed_options(printed).items()})
     except DisplayError as error:
         raise DisplayError(error.what, where=f"--{error.where}", rule=error.rule, fix=error.fix) from None
 
@@ -75,9 +76,9 @@ def display_of(name: str, printed: PrintOptions) -> Display:
 
     if name == PRINT:
         return print_of(printed).display()
-    for key in _texts_of(printed):
+    for key in changed_options(printed):
         rule = f"it applies to --display {PRINT} only"
-        raise UsageError(f"does not apply to the display {name}", where=f"--{_option(key)}", rule=rule)
+        raise UsageError(f"does not apply to the display {name}", where=flag_of(key), rule=rule)
     return load_display(name)
 
 
@@ -103,10 +104,6 @@ def planned_display(name: str, printed: PrintOptions) -> tuple[Display, tuple[in
     return display, (pair.width, pair.height)
 
 
-def _texts_of(printed: PrintOptions) -> dict[str, str]:
-    return {key: text for key, text in vars(printed).items() if text is not None}
-
-
 def sheet_of(display: Display, finishing: FinishOptions, *, in_frames: bool = False) -> tuple[Display, Finish | None]:
     """The display with its bleed, and what is done to its picture afterwards; None for nothing.
 
@@ -118,7 +115,7 @@ def sheet_of(display: Display, finishing: FinishOptions, *, in_frames: bool = Fa
     PictureError
         If the profile cannot be used.
     """
-    asked = [f"--{name}" for name, value in vars(finishing).items() if value not in (None, False)]
+    asked = [flag_of(name) for name in changed_options(finishing)]
     if not asked:
         return display, None
     if display.sheet is None:
@@ -137,10 +134,6 @@ def sheet_of(display: Display, finishing: FinishOptions, *, in_frames: bool = Fa
     finish = Finish(margin, finishing.mirror, None if icc is None else read_profile(icc))
     finish.display(display)  # which checks the margin
     return display, finish
-
-
-def _option(parameter: str) -> str:
-    return parameter.replace("_", "-")
 
 
 def output_of(given: Path | None, source: str | Path, ending: str) -> Path:
