@@ -73,3 +73,10 @@ def test_an_option_of_the_command_at_hand_is_known_without_loading_the_others():
         "print(translated('photos=...'), 'lippmann.cli.commands.interlace' in sys.modules)"
     )
     assert run_python(code).stdout.splitlines() == ["--spp 3 False", "PHOTOS True"]
+
+
+def test_pythons_module_is_the_command():
+    command = [sys.executable, "-m", "lippmann", "bogus"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "lippmann: No such command 'bogus'. See 'lippmann --help'.\n"

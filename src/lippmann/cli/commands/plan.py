@@ -34,7 +34,10 @@ def plan(
     turning: Annotated[SequenceOptions, only("turntable", "swing")],
     machine: MachineOptions,
 ) -> None:
-    """Say what 'render' will show and take, without rendering: depth, blur, rays, memory and time."""
+    """Say what 'render' will show and take, without rendering: depth, blur, rays, memory and time.
+
+    For an eye-tracked monitor --size is that of its pair in pixels, such as 7680x2160.
+    """
     from lippmann.rendering.forecast import forecast
     from lippmann.rendering.request.render_request import RenderRequest
 
