@@ -351,6 +351,10 @@ def test_without_any_depth_there_is_no_scene(tmp_path):
         match=r"^photo\.png: needs a depth map; .*quilts.* own; add depth_map=\.\.\., or lay photo_depth\.png",
     ):
         load_scene(tmp_path / "photo.png")
+    slices = Pillow.new("L", (4, 4))
+    slices.save(tmp_path / "cells.tif", save_all=True, append_images=[slices])
+    with pytest.raises(SceneError, match=r"^cells\.tif: needs a depth map; .*; slices of a volume are read as \.npy"):
+        load_scene(tmp_path / "cells.tif")
 
 
 @pytest.mark.parametrize(

@@ -89,6 +89,7 @@ def test_up_of_what_says_it_itself_is_refused():
         ("ring.3dm", "Rhino"),
         ("turn.mp4", "ffmpeg"),
         ("turn.m4v", "ffmpeg"),
+        ("brain.mnc", r"nibabel\.load\('a\.mnc'\)"),
         ("hero.ms3d", r"assimp export in\.ms3d out\.glb"),
         ("town.i3dm", r"i3dmToGlb -i in\.i3dm"),
         ("gear.sldprt", "STEP"),

@@ -5,6 +5,7 @@ import struct
 import numpy as np
 import pytest
 
+from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.readers.stl import read_stl
 
@@ -56,6 +57,13 @@ def colored_file(header, numbers):
         (b"", (0b1_11111_00000_00000, 0), ((1, 0, 0), (0.7, 0.7, 0.7))),
         # Materialise: 1 bit "has the colour of the object", then blue, green, red.
         (b"COLOR=\x00\xff\x00\xff", (0b0_00000_00000_11111, 1 << 15), ((1, 0, 0), (0, 1, 0))),
+        (b"COLOR=\x00\xff\x00\xff", (0, 0), ((0, 1, 0), (0, 1, 0))),
+        # MeshLab: 1 bit "has a colour" instead, and 0 where there is none, as it writes meshes without colours.
+        (
+            b"COLOR=\x7f\x7f\x7f MATERIAL=\x7f\x7f\x7f",
+            (0b1_00000_00000_11111, 0),
+            ((1, 0, 0), decode_srgb(np.full(3, 127 / 255))),
+        ),
     ],
 )
 def test_colours_of_facets(read, header, numbers, expected):

@@ -81,6 +81,8 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
         if depth_map is None:
             fix = f"add depth_map=..., or lay {path.stem[:40]}_depth.png beside it"
             rule = "pictures are read as photographs with depth: 'lippmann weave' takes quilts, 'lippmann view' our own"
+            if any(note.endswith("the first is shown") for note in notes):
+                fix += "; slices of a volume are read as .npy: numpy.save('a.npy', tifffile.imread('a.tif'))"
             raise SceneError("needs a depth map", where=path.name, rule=rule, fix=fix)
         notes = (*notes, f"depth from {depth_map.name}, which lies beside it")
     chosen = read_depth_map(depth_map) if depth_map is not None else own

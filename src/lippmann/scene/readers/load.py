@@ -56,6 +56,7 @@ _BLENDER = "open it in Blender, then File > Export > glTF 2.0 (.glb)"
 _FREECAD = "open it in FreeCAD, then File > Export > glTF (.glb)"
 _CLOUD_COMPARE = "save it as .ply, in CloudCompare for instance"
 _SLICER_3D = "save it as .nii.gz, in 3D Slicer for instance"
+_NIBABEL = "save it as .nii.gz, in Python by: nibabel.save(nibabel.load('a{0}'), 'a.nii.gz')"
 _MAYA = "export it from Maya as FBX, and that from Blender as glTF 2.0 (.glb)"
 _TRIMESH = "convert it, in Python by trimesh: trimesh.load_mesh('a.off').export('a.ply')"
 _ASSIMP = "convert it by Assimp: assimp export in{0} out.glb"
@@ -94,6 +95,7 @@ _ELSEWHERE = {
     ".vtkhdf": "save it as .vtu, in PyVista by: pyvista.read('a.vtkhdf').cast_to_unstructured_grid().save('a.vtu')",
     **dict.fromkeys((".nrrd", ".nhdr", ".mha", ".mhd"), _SLICER_3D),
     **dict.fromkeys((".mgz", ".mgh"), "convert it by FreeSurfer: mri_convert in.mgz out.nii.gz"),
+    **{kind: _NIBABEL.format(kind) for kind in (".mnc", ".par", ".rec")},
     ".mtl": "it holds the materials of an .obj file: name that",
     ".hdr": "a sky is for --environment; save a volume as .nii, which holds header and voxels in one file",
     ".amf": "save it as .stl in the slicer",

@@ -24,6 +24,8 @@ _FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribut
 
 #: In a header of Materialise's programs, before the bytes R, G, B, A of facets without a colour of their own.
 _OWN_COLOR = b"COLOR="
+#: The beginning of a header of MeshLab's, with its grey.
+_MESHLAB = b"COLOR=\x7f\x7f\x7f MATERIAL="
 
 # Lines that hold names or remarks: free text in which any word may stand.
 _REMARK = re.compile(r"(?m)^[ \t]*(?:(?:end)?solid\b|#|//|;).*$|(?:[ \t]#|//|;).*$")
@@ -87,15 +89,17 @@ def _facet_colors(header: bytes, numbers: NDArray[np.uint16]) -> FloatArray | No
     """Linear RGBA ``(3 facets, 4)`` of the corners; None of a file whose facets have no colours.
 
     A colour has five bits a channel. With ``COLOR=`` in the header (Materialise) red is in the lowest bits, and facets
-    whose highest bit is set have the header's colour. Without (VisCAM, SolidView) red is in the highest bits; facets
-    whose highest bit is set have a colour; all others are 0.
+    whose highest bit is set have the header's colour; so have those of 0 where all are, and in files of MeshLab, which
+    sets that bit of each colour. Without (VisCAM, SolidView) red is in the highest bits; facets whose highest bit is
+    set have a colour; all others are 0.
     """
     is_set = numbers >> 15 == 1
     parts = np.stack([numbers >> shift & 31 for shift in (0, 5, 10)], axis=1) / 31.0
     start = header.find(_OWN_COLOR) + len(_OWN_COLOR)
     own = header[start : start + 3]
     if start >= len(_OWN_COLOR) and len(own) == 3:
-        codes = np.where(is_set[:, None], np.frombuffer(own, np.uint8) / 255.0, parts)
+        inherits = numbers == 0 if header.startswith(_MESHLAB) or not numbers.any() else is_set
+        codes = np.where(inherits[:, None], np.frombuffer(own, np.uint8) / 255.0, parts)
     elif is_set.any() and not numbers[~is_set].any():
         codes = np.where(is_set[:, None], parts[:, ::-1], encode_srgb(np.array(0.7)))
     else:
