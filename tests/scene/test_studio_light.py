@@ -16,7 +16,7 @@ def irradiance(normal):
 
 def test_it_is_a_white_panorama():
     pixels = studio().pixels
-    assert pixels.shape == (256, 512, 3)
+    assert pixels.shape == (64, 128, 3)
     assert pixels.dtype == np.float32
     assert np.isfinite(pixels).all()
     assert pixels.min() > 0

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,19 +24,21 @@ BRIGHTEST = 2.5
 
 _DARK = 0.25
 
-_HEIGHT = 256
+_HEIGHT = 64
 
 # Radiance of the walls straight down, at the horizon and straight up, before scaling.
 _FLOOR, _HORIZON, _CEILING = 0.1, 0.25, 0.35
+#: That of a line from floor to ceiling is in proportion to 1 + SLOPE y.
+SLOPE = (_CEILING - _FLOOR) / (_CEILING + _FLOOR)
 
 # A white diffuse surface that faces the viewer, tilted this much upwards (degrees), comes out at radiance 1.
 _CALIBRATION_TILT = 30.0
 
 
 @dataclass(frozen=True)
-class _SoftBox:
+class SoftBox:
     """A bright rectangle at infinity: azimuth to the right of the viewer's own direction, elevation, half its width and
-    height (degrees), and its radiance before scaling. Its edges fade over a fifth of its size."""
+    height (degrees), and its radiance before scaling. Its edges fade over a fifth of its half size."""
 
     azimuth: float
     elevation: float
@@ -42,12 +46,45 @@ class _SoftBox:
     half_height: float
     radiance: float
 
+    @cached_property
+    def frame(self) -> NDArray[np.float64]:
+        """``(3, 3)``: its middle on a plane at distance 1, and from there the ways to its right and its upper edge."""
+        azimuth, elevation = np.radians(self.azimuth), np.radians(self.elevation)
+        right = np.array([np.cos(azimuth), 0.0, -np.sin(azimuth)])
+        center = np.array([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)])
+        width, height = np.tan(np.radians([self.half_width, self.half_height]))
+        return np.stack([center, right * width, np.cross(center, right) * height])
 
-_BOXES = (
-    _SoftBox(azimuth=-50.0, elevation=45.0, half_width=22.0, half_height=18.0, radiance=14.0),  # key, on the left
-    _SoftBox(azimuth=65.0, elevation=15.0, half_width=14.0, half_height=30.0, radiance=1.8),  # fill, on the right
-    _SoftBox(azimuth=0.0, elevation=80.0, half_width=30.0, half_height=10.0, radiance=3.0),  # overhead
-    _SoftBox(azimuth=150.0, elevation=25.0, half_width=8.0, half_height=28.0, radiance=10.0),  # rim, from behind
+    @property
+    def area(self) -> float:
+        """The integral of both fades of :meth:`meet` over that plane."""
+        _, right, up = self.frame
+        return float((2 * FULL + FADE) ** 2 * np.linalg.norm(right) * np.linalg.norm(up))
+
+    def meet(self, lib: ModuleType, x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
+        """Where a direction meets that plane: two fades across and along it, and the cosine that it was met at.
+
+        A fade is 1 inside and falls evenly to 0 at the edges, and is 0 behind. Arguments as those of :func:`radiance`.
+        """
+
+        def along(axis: NDArray[np.float64]) -> Any:
+            return float(axis[0]) * x + float(axis[1]) * y + float(axis[2]) * z
+
+        center, right, up = self.frame
+        ahead = lib.maximum(along(center), 1e-6)
+        offsets = (lib.abs(along(axis / (axis @ axis)) / ahead) for axis in (right, up))
+        across, upwards = (lib.minimum(lib.maximum((1 - offset) / FADE, 0), 1) for offset in offsets)
+        return across, upwards, ahead
+
+
+#: Shares of half a soft box that are evenly bright, and that fade.
+FULL, FADE = 0.8, 0.2
+
+BOXES = (
+    SoftBox(azimuth=-50.0, elevation=45.0, half_width=22.0, half_height=18.0, radiance=14.0),  # key, on the left
+    SoftBox(azimuth=65.0, elevation=15.0, half_width=14.0, half_height=30.0, radiance=1.8),  # fill, on the right
+    SoftBox(azimuth=0.0, elevation=80.0, half_width=30.0, half_height=10.0, radiance=3.0),  # overhead
+    SoftBox(azimuth=150.0, elevation=25.0, half_width=8.0, half_height=28.0, radiance=10.0),  # rim, from behind
 )
 
 
@@ -65,24 +102,39 @@ def studio_for(scene: SceneDescription) -> Environment:
 
 @lru_cache(maxsize=4)
 def studio(strength: float = 1.0) -> Environment:
-    """Soft boxes on a grey gradient, as an environment of 512 x 256 texels.
+    """Soft boxes on a grey gradient, as an environment that renderers evaluate by :func:`radiance`.
 
     The viewer is taken to look along -z with +y up: the key light hangs over the viewer's left shoulder, the fill on
     the right, one box overhead, a narrow one behind the scene on the right. All light is white. It is scaled so that
     a white diffuse surface facing the viewer and 30 degrees upwards has radiance 1, times ``strength``.
     """
     directions, solid_angles = directions_of(_HEIGHT)
-    up = directions[..., 1]
-    towards = np.where(up < 0.0, _FLOOR, _CEILING)
-    radiance = _HORIZON + (towards - _HORIZON) * np.abs(up) ** 0.7
-    for box in _BOXES:
-        radiance += box.radiance * _coverage(box, directions)
+    grey = radiance(np, *np.moveaxis(directions, -1, 0))
     tilt = np.radians(_CALIBRATION_TILT)
     cosine = np.maximum(directions @ np.array([0.0, np.sin(tilt), np.cos(tilt)]), 0.0)
-    radiance *= strength * np.pi / (radiance * cosine * solid_angles).sum()
-    pixels = np.repeat(radiance[..., None], 3, axis=-1).astype(np.float32)
+    scale = strength * np.pi / float((grey * cosine * solid_angles).sum())
+    pixels = np.repeat(scale * grey[..., None], 3, axis=-1).astype(np.float32)
     pixels.setflags(write=False)
-    return Environment(pixels, name=NAME, follows_viewer=True)
+    return Environment(pixels, name=NAME, follows_viewer=True, studio_scale=scale)
+
+
+def radiance(lib: ModuleType, x: Any, y: Any, z: Any) -> Any:
+    """Radiance before scaling toward unit directions, in the frame of :func:`studio`.
+
+    ``lib`` is the library of the arrays: NumPy, or Dr.Jit.
+    """
+    value = shell(lib, y)
+    for box in BOXES:
+        across, upwards, _ = box.meet(lib, x, y, z)
+        both = across * upwards
+        value = value + box.radiance * (both * both * (3 - 2 * across) * (3 - 2 * upwards))  # smooth steps
+    return value
+
+
+def shell(lib: ModuleType, up: Any) -> Any:
+    """Radiance of the walls before scaling, by the y of unit directions."""
+    middle, half = (_CEILING + _FLOOR) / 2 - _HORIZON, (_CEILING - _FLOOR) / 2
+    return _HORIZON + (middle + half * lib.sign(up)) * lib.abs(up) ** 0.7
 
 
 def directions_of(height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -100,23 +152,3 @@ def directions_of(height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]
     edges = np.cos(np.pi * np.arange(height + 1) / height)
     solid_angles = np.broadcast_to((edges[:-1] - edges[1:])[:, None] * (np.pi / height), (height, 2 * height))
     return directions, solid_angles
-
-
-def _coverage(box: _SoftBox, directions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Coverage of each direction by the box, 0 to 1: its shape on a plane in front of it."""
-    azimuth, elevation = np.radians(box.azimuth), np.radians(box.elevation)
-    right = np.array([np.cos(azimuth), 0.0, -np.sin(azimuth)])
-    center = np.array([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)])
-    ahead = directions @ center
-    safe = np.maximum(ahead, 1e-6)
-    across = np.abs(directions @ right) / safe / np.tan(np.radians(box.half_width))
-    along = np.abs(directions @ np.cross(center, right)) / safe / np.tan(np.radians(box.half_height))
-    coverage: NDArray[np.float64] = np.where(ahead > 0.0, _fade(across) * _fade(along), 0.0)
-    return coverage
-
-
-def _fade(distance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """1 inside, 0 outside, smooth from 0.8 to 1 of the half size."""
-    t = np.clip((1.0 - distance) / 0.2, 0.0, 1.0)
-    smooth: NDArray[np.float64] = t * t * (3.0 - 2.0 * t)
-    return smooth

@@ -108,7 +108,11 @@ def environment_object(environment: Environment) -> Emitter:
         raise SceneError("a pixel is negative or not finite", where=where, rule="radiance is finite and not negative")
     if (pixels == pixels[0, 0]).all():
         return mi.load_dict({"type": "constant", "radiance": {"type": "rgb", "value": pixels[0, 0].tolist()}})
-    to_world = mi.ScalarTransform4f((np.asarray(environment.world_from_environment) @ _HALF_TURN).tolist())
+    to_world = mi.ScalarTransform4f(environment_to_world(environment.world_from_environment).tolist())
+    if environment.studio_scale > 0:
+        from lippmann.device.pbr.studio_emitter import studio_emitter
+
+        return studio_emitter(environment.studio_scale, to_world)
     if len(pixels) <= MAX_EXACT_ROWS:
         pixels = _rows_for_mitsuba(pixels)
     bitmap = mi.Bitmap(np.require(pixels, requirements=["C", "W"]))  # it refuses read-only arrays

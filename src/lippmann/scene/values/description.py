@@ -250,7 +250,9 @@ class Environment:
 
     Row 0 lies at +y (up), the middle column at -z, ahead of a viewer who looks that way; columns run to the right (+x).
     ``follows_viewer`` says that this holds for whoever looks at the scene, wherever the display or camera stands;
-    ``world_from_environment`` is then set for each picture. ``notes`` say what of its file is not used.
+    ``world_from_environment`` is then set for each picture. ``notes`` say what of its file is not used. A
+    ``studio_scale`` above 0 says that ``pixels`` show the built-in studio with its radiance scaled by this: renderers
+    evaluate the studio itself.
 
     Examples
     --------
@@ -264,6 +266,7 @@ class Environment:
     name: str = ""
     follows_viewer: bool = False
     notes: Sequence[str] = ()
+    studio_scale: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
