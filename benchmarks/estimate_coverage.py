@@ -150,10 +150,10 @@ class Case:
 
     def beside_the_truth(self, traced: Any) -> dict[str, Any]:
         """What a picture says of itself, and what is true."""
-        from lippmann.rendering.provenance import stated_error
+        from lippmann.rendering.provenance import state_error
 
         psnr, worst = self.truth(traced.frame.pixels)
-        told: Any = stated_error(traced.estimate, self.session.choices)
+        told: Any = state_error(traced.estimate, self.session.choices)
         return {
             "samples": traced.samples,
             "psnr": psnr,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from lippmann.rendering.estimate.psnr import Estimate
-from lippmann.rendering.provenance import light_notes, stated_error
+from lippmann.rendering.provenance import light_notes, state_error
 from lippmann.rendering.request.render_request import RenderRequest
 
 ESTIMATE = Estimate(40.0, 38.0, 43.0, 34.0, 30.0, 37.0, (3, 0))
@@ -20,15 +20,15 @@ def test_few_samples_among_mirrors_are_told(samples, is_few, caustics):
 
 
 def test_elsewhere_they_are_as_estimated():
-    assert stated_error(ESTIMATE, {}) == ESTIMATE.to_dict()
+    assert state_error(ESTIMATE, {}) == ESTIMATE.to_dict()
     assert light_notes(RenderRequest(), ESTIMATE, 2, {}) == ()
-    assert stated_error(None, AMONG_MIRRORS) is None
+    assert state_error(None, AMONG_MIRRORS) is None
     assert light_notes(RenderRequest(), None, 2, AMONG_MIRRORS) == ()
 
 
 def test_without_caustics_that_are_there_nothing_is_stated():
     left = {"caustics": "paths"}
-    assert stated_error(ESTIMATE, left) is None
+    assert state_error(ESTIMATE, left) is None
     (note,) = light_notes(RenderRequest(), None, 64, left)
     assert "no estimate of the error" in note
 

@@ -12,7 +12,7 @@ from lippmann.errors import SceneError, UsageError
 from lippmann.scene.cloud_selection import SplatSelection
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.scene import Scene
-from lippmann.scene.splat_clouds import check_splats, cropped, moved, typical_points
+from lippmann.scene.splat_clouds import check_splats, crop, moved, typical_points
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import Splats, joined, real_harmonics
 
@@ -118,7 +118,7 @@ def test_a_choice_of_splats_is_made_in_order():
     np.testing.assert_allclose(chosen.centers, 10 * splats.centers[keep], rtol=1e-6)
     np.testing.assert_allclose(chosen.scales, 10 * splats.scales[keep], rtol=1e-6)
     assert SplatSelection().of(scene) is scene
-    assert cropped(splats, np.array([[-1, -1, -1], [1, 1, 1]])).count == 200
+    assert crop(splats, np.array([[-1, -1, -1], [1, 1, 1]])).count == 200
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from lippmann.optics.proof import Proof, prove
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.memory_model import cut_wavefronts
-from lippmann.rendering.picture import lens_notes, traced_window
+from lippmann.rendering.picture import find_window, lens_notes
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.request.render_request import RenderRequest, format_value
@@ -171,7 +171,7 @@ def forecast(
     from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 
     whole = DisplayRays(display, placement.world_from_display, bool(request.subpixels))
-    window = traced_window(session, display, placement)
+    window = find_window(session, display, placement)
     source = whole if window is None else WindowRays(whole, window)
     probe = _Probe(source, request.seed)
     panels = size[0] * size[1] / (width * height)

@@ -133,10 +133,10 @@ def trace_samples(job: Job) -> Traced:
     if why is not None:
         return trace_unjudged(job, why)
     if job.is_part:
-        return _denoised_part(job)
+        return _denoise_part(job)
     request = job.request
     is_fixed = request.denoise == "none" and not request.is_open_ended and request.spp_reserve is None
-    return _fixed_samples(job) if is_fixed else _in_rounds(job)
+    return _trace_fixed(job) if is_fixed else _trace_in_rounds(job)
 
 
 def trace_unjudged(job: Job, *notes: str) -> Traced:
@@ -164,7 +164,7 @@ def one_stream(job: Job, *notes: str) -> Traced:
 
 def trace_reused(job: Job) -> Traced:
     """Reprojection of traced points between micro-images; denoised if requested."""
-    return denoise_whole(job, _reused(job))
+    return denoise_whole(job, _reproject(job))
 
 
 #: The function of each method. ``pooled`` differs from ``full`` in that the denoiser shares light between micro-images.
@@ -185,7 +185,7 @@ def _samples_of_pixels(traced: Traced) -> NDArray[np.uint32]:
     return np.where(status == TRACED, np.uint32(traced.samples), np.uint32(0))
 
 
-def _fixed_samples(job: Job) -> Traced:
+def _trace_fixed(job: Job) -> Traced:
     """A fixed number of samples, in bands of rows."""
     frame, errors = trace_in_batches(
         job.integrator,
@@ -198,22 +198,22 @@ def _fixed_samples(job: Job) -> Traced:
         progress=job.progress,
     )
     frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
-    return Traced(frame, job.request.samples, _estimator(job).estimate(errors, job.request.samples))
+    return Traced(frame, job.request.samples, _make_estimator(job).estimate(errors, job.request.samples))
 
 
-def _in_rounds(job: Job) -> Traced:
+def _trace_in_rounds(job: Job) -> Traced:
     """As many samples as the goal needs, denoised if requested."""
-    batches = _batches(job)
+    batches = _make_batches(job)
     denoiser = None if job.request.denoise == "none" else job.denoiser
-    picture = batches if denoiser is None else _denoised(job, batches, denoiser)
-    goal = _timed_goal(job)
+    picture = batches if denoiser is None else _make_denoised(job, batches, denoiser)
+    goal = _start_goal(job)
     assessment = 0.0 if denoiser is None or goal.max_time is None else denoiser.probe(REQUEST.fewest)
     first = REQUEST.usual if denoiser is None else REQUEST.fewest
     outcome = reach(
         goal,
         batches,
         picture,
-        _estimator(job),
+        _make_estimator(job),
         first=first if job.request.is_open_ended else job.request.samples,
         slope=1.0 if denoiser is None else TUNING.denoised_slope,
         assessment=assessment,
@@ -223,10 +223,10 @@ def _in_rounds(job: Job) -> Traced:
         # The time is up after one sample, and denoising takes longer than what is left.
         picture, denoiser = batches, None
     notes = _end_notes(goal, outcome)
-    return _traced(job, batches, picture, denoiser, errors=outcome.errors, estimate=outcome.estimate, notes=notes)
+    return _assemble(job, batches, picture, denoiser, errors=outcome.errors, estimate=outcome.estimate, notes=notes)
 
 
-def _timed_goal(job: Job) -> Goal:
+def _start_goal(job: Job) -> Goal:
     """The goal of the request; its time begins with the request and includes the work after the last sample."""
     # Putting a picture together and writing it takes a tenth of a microsecond a pixel, as a rule.
     writing = 1e-7 * job.source.width * job.source.height
@@ -235,7 +235,7 @@ def _timed_goal(job: Job) -> Goal:
     return replace(goal_of(job.request), began=began, reserve=writing, part=part)
 
 
-def _traced(
+def _assemble(
     job: Job,
     batches: FullInBatches,
     picture: FullInBatches | Denoised,
@@ -253,7 +253,7 @@ def _traced(
     return traced if denoiser is None else _with_denoiser(traced, denoiser)
 
 
-def _batches(job: Job) -> FullInBatches:
+def _make_batches(job: Job) -> FullInBatches:
     source = job.sample_source
     return FullInBatches(
         job.integrator,
@@ -266,19 +266,19 @@ def _batches(job: Job) -> FullInBatches:
     )
 
 
-def _denoised_part(job: Job) -> Traced:
+def _denoise_part(job: Job) -> Traced:
     """A denoised tile with a fixed number of samples; its picture is assembled and assessed elsewhere."""
-    batches = _batches(job)
+    batches = _make_batches(job)
     batches.add(job.request.samples, job.progress)
-    picture = _denoised(job, batches, job.denoiser)
-    return _traced(job, batches, picture, job.denoiser, errors=picture.squared_error(), estimate=None)
+    picture = _make_denoised(job, batches, job.denoiser)
+    return _assemble(job, batches, picture, job.denoiser, errors=picture.squared_error(), estimate=None)
 
 
-def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Denoised:
+def _make_denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Denoised:
     return Denoised(batches, denoiser, job.request.coding, job.session.engine.threads, denoiser.coverage)
 
 
-def _estimator(job: Job) -> PictureEstimator:
+def _make_estimator(job: Job) -> PictureEstimator:
     """The error estimator of the picture, by micro-image for a display and by view for a quilt."""
     source = job.source
     parts: Display | Parts
@@ -294,7 +294,7 @@ def _estimator(job: Job) -> PictureEstimator:
     return PictureEstimator(parts, is_among_mirrors(job.session.choices))
 
 
-def _reused(job: Job) -> Traced:
+def _reproject(job: Job) -> Traced:
     request = job.request
     assert request.method in ("lens-view", "interpolated")
     assert isinstance(job.source, DisplayRays)
@@ -328,8 +328,8 @@ def denoise_whole(job: Job, traced: Traced) -> Traced:
     if frame.coverage is not None and (further := denoiser.coverage()) is not None:
         noisy = exchange_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)
     # The network runs once, not for each of two halves: its high effort is worth its time from half as many samples on.
-    cleaned = remove_excess(clean_light(noisy, frame.specular, denoiser, 2 * traced.samples), frame.excess)
-    frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
+    clean = remove_excess(clean_light(noisy, frame.specular, denoiser, 2 * traced.samples), frame.excess)
+    frame.pixels = source.own_colors(clean) if isinstance(source, SubpixelRays) else clean
     return _with_denoiser(traced, denoiser)
 
 

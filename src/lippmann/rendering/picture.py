@@ -69,7 +69,7 @@ def render_picture(
     display_from_world = placement.display_from_world
     source = DisplayRays(display, placement.world_from_display, bool(request.subpixels))
     integrator = session.integrator(source, display_from_world, placement.exposure)
-    window = traced_window(session, display, placement)
+    window = find_window(session, display, placement)
     part = source if window is None else WindowRays(source, window)
 
     traced = trace(Job(session, integrator, part, display_from_world))
@@ -92,7 +92,7 @@ def render_picture(
             **({"auto": request.reason} if request.reason else {}),
             **_reuse_options(request),
             **traced.options,
-            **placed_options(request, placement),
+            **describe_placement(request, placement),
         },
         estimate=traced.estimate,
         notes=(*placement.warnings, *lens_notes(display), *traced.notes),
@@ -125,10 +125,10 @@ def choose_exposure(scene: Scene, display: Display, request: RenderRequest, buil
     source = DisplayRays(display, placement.world_from_display, bool(session.request.subpixels))
     session.integrator(source, placement.display_from_world, placement.exposure)
     # A fixed exposure comes on top of the camera's own.
-    return cast("float", session.choices.get("exposure", 0.0)) - session.counted_exposure(placement.exposure)
+    return cast("float", session.choices.get("exposure", 0.0)) - session.count_exposure(placement.exposure)
 
 
-def traced_window(session: Session, display: Display, placement: Placement) -> PixelWindow | None:
+def find_window(session: Session, display: Display, placement: Placement) -> PixelWindow | None:
     """The window of pixels that can see the scene, if the others show an even background; None where all are traced.
 
     Only for denoised pictures: others may be rendered in tiles, and each pixel has the same samples then.
@@ -156,7 +156,7 @@ def _widen(frame: Frame, window: PixelWindow, display: Display, background: Colo
         frame.maps[name][window.slices] = values
 
 
-def placed_options(request: RenderRequest, placement: Placement) -> dict[str, object]:
+def describe_placement(request: RenderRequest, placement: Placement) -> dict[str, object]:
     """Metadata of pixel filter, tone mapping and placement."""
     return {
         "pixel_filter": request.pixel_filter,

@@ -61,7 +61,7 @@ def provenance_of(
         pixel_shares=frame.shares,
         rays={"primary": rays.primary, "shadow": rays.shadow, "secondary": rays.secondary},
         seconds=_stage_seconds(session.watch, frame),
-        estimate=stated_error(estimate, session.choices),
+        estimate=state_error(estimate, session.choices),
         options={**options, **session.choices, "plan": plan, "settings": _settings(session)},
         notes=(
             *session.notes,
@@ -113,7 +113,7 @@ def _frame_notes(frame: Frame) -> tuple[str, ...]:
     return (f"{frame.rays.discarded} samples were not finite and count as black",)
 
 
-def stated_error(estimate: Estimate | None, choices: Mapping[str, object]) -> dict[str, object] | None:
+def state_error(estimate: Estimate | None, choices: Mapping[str, object]) -> dict[str, object] | None:
     """The estimate as metadata; None where the samples miss light that their differences cannot reveal.
 
     Parameters

@@ -13,7 +13,7 @@ from lippmann.display import Display
 from lippmann.display.view_cone import view_window
 from lippmann.image.metadata import Provenance
 from lippmann.progress import ProgressCallback, silent
-from lippmann.rendering.picture import placed_options
+from lippmann.rendering.picture import describe_placement
 from lippmann.rendering.provenance import provenance_of
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
@@ -86,7 +86,7 @@ def render_quilt(
 
     traced = trace(Job(session, integrator, source, display_from_world))
     session.watch.seconds.update(traced.seconds)
-    traced.frame.pixels = _assembled(traced.frame.pixels, source, size, background)
+    traced.frame.pixels = _assemble(traced.frame.pixels, source, size, background)
     provenance = provenance_of(
         session,
         traced.frame,
@@ -95,7 +95,7 @@ def render_quilt(
             **traced.options,
             "views": [columns, rows],
             "window": list(astuple(source.window)),
-            **placed_options(request, placement),
+            **describe_placement(request, placement),
         },
         estimate=traced.estimate,
         notes=(*placement.warnings, *traced.notes),
@@ -103,7 +103,7 @@ def render_quilt(
     return QuiltFrame(session.request.tone_mapped(traced.frame.pixels), provenance)
 
 
-def _assembled(
+def _assemble(
     pixels: NDArray[np.float32], source: QuiltRays, size: tuple[int, int], background: Color | None
 ) -> NDArray[np.float32]:
     """The whole quilt: tiles of whole views, the background about their windows, and a black rest right and on top."""

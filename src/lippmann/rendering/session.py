@@ -209,7 +209,7 @@ class Session:
             return SplatIntegrator(integrator, built, built.splats, self.engine.threads)
         return integrator
 
-    def counted_exposure(self, own_exposure: float) -> float:
+    def count_exposure(self, own_exposure: float) -> float:
         """A camera's own exposure if the light is the scene file's; 0 for the studio's light."""
         scene = self.scene
         is_lit = scene.has_physical_lights or (scene.environment is not None and not scene.in_studio)
@@ -229,7 +229,7 @@ class Session:
             source,
             memory_limit(self.request),
             even_background(self.built, self.request),
-            own_exposure=self.counted_exposure(own_exposure),
+            own_exposure=self.count_exposure(own_exposure),
             stands_alone=not self.scene.lies_off_surfaces,
             weighs_emitters=isinstance(self.built, BuiltScene) and not self.built.borrowed,
         )

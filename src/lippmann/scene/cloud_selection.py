@@ -12,7 +12,7 @@ from lippmann.options.scene import Crop
 from lippmann.scene.matrices import scaling
 from lippmann.scene.point_clouds import crop_cloud, is_cloud
 from lippmann.scene.scene import Scene
-from lippmann.scene.splat_clouds import check_splats, cropped, moved
+from lippmann.scene.splat_clouds import check_splats, crop, moved
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import Splats
 from lippmann.scene.values.volume import TransferFunction, Volume
@@ -87,7 +87,7 @@ class SplatSelection:
             splats = moved(splats, scaling(self.unit_scale))
             check_splats(splats, scene.name)
         if self.crop is not None:
-            splats = _some(cropped(splats, np.array([self.crop[:3], self.crop[3:]])), "crop", scene.name)
+            splats = _some(crop(splats, np.array([self.crop[:3], self.crop[3:]])), "crop", scene.name)
         if self.min_opacity is not None:
             kept = splats.select(splats.opacities >= np.float32(self.min_opacity))
             splats = _some(kept, "min_opacity", scene.name)
@@ -175,7 +175,7 @@ class VolumeSelection:
             raise holds_none(scene, "volume", next(iter(asked)))
         volume = description.volume
         if self.crop is not None:
-            part = grid.cropped(volume, np.array([self.crop[:3], self.crop[3:]]))
+            part = grid.crop(volume, np.array([self.crop[:3], self.crop[3:]]))
             if part is None:
                 raise UsageError("leaves no voxel", where=scene.name, parameter="crop", fix="ask for less")
             volume = part

@@ -111,7 +111,7 @@ def _turned(harmonics: NDArray[np.float32], turn: Numbers) -> NDArray[np.float32
     return turned
 
 
-def cropped(splats: Splats, box: Numbers) -> Splats:
+def crop(splats: Splats, box: Numbers) -> Splats:
     """The splats whose centres lie in a box ``(2, 3)``."""
     return splats.select(((splats.centers >= box[0]) & (splats.centers <= box[1])).all(axis=1))
 

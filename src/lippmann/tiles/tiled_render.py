@@ -223,7 +223,7 @@ class _Counted:
 def _summed(prepared: Prepared, store: TileStore) -> Provenance:
     """Rays and the estimate from all tiles, in their order; each is checked on the way."""
     from lippmann.rendering.film.wavefront import Frame, RayTotals
-    from lippmann.rendering.picture import placed_options
+    from lippmann.rendering.picture import describe_placement
     from lippmann.tiles.tile_render import LENSES, OF_SAMPLES, SUMS
 
     job, grid = prepared.job, prepared.job.display.lens_grid
@@ -261,7 +261,7 @@ def _summed(prepared: Prepared, store: TileStore) -> Provenance:
         options={
             **({"auto": job.request.reason} if job.request.reason else {}),
             **prepared.options,
-            **placed_options(job.request, prepared.placement),
+            **describe_placement(job.request, prepared.placement),
         },
         notes=tuple(notes),
         has_pixels=False,

@@ -34,7 +34,7 @@ class Noise:
     of_excess = None
     covered = None
 
-    def displayed(self, values):
+    def to_display(self, values):
         return values
 
     def specular(self):
@@ -49,10 +49,10 @@ class Noise:
     def picture(self):
         return self._halves[0]
 
-    def traced_picture(self):
+    def average_samples(self):
         return self._halves[0]
 
-    def traced_halves(self):
+    def average_halves(self):
         return tuple(self._halves)
 
     def coverage_halves(self):
@@ -102,7 +102,7 @@ def test_noise_that_both_halves_share_would_not_be_seen_but_theirs_is_their_own(
     """The judge of a half is the other one: a denoiser that does nothing is told its whole noise."""
     renderer = Noise()
     told = Denoised(renderer, lambda picture, *_: picture, "srgb").squared_error()
-    noise = true_error(np.mean(renderer.traced_halves(), axis=0), renderer.truth)
+    noise = true_error(np.mean(renderer.average_halves(), axis=0), renderer.truth)
     assert float(told.values.mean()) == pytest.approx(noise, rel=0.2)
 
 
@@ -112,7 +112,7 @@ def test_what_the_curve_takes_off_rare_light_is_told(coding, monkeypatch):
     random = np.random.default_rng(3)
     renderer = Noise()
     halves = tuple(renderer.truth * random.gamma(1, 1, (*SHAPE[:2], 1)).astype(np.float32) for _ in range(2))
-    monkeypatch.setattr(renderer, "traced_halves", lambda: halves)
+    monkeypatch.setattr(renderer, "average_halves", lambda: halves)
     denoised = Denoised(renderer, lambda picture, *_: picture, coding)
     codes = (encode(picture.astype(float), coding) for picture in (denoised.picture(), renderer.truth))
     true = np.square(np.subtract(*codes)).mean()
@@ -133,8 +133,8 @@ def test_what_the_halves_differ_by_is_known():
 def test_seen_light_goes_past_the_denoiser(as_denoised):
     """A highlight of one pixel, which a blur would wipe out."""
     renderer = Noise()
-    highlights = [np.zeros_like(half) for half in renderer.traced_halves()]
-    for light, half, strength in zip(highlights, renderer.traced_halves(), (5.0, 5.4), strict=True):
+    highlights = [np.zeros_like(half) for half in renderer.average_halves()]
+    for light, half, strength in zip(highlights, renderer.average_halves(), (5.0, 5.4), strict=True):
         light[100, 100] = strength
         half += light
     given = []
@@ -154,12 +154,12 @@ def test_seen_light_goes_past_the_denoiser(as_denoised):
 
 def test_what_rests_on_single_chains_is_left_out_and_still_counts_as_an_error():
     renderer = Noise()
-    hits = [np.zeros_like(half) for half in renderer.traced_halves()]
-    for hit, half in zip(hits, renderer.traced_halves(), strict=True):
+    hits = [np.zeros_like(half) for half in renderer.average_halves()]
+    for hit, half in zip(hits, renderer.average_halves(), strict=True):
         hit[50, 50] = 0.25
         half += hit
     hits[0][100, 100] = 3.0
-    renderer.traced_halves()[0][100, 100] += 3.0
+    renderer.average_halves()[0][100, 100] += 3.0
     renderer.of_seen = tuple(hits)
     before = Denoised(renderer, blur, "srgb")
     whole = before.picture()
@@ -182,9 +182,9 @@ def test_what_rests_on_single_chains_is_left_out_and_still_counts_as_an_error():
 def test_an_emitter_in_a_narrow_lobe_does_not_light_the_pixels_beside_it():
     """A mirrored emitter of which a tenth is not sharp; beside it something bright that is not seen light at all."""
     renderer = Noise()
-    rest = [half.copy() for half in renderer.traced_halves()]
+    rest = [half.copy() for half in renderer.average_halves()]
     emitters = [np.zeros_like(half) for half in rest]
-    for light, half in zip(emitters, renderer.traced_halves(), strict=True):
+    for light, half in zip(emitters, renderer.average_halves(), strict=True):
         light[100, 100] = 300.0
         half[100, 100] += 330.0
         half[50, 50] += 30.0
@@ -201,7 +201,7 @@ def test_an_emitter_in_a_narrow_lobe_does_not_light_the_pixels_beside_it():
         assert displayed[50, 50] == pytest.approx(8.0)
         displayed[100, 100] = displayed[50, 50] = half[100, 100] = half[50, 50] = 0
         assert displayed == pytest.approx(half)
-    expected = np.mean(renderer.traced_halves(), axis=0)
+    expected = np.mean(renderer.average_halves(), axis=0)
     assert picture == pytest.approx(expected)
 
 
@@ -210,7 +210,7 @@ def test_one_path_that_happens_upon_an_emitter_does_not_light_the_pixels_beside_
     renderer = Noise()
     renderer.samples = samples
     without = Denoised(renderer, blur, "srgb").picture()
-    renderer.traced_halves()[0][50, 50] += 3000.0
+    renderer.average_halves()[0][50, 50] += 3000.0
     beside = Denoised(renderer, blur, "srgb").picture() - without
     assert 0 < beside[50, 51].max() < 1
 
@@ -220,9 +220,9 @@ def test_what_is_still_far_beyond_white_without_its_noise_is_as_bright_as_the_sa
     """An emitter that fills pixels, and not the same for both halves."""
     renderer = Noise()
     renderer.samples = samples
-    for value, half in zip((290.0, 310.0), renderer.traced_halves(), strict=True):
+    for value, half in zip((290.0, 310.0), renderer.average_halves(), strict=True):
         half[40:60, 40:60] = value
-    displayed = renderer.traced_picture() if samples == 1 else np.mean(renderer.traced_halves(), axis=0)
+    displayed = renderer.average_samples() if samples == 1 else np.mean(renderer.average_halves(), axis=0)
     picture = Denoised(renderer, blur, "srgb").picture()
     assert picture[45:55, 45:55] == pytest.approx(displayed[45:55, 45:55])
 
@@ -233,7 +233,7 @@ def test_a_pixel_that_both_halves_hit_hard_does_not_hide_what_is_wrong_elsewhere
     renderer = Noise()
     renderer.samples = samples
     clear = float(Denoised(renderer, lambda p, *_: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
-    for half in renderer.traced_halves():
+    for half in renderer.average_halves():
         half[100, 100] += 15
     told = float(Denoised(renderer, lambda p, *_: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
     assert (told > 2 * clear) == hidden

@@ -50,8 +50,8 @@ def test_own_colours_are_those_that_sub_pixels_have_alone(integrator, order, win
         batches.add(5)
     assert alone.picture().std() > 0.05
     assert together.picture() == pytest.approx(alone.picture(), rel=1e-5, abs=1e-6)
-    for half, other in zip(together.traced_halves(), alone.traced_halves(), strict=True):
-        assert together.displayed(half) == pytest.approx(other, rel=1e-5, abs=1e-6)
+    for half, other in zip(together.average_halves(), alone.average_halves(), strict=True):
+        assert together.to_display(half) == pytest.approx(other, rel=1e-5, abs=1e-6)
     assert together.squared_error().values == pytest.approx(alone.squared_error().values, rel=1e-3, abs=1e-6)
     assert together.rays == alone.rays
 
@@ -77,7 +77,7 @@ def test_a_denoiser_is_given_all_colours(integrator, as_denoised):
     one, *halves = given
     assert turns == [False, False, True]
     assert one.shape == halves[0].shape == (64, 288, 3)
-    for half, traced in zip(halves, batches.traced_halves(), strict=True):
+    for half, traced in zip(halves, batches.average_halves(), strict=True):
         assert half == pytest.approx(traced)
     # All colours of a sub-pixel are there, not only its own.
     assert (one.reshape(-1, 3).max(axis=0) > 0).all()

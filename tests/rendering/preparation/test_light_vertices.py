@@ -80,8 +80,8 @@ def batches(integrator, source, memory=1 << 30, spp=16, seed=5):
 
 def test_a_small_emitter_beside_a_wall_is_worth_it():
     integrator, source = stage(room(small()))
-    joined = batches(given(integrator, source), source).traced_halves()
-    plain = batches(integrator, source).traced_halves()
+    joined = batches(given(integrator, source), source).average_halves()
+    plain = batches(integrator, source).average_halves()
     noise = [np.square(np.clip(a, 0, 1) - np.clip(b, 0, 1)).mean() for a, b in (joined, plain)]
     assert noise[0] < 0.4 * noise[1]
 
@@ -129,7 +129,7 @@ def test_passes_serve_their_samples_and_pictures_do_not_depend_on_the_memory(mon
     assert sorted(set(served)) == [0, 1, 2, 3]
     again = batches(integrator, source, memory=1 << 21)
     assert whole.picture() == pytest.approx(again.picture(), rel=1e-5)
-    a, b = whole.traced_halves()
+    a, b = whole.average_halves()
     assert not np.array_equal(a, b)
 
 

@@ -235,7 +235,7 @@ def test_chains_count_as_rays_and_depend_on_the_seed_alone(all_events):
     lanes = SIDE * SIDE * 8
     assert whole.rays.primary == plain.rays.primary == lanes
     assert whole.rays.secondary - plain.rays.secondary >= 4 * lanes
-    a, b = whole.traced_halves()
+    a, b = whole.average_halves()
     assert not np.array_equal(a, b)
 
 

@@ -11,7 +11,7 @@ from lippmann.errors import LippmannError, SceneError, UsageError
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.volume import TransferFunction, Volume
-from lippmann.scene.volumes.grid import cropped, visible_corners
+from lippmann.scene.volumes.grid import crop, visible_corners
 from lippmann.scene.volumes.presets import PRESETS, automatic, preset
 from lippmann.scene.volumes.transfer_file import read_transfer_function
 
@@ -106,7 +106,7 @@ def test_a_box_keeps_the_voxels_in_it():
     assert kept.size == (2, 6, 2)
     assert kept.world_from_voxel[:3, 3].tolist() == [1, 0, 2]
     oblique = Volume(kept.grid, np.array([[0.8, -0.6, 0, 0], [0.6, 0.8, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]), RAMP)
-    assert cropped(oblique, np.array([[-99, -99, -99], [99, 99, 99.0]])).size == oblique.size
+    assert crop(oblique, np.array([[-99, -99, -99], [99, 99, 99.0]])).size == oblique.size
 
 
 def test_the_scene_is_as_large_as_what_can_be_seen():

@@ -123,11 +123,11 @@ class Denoised:
         return mean
 
     def _clean_picture(self) -> Floats:
-        noisy, coverage = self._renderer.traced_picture(), self._coverages()
+        noisy, coverage = self._renderer.average_samples(), self._coverages()
         if coverage is not None:
             (paths, further), (more_paths, more_further) = coverage
             noisy = exchange_coverage(noisy, paths + more_paths, further + more_further, threads=self._threads)
-        return self._renderer.displayed(
+        return self._renderer.to_display(
             clean_light(noisy, self._renderer.specular(), self._denoise, self._renderer.samples)
         )
 
@@ -137,19 +137,19 @@ class Denoised:
             traced, specular = self._noisy_halves(), self._renderer.specular_halves() or (None, None)
             with keep_memory():
                 first, second = (
-                    self._renderer.displayed(
+                    self._renderer.to_display(
                         clean_light(traced[k], specular[k], self._denoise, self._renderer.samples, turned=k == 1)
                     )
                     for k in (0, 1)
                 )
-            noisy = self._renderer.displayed(traced[0]), self._renderer.displayed(traced[1])
+            noisy = self._renderer.to_display(traced[0]), self._renderer.to_display(traced[1])
             own = weigh_samples(noisy, (first, second), self._coding, threads=self._threads)
             self._halves = noisy, (first + own * (noisy[0] - first), second + own * (noisy[1] - second))
         return self._halves
 
     def _noisy_halves(self) -> tuple[Floats, Floats]:
         """The noisy half-buffers, with the coverage of all rays at outlines."""
-        halves, coverage = self._renderer.traced_halves(), self._coverages()
+        halves, coverage = self._renderer.average_halves(), self._coverages()
         if coverage is None:
             return halves
         threads = self._threads

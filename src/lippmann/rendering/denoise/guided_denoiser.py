@@ -104,12 +104,12 @@ class GuidedDenoiser:
         if self._shares and isinstance(self._source, QuiltRays):
             pixels = share_views(pixels, self._source, guides)
         # The network overshoots below black beside bright edges.
-        cleaned = np.maximum(self._cleaned(pixels, guides, turned), np.float32(0))
+        clean = np.maximum(self._denoise_tiles(pixels, guides, turned), np.float32(0))
         if self._shares and not isinstance(self._source, QuiltRays):
-            cleaned = self._share(cleaned)
+            clean = self._share(clean)
         self._progress(Progress("denoise", 1, 1))
         self.seconds += time.perf_counter() - started
-        return cleaned
+        return clean
 
     def _share(self, clean: Floats) -> Floats:
         """A denoised picture with the light shared between its micro-images."""
@@ -141,7 +141,7 @@ class GuidedDenoiser:
         denoise(small, small, small, clean_guides=True, effort=effort, threads=self._threads)
         return TUNING.runs * (time.perf_counter() - started) * self._source.width * self._source.height / side**2
 
-    def _cleaned(self, pixels: Floats, guides: Guides, turned: bool) -> Floats:
+    def _denoise_tiles(self, pixels: Floats, guides: Guides, turned: bool) -> Floats:
         source = self._source
         if not self._surfaces:
             self._surfaces = [SurfacePart.of(guides.normal[tile]) for tile in source.tiles()]
@@ -199,7 +199,7 @@ class SurfacePart:
         """The part with all surfaces of a picture, by its normals ``(H, W, 3)``, 0 off surfaces; None without any."""
         is_surface = (normal[..., 0] != 0) | (normal[..., 1] != 0) | (normal[..., 2] != 0)
         place = _rectangle(is_surface)
-        return None if place is None else SurfacePart(place, _widened(is_surface[place])[..., None])
+        return None if place is None else SurfacePart(place, _widen(is_surface[place])[..., None])
 
 
 def denoise_surfaces(
@@ -222,14 +222,14 @@ def denoise_surfaces(
     place = surfaces.place
     images = color[place], albedo[place], normal[place]
     # Guides follow mirrors and glass deterministically, so they are noisy along edges alone.
-    cleaned = denoise(*images, clean_guides=True, effort=effort, turned=turned, threads=threads)
+    clean = denoise(*images, clean_guides=True, effort=effort, turned=turned, threads=threads)
     # Copied after the network, whose memory is the largest.
     result = np.array(color, dtype=np.float32)
-    np.copyto(result[place], cleaned, where=surfaces.near)
+    np.copyto(result[place], clean, where=surfaces.near)
     return result
 
 
-def _widened(is_surface: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _widen(is_surface: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """The mask dilated by one pixel: guides of few samples miss edges that barely reach into a pixel."""
     for axis in (0, 1):
         lines = np.swapaxes(is_surface, 0, axis)

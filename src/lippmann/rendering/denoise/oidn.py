@@ -87,16 +87,16 @@ def denoise(
     load_denoiser()
     height, width = images["color"].shape[:2]
     if turned:
-        images = {name: _turned(images.pop(name)) for name in list(images)}  # frees each unturned image
+        images = {name: _rotate(images.pop(name)) for name in list(images)}  # frees each unturned image
     # One device serves one filter at a time, and its threads do not survive a fork.
     with exclusive():
-        result = _filtered(images, options, threads or machine.usable_cores())
+        result = _filter_images(images, options, threads or machine.usable_cores())
     if not turned:
         return result
     return np.ascontiguousarray(result[-height:, -width:][::-1, ::-1])
 
 
-def _turned(image: FloatArray) -> FloatArray:
+def _rotate(image: FloatArray) -> FloatArray:
     """The image rotated by 180 degrees and padded to whole steps of the network by reflection.
 
     So the network groups the same pixels as without rotation. Repeated pixels would look like an object to it.
@@ -158,7 +158,7 @@ def denoiser_version() -> str | None:
 _devices: dict[int | None, library.Device] = {}
 
 
-def _filtered(images: dict[str, FloatArray], options: Mapping[str, float], threads: int) -> FloatArray:
+def _filter_images(images: dict[str, FloatArray], options: Mapping[str, float], threads: int) -> FloatArray:
     """Output of a filter for ``images``, packed ``(H, W, 3)``, by the filter's input names.
 
     Falls back to the CPU where the GPU fails, for example for lack of memory.
@@ -188,7 +188,7 @@ def _on_cpu(images: dict[str, FloatArray], options: Mapping[str, float], threads
 
 
 def _on_gpu(images: dict[str, FloatArray], options: Mapping[str, float]) -> FloatArray:
-    """As :func:`_filtered`, on copies in the memory of the GPU."""
+    """As :func:`_filter_images`, on copies in the memory of the GPU."""
     output = np.empty_like(next(iter(images.values())))
     device = _device(None, library.DEVICE_TYPE_CUDA)
     with ExitStack() as stack:

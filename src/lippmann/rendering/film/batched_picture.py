@@ -102,23 +102,23 @@ class BatchedPicture:
 
     def picture(self) -> Floats:
         """``(H, W, 3)`` float32: the mean of all samples, linear; black where there are none."""
-        return self.displayed(self.traced_picture())
+        return self.to_display(self.average_samples())
 
-    def traced_picture(self) -> Floats:
-        """:meth:`picture` with all that is traced of it, see :meth:`displayed`."""
+    def average_samples(self) -> Floats:
+        """:meth:`picture` with all that is traced of it, see :meth:`to_display`."""
         return self._mean(self._sums)
 
-    def traced_halves(self) -> tuple[Floats, Floats]:
+    def average_halves(self) -> tuple[Floats, Floats]:
         """Half-buffers A and B: the means of either stream, of all that is traced."""
         per_stream = self._batches_of_stream
         return self._means([self._sums[s * per_stream : (s + 1) * per_stream].sum(axis=0) for s in range(STREAMS)])
 
     def specular_halves(self) -> tuple[Floats, Floats] | None:
-        """The specular light in :meth:`traced_halves`; None where it is not kept."""
+        """The specular light in :meth:`average_halves`; None where it is not kept."""
         return None if self._specular is None else self._means(list(self._specular))
 
     def specular(self) -> Floats | None:
-        """The specular light in :meth:`traced_picture`; None where it is not kept."""
+        """The specular light in :meth:`average_samples`; None where it is not kept."""
         return None if self._specular is None else self._mean(self._specular)
 
     def coverage_halves(self) -> tuple[Coverage, Coverage] | None:
@@ -130,7 +130,7 @@ class BatchedPicture:
 
     def excess(self) -> Floats | None:
         """The light of :meth:`picture` above the clamp on its specular chains; None where it is not kept."""
-        return None if self._excess is None else self.displayed(self._mean(self._excess))
+        return None if self._excess is None else self.to_display(self._mean(self._excess))
 
     def _mean(self, sums: Floats) -> Floats:
         """Mean of all samples from partial ``sums``."""
@@ -162,7 +162,7 @@ class BatchedPicture:
         if self.samples < STREAMS:
             raise UsageError("one sample per pixel does not tell its own error", rule="two or more do")
         if self._errors is None:
-            error, outliers = error_of_batches(self.displayed(self._sums), self._taken, self._coding)
+            error, outliers = error_of_batches(self.to_display(self._sums), self._taken, self._coding)
             shape = self.shape[0], -1
             error = error.reshape(shape)
             blur = self.squared_blur()
@@ -179,10 +179,10 @@ class BatchedPicture:
         if self._blur_after is None:
             return None
         slope = coding_slope(self.picture(), self._coding)
-        blur: Floats = (np.square(slope) * self.displayed(self._blur_after(self.samples))).mean(axis=-1)
+        blur: Floats = (np.square(slope) * self.to_display(self._blur_after(self.samples))).mean(axis=-1)
         return blur
 
-    def displayed(self, values: Floats) -> Floats:
+    def to_display(self, values: Floats) -> Floats:
         """The display's pixels from traced values ``(..., W, 3)``."""
         return values
 
@@ -278,7 +278,7 @@ class _Batches:
         """Squared difference between the two streams, less the mean of that between halves that mix both."""
         streams, _ = self._difference(range(len(self.sums) // 2))
         mixed, number = mi.Float(0), mi.Float(0)
-        for split in _mixed_halves(len(self.sums)):
+        for split in _mix_halves(len(self.sums)):
             difference, known = self._difference(split)
             mixed += difference
             number += dr.select(known, mi.Float(1), mi.Float(0))
@@ -300,7 +300,7 @@ class _Batches:
         return dr.select(known, size, 0), known
 
 
-def _mixed_halves(batches: int) -> list[tuple[int, ...]]:
+def _mix_halves(batches: int) -> list[tuple[int, ...]]:
     """Halves of the batches with equal parts of both streams, orthogonal to each other (Walsh functions)."""
     if batches == 2:
         return []

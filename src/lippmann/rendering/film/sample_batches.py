@@ -134,7 +134,7 @@ class FullInBatches(BatchedPicture):
         self.seconds_compile += compiled
         self.seconds_trace += time.perf_counter() - started - compiled
 
-    def displayed(self, values: Floats) -> Floats:
+    def to_display(self, values: Floats) -> Floats:
         """``(..., H, W, 3)``; of sub-pixels whose rays keep all colours, ``(..., H, 3 W, 3)``, each its own colour."""
         return self._source.own_colors(values) if isinstance(self._source, SubpixelRays) else values
 

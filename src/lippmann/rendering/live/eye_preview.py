@@ -14,7 +14,7 @@ from lippmann.options.choices import POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.film.memory_model import cut_wavefronts
-from lippmann.rendering.picture import placed_options
+from lippmann.rendering.picture import describe_placement
 from lippmann.rendering.preview import Preview
 from lippmann.rendering.provenance import provenance_of
 from lippmann.rendering.request.plan import resolve
@@ -99,7 +99,7 @@ def render_eye_preview(
         session,
         frame,
         samples=samples,
-        options={"eye": list(eye), **options, **placed_options(resolved, placement)},
+        options={"eye": list(eye), **options, **describe_placement(resolved, placement)},
         notes=placement.warnings,
     )
     return Preview(resolved.tone_mapped(picture), provenance)

@@ -117,7 +117,7 @@ class Progressive:
             halves = (sums / np.float32(self._taken) for sums in self._sums)
             first, second = (self._pixels.arrange_for_denoiser(half) for half in halves)
             threads = self._kernels.session.engine.threads
-            self._task = _denoised((first, second), (albedo, normal), self.samples, threads)
+            self._task = _denoise_halves((first, second), (albedo, normal), self.samples, threads)
         picture = next(self._task)
         seconds["denoise"] = time.perf_counter() - started
         if picture is None:
@@ -130,7 +130,7 @@ class Progressive:
         return LiveFrame(pixels, self.samples, is_denoised, self._view.placement, self._exposure, seconds)
 
 
-def _denoised(
+def _denoise_halves(
     noisy: tuple[Floats, Floats], guides: tuple[Floats, Floats], samples: int, threads: int
 ) -> Iterator[Floats | None]:
     """Short steps of denoising, the last of which yields the picture.

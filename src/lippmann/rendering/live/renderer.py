@@ -137,13 +137,13 @@ class LiveRenderer:
         for start in range(0, count, step):
             if start:
                 yield None
-            with exclusive(), _timed(seconds, "trace"):
+            with exclusive(), _time_stage(seconds, "trace"):
                 stand.light_up(exposure)
                 lanes = Lanes(stand.pixels, slice(start, start + step))
                 traced = tracer.trace(lanes, stand.placed, seed=stand.request.seed)
                 values[lanes.part], heights[lanes.part] = traced.sums[0], traced.height
         self._latest, self._height = stand, heights
-        with _timed(seconds, "encode"):
+        with _time_stage(seconds, "encode"):
             codes = develop(values, stand.pixels, stand.request)
             if view.eye is None and view.row_step > 1:
                 height = display.panel.height if view.window is None else view.window.height
@@ -241,12 +241,12 @@ class LiveRenderer:
             raise UsageError(
                 "cannot change", parameter="light_strength", rule="spots with a radius keep their strength"
             )
-        with _timed(seconds, "place"):
+        with _time_stage(seconds, "place"):
             resolved = resolve(request, kernels.session.scene, display)
             placement = kernels.place(display, resolved)
             kernels.light(view.light, rotation_of(placement.world_from_display))
             placed = PlacedDisplay(placement.world_from_display)
-        with _timed(seconds, "map"):
+        with _time_stage(seconds, "map"):
             subpixels = bool(resolved.subpixels)
             if view.eye is None:
                 pixels = self._window(display, view.window, subpixels=subpixels, row_step=view.row_step)
@@ -288,7 +288,7 @@ def _plain(request: RenderRequest, integrator: str, depth: int | None) -> Render
 
 
 @contextmanager
-def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+def _time_stage(seconds: dict[str, float], stage: str) -> Iterator[None]:
     started = time.perf_counter()
     yield
     seconds[stage] = seconds.get(stage, 0.0) + time.perf_counter() - started

@@ -109,7 +109,7 @@ class SceneKernels:
                 self._exposure = measure_exposure(plain, source, background, self.session.memory, request.seed)
             exposure = self._exposure
         else:
-            exposure += self.session.counted_exposure(placement.exposure)
+            exposure += self.session.count_exposure(placement.exposure)
         gain, clamp = gain_of(exposure), request.clamp_indirect
         most_indirect = None if clamp is None else dr.opaque(mi.Float, clamp / gain)
         light = PreparedLight(sampler, dr.opaque(mi.Float, gain), most_indirect)

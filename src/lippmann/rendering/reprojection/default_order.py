@@ -49,7 +49,7 @@ class DefaultOrder:
         self._make(odd)
         if len(even.targets):
             self._warp.receive(even)
-            average_neighbors(self._points, self._field, self._queued(), self._rules, self._bands)
+            average_neighbors(self._points, self._field, self._find_queued(), self._rules, self._bands)
             self._trace_queued()
 
     def correct(self) -> None:
@@ -63,7 +63,7 @@ class DefaultOrder:
         for row in range(len(status)):
             # Probes of all micro-images, also of those that are not made here.
             status[row, self._warp.probes(row)] = QUEUED
-        self._tracer.trace(self._queued(), self._points)
+        self._tracer.trace(self._find_queued(), self._points)
         is_key = np.isin(np.arange(len(field.center)), keys)
         status[is_key[field.lens] & (status == MISSED)] = QUEUED
         self._trace_queued()
@@ -73,13 +73,13 @@ class DefaultOrder:
             self._trace_queued()
             self._warp.finish(step.targets)
 
-    def _queued(self) -> Pixels:
+    def _find_queued(self) -> Pixels:
         return np.flatnonzero(self._points.status == QUEUED).astype(np.uint32)
 
     def _trace_queued(self) -> None:
         """Trace some of the queued pixels, bridge the others, and trace those that careful rules do not bridge."""
         arguments = self._points, self._field.lens, self._rules
         self._bands.lines(thin_out, len(self._points.status), *arguments)
-        self._tracer.trace(self._queued(), self._points)
+        self._tracer.trace(self._find_queued(), self._points)
         self._bands.lines(bridge, len(self._points.status), *arguments)
-        self._tracer.trace(self._queued(), self._points)
+        self._tracer.trace(self._find_queued(), self._points)

@@ -63,16 +63,16 @@ class PaperOrder:
             _carry(self._points, self._beside, self._field, self._of_column(column - 1), 1)
             if column + 1 < columns:
                 _carry(self._points, self._beside, self._field, self._of_column(column + 1), -1)
-        average_neighbors(self._points, self._field, self._missed(even), _ANY_COLOR, self._bands)
-        self._tracer.trace(self._missed(even), self._points)
+        average_neighbors(self._points, self._field, self._find_missed(even), _ANY_COLOR, self._bands)
+        self._tracer.trace(self._find_missed(even), self._points)
 
     def _pass_on(self, columns: range, step: int) -> None:
         for column in columns:
             if column >= step:
                 _carry(self._points, self._beside, self._field, self._of_column(column - step), step)
-            self._tracer.trace(self._missed(range(column, column + 1)), self._points)
+            self._tracer.trace(self._find_missed(range(column, column + 1)), self._points)
 
-    def _missed(self, columns: range) -> Pixels:
+    def _find_missed(self, columns: range) -> Pixels:
         status = self._points.status.ravel()
         parts = [numbers[status[numbers] == MISSED] for numbers in map(self._of_column, columns)]
         return np.concatenate(parts) if parts else np.empty(0, dtype=np.uint32)

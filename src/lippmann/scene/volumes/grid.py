@@ -88,7 +88,7 @@ def moved(volume: Volume, matrix: Numbers) -> Volume:
     return replace(volume, world_from_voxel=np.asarray(matrix, np.float64) @ volume.world_from_voxel)
 
 
-def cropped(volume: Volume, box: Numbers) -> Volume | None:
+def crop(volume: Volume, box: Numbers) -> Volume | None:
     """The smallest block of the grid with all voxels whose middle lies in a box ``(2, 3)``; None if there are none.
 
     Where the grid's axes run along the world's, it holds no others.
