@@ -82,6 +82,8 @@ def test_physically_based_statements_win(material):
         ("newmtl m\nTr 1\nnewmtl n\nTr 0.25\n", [1.0, 0.25]),  # one library speaks one language
         ("newmtl m\nTr 1\nnewmtl n\nTr 0\nnewmtl o\nTr 0\n", [0.0, 1.0, 1.0]),
         ("# Converted by Meshlab Group\nnewmtl m\nTr 0.25\n", [0.25]),
+        ("# Converted by Meshlab Group\nnewmtl m\nTr 0\n", [1.0]),  # since its version 2023.12
+        ("# Converted by Meshlab Group\nnewmtl m\nTr 0\nnewmtl n\nTr 0.25\n", [1.0, 0.75]),
     ],
 )
 def test_tr_is_what_its_writer_means(tmp_path, library, opacities):

@@ -126,7 +126,7 @@ def parse_mtl(path: Path) -> dict[str, MtlRecord]:
             raise SceneError(f"'{words[0][:40]}' before any newmtl", where=where, fix="is it an MTL file?")
         else:
             _read_statement(current, _ALIASES.get(key, key), words[0], body, where)
-    if _MESHLAB in text or _tr_is_opacity(records.values()):
+    if _tr_is_opacity(records.values(), is_of_meshlab=_MESHLAB in text):
         for record in records.values():
             if "tr" in record.numbers:
                 record.numbers.setdefault("d", record.numbers.pop("tr"))
@@ -134,14 +134,15 @@ def parse_mtl(path: Path) -> dict[str, MtlRecord]:
     return commented | records
 
 
-def _tr_is_opacity(records: Iterable[MtlRecord]) -> bool:
-    """Whether ``Tr`` says how opaque the materials of a library are, as with MeshLab, rather than how transparent.
+def _tr_is_opacity(records: Iterable[MtlRecord], *, is_of_meshlab: bool) -> bool:
+    """Whether ``Tr`` says how opaque the materials of a library are, rather than how transparent.
 
     Nobody writes a library of invisible materials: 1 means opaque where it is more frequent than 0. Glass, which is
-    seen with either, has no say.
+    seen with either, has no say. MeshLab wrote opacities before its version 2023.12, and those are taken where its
+    materials have neither 0 nor 1, or both alike.
     """
     values = [record.scalar("tr", 0.0) for record in records if _only_tr(record) and not record.is_glass_model]
-    return values.count(1.0) > values.count(0.0)
+    return values.count(1.0) + is_of_meshlab > values.count(0.0)
 
 
 def _only_tr(record: MtlRecord) -> bool:
