@@ -97,6 +97,8 @@ def workplace(tmp_path, monkeypatch, moving_ball, fake_bridge):
     for number in range(3):
         Image.new("RGB", (80, 60), (50 + 50 * number,) * 3).save(tmp_path / "photos" / f"IMG_{number}.jpg")
     Image.new("RGB", (32, 24), (200, 120, 60)).save(tmp_path / "photo.png")
+    eyes = [Image.new("RGB", (320, 256), (level, 120, 60)) for level in (200, 100)]
+    eyes[0].save(tmp_path / "photo.mpo", save_all=True, append_images=eyes[1:])
     np.save(tmp_path / "photo-depth.npy", np.where(np.arange(32) < 16, 1.0, 3.0) * np.ones((24, 1)))
     shutil.copytree(moving_ball.parent, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)

@@ -109,6 +109,19 @@ def test_our_own_reader_knows_the_eyes(lippmann, balls, tmp_path):
     assert "2x1 of 240x270 pixels, aspect 1.77778" in lippmann("info", bare).out
 
 
+def test_a_photographed_pair_becomes_a_pair_for_a_monitor(lippmann, tmp_path):
+    left, right = (Image.new("RGB", (320, 256), color) for color in ("red", "blue"))
+    left.save(tmp_path / "seen.mpo", save_all=True, append_images=[right])
+    done = lippmann("quilt", "pack", tmp_path / "seen.mpo", "-o", tmp_path / "seen_2x1.png")
+    assert done.code == 0, done.err
+    with Image.open(tmp_path / "seen_2x1.png") as made:
+        assert made.size == (640, 256)
+        assert made.getpixel((100, 100))[0] > 240 > 20 > made.getpixel((100, 100))[2]
+        assert made.getpixel((500, 100))[2] > 240 > 20 > made.getpixel((500, 100))[0]
+    done = lippmann("quilt", "pack", tmp_path / "seen.mpo", "-o", tmp_path / "seen_qs3x1a1.png")
+    assert (done.code, "the name says 3x1" in done.err) == (2, True)
+
+
 def test_a_film_holds_both_eyes(lippmann, balls, tmp_path):
     import av
 

@@ -15,6 +15,7 @@ from lippmann.image import PictureFile, encoding
 from lippmann.quilts import files as quilt_files
 from lippmann.quilts.files import is_quilt, read_quilt, read_views, write_quilt, write_views
 from lippmann.quilts.quilt import Quilt, QuiltLayout
+from lippmann.viewing.stereo import write_pair
 
 LAYOUT = QuiltLayout(8, 6, 0.75)
 SIZE = (48, 64)
@@ -349,3 +350,42 @@ def test_large_jpegs_are_read_without_a_warning(tmp_path, monkeypatch):
     Image.new("RGB", (512, 256)).save(path)
     assert read_quilt(path).view_size == (128, 128)
     assert Image.MAX_IMAGE_PIXELS == 10_000
+
+
+@pytest.fixture
+def pair(tmp_path):
+    """A stereo pair that Pillow wrote, and its left and right view."""
+    views = np.kron(np.random.default_rng(5).integers(0, 256, (2, 32, 40, 3)), np.ones((1, 8, 8, 1))).astype(np.uint8)
+    left, right = (Image.fromarray(view) for view in views)
+    path = tmp_path / "pair.mpo"
+    left.save(path, save_all=True, append_images=[right], quality=95, subsampling=0)
+    return path, views
+
+
+def test_a_pair_in_one_file_is_a_quilt_of_two_views(pair):
+    path, views = pair
+    assert is_quilt(path)
+    quilt = read_quilt(path)
+    assert quilt.layout == QuiltLayout(2, 1, None)
+    for number, view in enumerate(views):
+        assert np.abs(quilt.view_values(number).astype(int) - view).mean() < 4
+
+
+def test_a_crossed_pair_is_turned_round(pair, tmp_path):
+    _, views = pair
+    codes = np.concatenate(list(views), axis=1) / np.float32(255)
+    write_pair(codes.astype(np.float32), tmp_path / "pair.jps", "full", "linear")
+    quilt = read_quilt(tmp_path / "pair.jps")
+    # The file itself has the right eye's picture on the left.
+    crossed = np.asarray(Image.open(tmp_path / "pair.jps"))
+    assert np.abs(crossed[:, :320].astype(int) - views[1]).mean() < 4
+    assert np.abs(quilt.view_values(0).astype(int) - views[0]).mean() < 4
+
+
+def test_two_pictures_that_nothing_calls_a_pair_are_none(tmp_path):
+    pillow_heif = pytest.importorskip("pillow_heif")
+    file = pillow_heif.from_pillow(Image.new("RGB", (320, 256)))
+    file.add_from_pillow(Image.new("RGB", (320, 256)))
+    file.save(tmp_path / "two.heic")
+    with pytest.raises(PictureError, match=r"two\.heic: holds no stereo pair; two views that are marked as such"):
+        read_quilt(tmp_path / "two.heic")

@@ -16,6 +16,7 @@ import numpy as np
 
 from lippmann.codecs.photograph import open_photograph
 from lippmann.codecs.picture_notes import FileNotes
+from lippmann.codecs.stereo_pairs import HEIF, PAIRS
 from lippmann.codecs.types import FILMS
 from lippmann.errors import OutputError, PictureError
 from lippmann.image.encoding import FORMATS, STORED, FormatName, converted_values, encode_values
@@ -55,6 +56,8 @@ def is_quilt(path: Path) -> bool:
     PictureError
         If the file is missing or damaged.
     """
+    if path.suffix.lower() in (*PAIRS, *HEIF):
+        return True
     text = "" if path.suffix.lower() in _PHOTOGRAPHS else open_file(path).text
     if not text:
         return names_layout(path) or path.stem.endswith(_FROM_TOP)
@@ -64,6 +67,8 @@ def is_quilt(path: Path) -> bool:
 @checked
 def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
     """Read a quilt: PNG, OpenEXR, TIFF, JPEG, WebP, AVIF, BMP, PPM, GIF or TGA; transparent parts lie on black.
+
+    A stereo pair in one file (JPS, MPO, HEIF) is a quilt of two views, whatever the layout.
 
     Parameters
     ----------
@@ -78,6 +83,10 @@ def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
     PictureError
         If the file is missing or damaged, nothing says its layout, or the layout does not fit its size.
     """
+    if path.suffix.lower() in (*PAIRS, *HEIF):
+        from lippmann.quilts.photos import quilt_of_pair
+
+        return quilt_of_pair(path)
     _check_ending(path)
     with open_view(path) as file:
         metadata = metadata_of_text(file.text, str(path))

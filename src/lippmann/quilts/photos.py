@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
@@ -172,6 +172,22 @@ def read_photos(
     for source, header in zip(sources, headers, strict=True):
         of_files.add(source.path.name, header.notes)
     return Photos(quilt, target, (cropped[0], cropped[1]), notes + of_files.lines())
+
+
+def quilt_of_pair(path: Path) -> Quilt:
+    """The two views of a stereo pair in one file (JPS, MPO, HEIF), the left one first, in sRGB.
+
+    Raises
+    ------
+    PictureError
+        The file is missing, damaged or holds one picture, or its views differ in size.
+    """
+    sources = _views_in(path)
+    if len(sources) < 2:
+        raise PictureError("holds no stereo pair", where=str(path), rule="two views that are marked as such")
+    size = _header(sources[0]).size
+    read = read_photos([path], size, size, keeps_profile=False)
+    return replace(read.quilt, notes=read.notes)
 
 
 class _Source(NamedTuple):

@@ -158,7 +158,13 @@ def render(
 
 @quilt.command("pack", cls=HelpfulCommand)
 def pack(
-    folder: Annotated[Path, typer.Argument(help="A folder with one picture per view, numbered from the left.")],
+    folder: Annotated[
+        Path,
+        typer.Argument(
+            help="A folder with one picture per view, numbered from the left, or a stereo pair: an .mpo, .jps "
+            "or .heic file."
+        ),
+    ],
     output: Annotated[
         Path, typer.Option("--output", "-o", help="The quilt to write: NAME_qsCOLUMNSxROWSaASPECT.png, .exr or .tif.")
     ],
@@ -169,13 +175,14 @@ def pack(
     """Put a folder of views into a quilt, the leftmost at the bottom left."""
     from lippmann.image.write import check_output
     from lippmann.quilts.files import read_views, write_quilt
+    from lippmann.quilts.photos import quilt_of_pair
     from lippmann.quilts.quilt import layout_of_name
 
     console = Console(quiet, as_json)
     layout = layout_of_name(output, to_write=True)
     check_output(output, bits)
     with console.progress() as progress:
-        packed = read_views(folder, layout, progress=progress)
+        packed = quilt_of_pair(folder) if folder.is_file() else read_views(folder, layout, progress=progress)
         console.remark(*packed.notes)
     write_quilt(packed, output, bits=bits)
     width, height = packed.size
