@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
@@ -102,6 +103,17 @@ def test_vertex_colours_are_srgb(read):
     (mesh,) = read(text).meshes
     assert mesh.colors[:2, :2].tolist() == [[1, 0], [0, 1]]
     assert mesh.colors[:, 2] == pytest.approx(np.full(3, decode_srgb(np.array(0.5))), abs=1e-6)
+
+
+def test_a_texture_shows_its_colour_alone(read, tmp_path):
+    """As MeshLab writes a mesh whose texture it made of the colours of its vertices."""
+    Image.new("RGB", (2, 2), (9, 8, 7)).save(tmp_path / "skin.png")
+    text = "mtllib m.mtl\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nvt 0 0\nf 1 2 3\nusemtl a\nf 1/1 2/1 3/1\n"
+    scene = read(text, m__mtl="newmtl a\nmap_Kd skin.png\n")
+    plain, textured = scene.meshes
+    assert (plain.colors == (1, 0, 0)).all()
+    assert textured.colors is None
+    assert scene.notes[0] == "colours of vertices are not shown where a texture has the colour"
 
 
 def test_vertices_without_colours_beside_coloured_ones_are_white(read):

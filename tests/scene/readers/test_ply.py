@@ -93,7 +93,8 @@ def test_attributes_of_vertices(read, tmp_path):
     (mesh,), (material,) = scene.meshes, scene.materials
     assert (mesh.normals == (0, 0, 1)).all()
     assert mesh.uvs[0][2].tolist() == [0.5, 0.0]  # v counts upwards in PLY and downwards in a description
-    assert mesh.colors[0] == pytest.approx([1, 0, float(decode_srgb(np.array(188 / 255))), 0.2], abs=1e-6)
+    assert mesh.colors[0] == pytest.approx([1, 1, 1, 0.2], abs=1e-6)  # the texture has the colour
+    assert "colours of vertices are not shown where a texture has the colour" in scene.notes
     assert material.base_color_texture.image.pixels.shape == (2, 4, 3)
     assert material.base_color == (1, 1, 1)
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lippmann.color.transfer import decode_srgb
-from lippmann.scene.values.description import Material
+from lippmann.scene.values.description import Material, Mesh
 
 #: Colours in [0, 1] overshoot it by less; real numbers beyond it count to 255.
 _MOST_OVERSHOOT = 2.0
@@ -34,3 +34,18 @@ def material_of(colors: ArrayLike | None) -> Material:
     if colors is None:
         return GREY
     return _TRANSLUCENT if (np.asarray(colors)[:, 3:] < 255).any() else COLORED
+
+
+def without_doubled_colors(mesh: Mesh, material: Material, notes: list[str]) -> Mesh:
+    """A mesh whose vertices have no colour but their opacity, with a note, where a texture has the colour.
+
+    Scans hold the colour of their surface twice, in vertices and in textures made of these, and are not meant to be
+    shown by the product.
+    """
+    if mesh.colors is None or not mesh.uvs or material.base_color_texture is None:
+        return mesh
+    note = "colours of vertices are not shown where a texture has the colour"
+    notes += [] if note in notes else [note]
+    colors = np.array(mesh.colors)
+    colors[:, :3] = 1.0
+    return replace(mesh, colors=colors if colors.shape[1] == 4 else None)

@@ -28,6 +28,7 @@ from lippmann.scene.parsing.files import (
 )
 from lippmann.scene.parsing.points_lines import as_material
 from lippmann.scene.parsing.triangulation import triangulate
+from lippmann.scene.parsing.vertex_colors import without_doubled_colors
 from lippmann.scene.point_clouds import describe_cloud
 from lippmann.scene.readers.mtl import MtlRecord, parse_mtl
 from lippmann.scene.readers.mtl_to_pbr import MaterialMapper
@@ -138,7 +139,8 @@ def read_obj(path: Path, *, files: NamedFiles | None = None) -> SceneDescription
         material = mapper.material(record) if record else mapper.default(name)
         if len(rows):
             materials.append(material)
-            meshes.append(_mesh(geometry, rows, name or path.stem, len(materials) - 1))
+            mesh = _mesh(geometry, rows, name or path.stem, len(materials) - 1)
+            meshes.append(without_doubled_colors(mesh, material, notes))
         if solids:
             materials.append(as_material(material))
             meshes += [replace(mesh, material=len(materials) - 1) for mesh in solids]

@@ -21,7 +21,7 @@ from lippmann.scene.parsing.normals import unit_normals
 from lippmann.scene.parsing.ply_body import Columns, Integers, Lists, Numbers, read_body
 from lippmann.scene.parsing.ply_header import Element, read_header
 from lippmann.scene.parsing.triangulation import triangulate
-from lippmann.scene.parsing.vertex_colors import full_brightness
+from lippmann.scene.parsing.vertex_colors import full_brightness, without_doubled_colors
 from lippmann.scene.point_clouds import describe_cloud
 from lippmann.scene.readers.splats.ply import holds_splats, read_splat_ply
 from lippmann.scene.values.description import (
@@ -105,6 +105,7 @@ def read_ply(path: Path, *, files: NamedFiles | None = None) -> SceneDescription
     elif len(textures) > 1:
         notes.append(f"only the first of {len(textures)} textures is used: no face says its texnumber")
     materials = [_material(path.stem, texture, mesh) for texture in textures or [None]]
+    meshes = [without_doubled_colors(each, materials[each.material], notes) for each in meshes]
     instances = [Instance(number, np.eye(4)) for number, mesh in enumerate(meshes) if len(mesh.faces)]
     return SceneDescription(path.stem, meshes, materials, instances, notes=notes, up=header.up)
 
