@@ -29,6 +29,11 @@ def test_noise_alone_flickers_by_all_of_its_error():
     assert (stated["flicker"], stated["flicker_low"], stated["flicker_high"]) == (40.0, 38.0, 43.0)
 
 
+def test_pixels_that_were_not_traced_may_not_flicker_at_all():
+    stated = with_flicker(ESTIMATE, 0.1)
+    assert (stated["flicker_low"], stated["flicker_high"]) == (38.0, 56.0)
+
+
 @pytest.mark.parametrize("estimate", [None, {"psnr": 40.0}])
 def test_nothing_is_stated_where_nothing_is_known(estimate):
     assert with_flicker(estimate) == estimate

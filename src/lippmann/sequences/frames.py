@@ -29,7 +29,9 @@ from lippmann.sequences.flicker import with_flicker
 from lippmann.sequences.forms import INTEGRAL, Form, QuiltForm, Shown
 from lippmann.sequences.kept_scene import KeptScene
 from lippmann.sequences.key_frames import KeyFrames, estimate_of_next
+from lippmann.sequences.key_light import KeyLight, LightOfSurfaces
 from lippmann.sequences.motion import Motion, open_motion
+from lippmann.sequences.still_pixels import StillPixels
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
@@ -327,21 +329,21 @@ def render_frames(
         return form.render(now.scene, display, replace(request, placement=now.placement), report, kept.build)
 
     def render_key(key: Moment, own: RenderRequest) -> Provenance:
-        return trace(key, of_frame(own, key.number), silent).provenance
+        return trace(key, of_frame(own, keys.noise_of(key.number, request)), silent).provenance
 
-    keys = KeyFrames(display, moment, render_key, where.first_pose is not None)
+    keys: KeyFrames = KeyFrames(display, moment, render_key, _shared_light(motion, where))
 
     def render(position: int, frame: int) -> Shown:
         now = moment(frame)
         key = keys.before(now, request)
-        own = keys.request_of(of_frame(request, frame), now, key)
+        own = keys.request_of(of_frame(request, keys.noise_of(frame, request)), now, key)
         image = trace(now, own, _report_of_frame(progress, position, len(frames)))
         made = image.provenance
         keys.add(now, made, key)
         estimate = made.estimate if key is None or key.made.estimate is None else estimate_of_next(key.made.estimate)
         # Noise that stands still has no flicker that the frames' own errors would tell.
         if not request.fixed_noise:
-            estimate = with_flicker(estimate)
+            estimate = with_flicker(estimate, made.pixel_shares.get("traced", 1.0))
         return replace(image, provenance=replace(made, options={**made.options, "frame": frame}, estimate=estimate))
 
     for position, frame in enumerate(frames):
@@ -391,6 +393,13 @@ def hold_exposure(
 
     still = replace(request, placement=where(0), fixed_noise=False)
     return replace(request, exposure=choose_exposure(scene, display, still, build))
+
+
+def _shared_light(motion: Motion, where: Stand) -> KeyLight | None:
+    """What frames share of a key frame's light: none where the display goes round a scene and takes the light along."""
+    if where.first_pose is not None:
+        return LightOfSurfaces()
+    return StillPixels() if np.array_equal(motion.display_turn(1), np.eye(4)) else None
 
 
 def of_frame(request: RenderRequest, number: int) -> RenderRequest:

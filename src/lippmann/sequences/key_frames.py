@@ -4,8 +4,9 @@ The halves of a frame are denoised one by one, as each judges the other. Their m
 are of one stream and are denoised together: 0.3 to 0.7 dB (``docs/research/films.md``). So the frames after a key frame
 have no halves. They take three quarters of its samples, and the estimate of their error follows from the key frame's.
 
-Where nothing but a camera moves, frames take a key frame's light (:mod:`lippmann.sequences.key_light`). Then every
-fourth frame passes on the light that it took, without halves, and only every sixteenth has them.
+Where nothing but a camera moves, and where the display is at rest, frames take a key frame's light
+(:mod:`lippmann.sequences.key_light`). Then every fourth frame passes on the light that it took, without halves, and
+only every sixteenth has them.
 
 Which frames are key frames follows from their numbers, so that a frame is the same whether it is rendered alone or with
 all others. A frame that shows another scene than its key frame, as after a cut, has halves itself.
@@ -21,7 +22,7 @@ from typing import NamedTuple, cast
 from lippmann.display import Display
 from lippmann.image.metadata import Provenance
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.sequences.cuts import Moment, is_cut, is_light_at_rest
+from lippmann.sequences.cuts import Moment, is_cut
 from lippmann.sequences.flicker import Figures
 from lippmann.sequences.kept_light import KeptLight
 from lippmann.sequences.key_light import KeyLight
@@ -52,8 +53,8 @@ class KeyFrames:
         Returns a frame by its number.
     render:
         Renders a frame as a request asks, which has no seed of the frame's own yet; its provenance.
-    follows_camera:
-        Whether the display follows a camera, so that it may move alone.
+    shared:
+        Takes the light of key frames for those after them; None where all frames are traced.
     """
 
     def __init__(
@@ -61,15 +62,14 @@ class KeyFrames:
         display: Display,
         moment: Callable[[int], Moment],
         render: Callable[[Moment, RenderRequest], Provenance],
-        follows_camera: bool,
+        shared: KeyLight | None,
     ) -> None:
         self._display = display
         self._moment = moment
         self._render = render
-        self._follows_camera = follows_camera
+        self._shared = shared
         self._last: tuple[Moment, Key] | None = None  # the last frame that others follow, and its key frame
         self._light = KeptLight()
-        self._shared = KeyLight()
 
     def request_of(self, request: RenderRequest, moment: Moment, key: Key | None) -> RenderRequest:
         """The request of a frame, which follows a ``key`` frame or, None, has halves of its own."""
@@ -81,13 +81,18 @@ class KeyFrames:
             told = f"{of_key}, with three quarters of its samples"
             samples = math.ceil(_SHARE * key.made.spp)
             own = replace(request, spp=samples, judged_by=told, keep_light=self._light.of_next)
-            is_shared = self._follows_camera and is_light_at_rest(self._last[0], moment)
-            trace = self._shared.pass_on if has_next else self._shared.trace_next
-            return replace(own, trace_through=trace) if is_shared else own
+            if self._shared is None or not self._shared.holds(self._last[0], moment):
+                return own
+            return replace(own, trace_through=self._shared.pass_on if has_next else self._shared.trace_next)
         if not (has_next and _is_open(request)):
             return request
         own = replace(request, keep_light=self._light.of_key)
-        return replace(own, trace_through=self._shared.trace_key) if self._follows_camera else own
+        return own if self._shared is None else replace(own, trace_through=self._shared.trace_key)
+
+    def noise_of(self, frame: int, request: RenderRequest) -> int:
+        """The number of the frame whose seed a frame has: its own, but the first's where noise would jump otherwise."""
+        is_alike = self._shared is not None and self._shared.keeps_noise and _is_open(request)
+        return 0 if is_alike and frame % FRAMES_OF_LIGHT == 0 else frame
 
     def add(self, moment: Moment, made: Provenance, key: Key | None) -> Key:
         """Remember how a frame was made, which followed a ``key`` frame or, None, had halves; its key frame."""
@@ -103,13 +108,15 @@ class KeyFrames:
         where the key frame's picture is no denoised one, and after a cut. A frame to follow that is missing is
         rendered.
         """
-        number = frame_before(moment.number, self._follows_camera)
+        number = frame_before(moment.number, self._shared is not None)
         if number is None or not _is_open(request):
             return None
         kept = self._last if self._last is not None and self._last[0].number == number else None
         last = self._moment(number) if kept is None else kept[0]
         is_link = moment.number % FRAMES_OF_KEY == 0
-        if is_cut(last, moment, self._display) or (is_link and not is_light_at_rest(last, moment)):
+        if is_cut(last, moment, self._display):
+            return None
+        if is_link and not (self._shared and self._shared.holds(last, moment)):
             return None
         if kept is None:
             before = self.before(last, request)
@@ -120,11 +127,11 @@ class KeyFrames:
         return key if is_told and not is_cut(key.moment, moment, self._display) else None
 
 
-def frame_before(frame: int, follows_camera: bool) -> int | None:
+def frame_before(frame: int, passes_light_on: bool) -> int | None:
     """The frame that a frame follows, by their numbers; None of those that always have halves."""
     if frame % FRAMES_OF_KEY:
         return frame - frame % FRAMES_OF_KEY
-    return frame - FRAMES_OF_KEY if follows_camera and frame % FRAMES_OF_LIGHT else None
+    return frame - FRAMES_OF_KEY if passes_light_on and frame % FRAMES_OF_LIGHT else None
 
 
 def estimate_of_next(key: Figures) -> Figures:

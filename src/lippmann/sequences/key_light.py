@@ -1,13 +1,15 @@
-"""Light of a key frame in the frames after it, while the scene and its light are at rest and the display alone moves.
+"""Light of a key frame in the frames after it, which trace paths for the other pixels alone.
 
-A diffuse surface then keeps its radiance. So a frame after a key frame traces the feature buffers of all pixels, but
-paths for some of them alone: disocclusions, outlines, emitters, edges of shadows, and surfaces that are not diffuse.
-All others take the irradiance of the key frame's denoised picture at the same point, times their own albedo; see
-:mod:`lippmann.device.pbr.diffuse_pixels`.
+Two kinds of films share light. Where the scene and its light are at rest and the display alone moves, a diffuse surface
+keeps its radiance: pixels take the irradiance of the key frame's denoised picture at the same point, times their own
+albedo (:mod:`lippmann.device.pbr.diffuse_pixels`). Disocclusions, outlines, emitters, edges of shadows, and surfaces
+that are not diffuse are traced. Where the display is at rest, pixels whose light does not change keep it
+(:mod:`lippmann.sequences.still_pixels`).
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -16,56 +18,87 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.sequences.cuts import Moment, is_light_at_rest
+
 if TYPE_CHECKING:
     from lippmann.device.pbr.diffuse_pixels import DiffusePixels, KeyPicture
     from lippmann.display.nearby_views import NearbyViews
     from lippmann.rendering.methods import Job, Traced
     from lippmann.rendering.transport.path import PreparedLight
+    from lippmann.rendering.transport.ray_source import OnePicture, QuiltRays, SinglePixelRays
 
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
+Places = NDArray[np.intp]
 
 
-class KeyLight:
+class KeyLight(ABC):
     """Keeps the picture of a key frame, and traces the frames after it with its light."""
 
-    def __init__(self) -> None:
-        self._key: tuple[PreparedLight, KeyPicture] | None = None
+    #: Whether pixels keep their noise, too, so that it would jump at the next key frame with another seed.
+    keeps_noise = False
 
     def trace_key(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
         """Trace a key frame; parameters as of ``trace_through`` in
         :class:`~lippmann.rendering.request.render_request.RenderRequest`.
         """
-        self._key = None  # the pictures of two key frames may not fit the memory
+        self._forget()  # the pictures of two key frames may not fit the memory
         traced = trace(job)
         self._keep(job, traced)
         return traced
 
-    def trace_next(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
-        """Trace a frame that shows the scene of the key frame at rest, with the light of that."""
-        if self._key is None or self._key[0] is not _light_of(job):
-            return trace(job)
-        pixels, is_known = _known_light(self._key[1], job)
-        return _trace_others(job, pixels, is_known) if is_known.any() else trace(job)
-
     def pass_on(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
         """Trace a frame as :meth:`trace_next`; it is the key frame of those after it."""
         traced = self.trace_next(job, trace)
-        self._key = None
+        self._forget()
         self._keep(job, traced)
         return traced
 
+    @abstractmethod
+    def trace_next(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
+        """Trace a frame after a key frame for which :meth:`holds` is true, with the light of that."""
+
+    @abstractmethod
+    def holds(self, key: Moment, moment: Moment) -> bool:
+        """Whether a frame may take light of a key frame, as far as their scenes and displays tell."""
+
+    @abstractmethod
     def _keep(self, job: Job, traced: Traced) -> None:
         """Keep the picture of a job."""
+
+    @abstractmethod
+    def _forget(self) -> None:
+        """Give up the picture that is kept."""
+
+
+class LightOfSurfaces(KeyLight):
+    """The irradiance of diffuse surfaces of a scene at rest, for a display that moves."""
+
+    def __init__(self) -> None:
+        self._key: tuple[PreparedLight, KeyPicture] | None = None
+
+    def trace_next(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
+        if self._key is None or self._key[0] is not light_of(job):
+            return trace(job)
+        pixels, is_known = _known_light(self._key[1], job)
+        return trace_others(job, pixels, is_known) if is_known.any() else trace(job)
+
+    def holds(self, key: Moment, moment: Moment) -> bool:
+        return is_light_at_rest(key, moment)
+
+    def _keep(self, job: Job, traced: Traced) -> None:
         from lippmann.device.pbr.diffuse_pixels import KeyPicture
 
-        light, views = _light_of(job), _views_of(job)
+        light, views = light_of(job), _views_of(job)
         if light is not None and views is not None:
             colors = _each_column(job, traced.frame.pixels)
-            self._key = light, KeyPicture(_pixels_of(job), colors, views, _columns(job))
+            self._key = light, KeyPicture(_pixels_of(job), colors, views, columns_of(job))
+
+    def _forget(self) -> None:
+        self._key = None
 
 
-def _light_of(job: Job) -> PreparedLight | None:
+def light_of(job: Job) -> PreparedLight | None:
     """The light of a job whose denoised picture may share it; None for all others."""
     from lippmann.rendering.transport.path import PathIntegrator
 
@@ -89,7 +122,7 @@ def _views_of(job: Job) -> NearbyViews | None:
     return LensViews(source.display, source.window if isinstance(source, WindowRays) else whole)
 
 
-def _columns(job: Job) -> int:
+def columns_of(job: Job) -> int:
     """Columns that are traced of each pixel: 3 of sub-pixels in full colour, else 1."""
     return job.sample_source.width // job.source.width
 
@@ -139,42 +172,57 @@ def _known_light(key: KeyPicture, job: Job) -> tuple[Floats, Mask]:
     return irradiance * albedo, is_known
 
 
-def _trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
-    """The picture with ``pixels`` where their light ``is_known``; the others are traced and denoised among them."""
-    from lippmann.rendering.film.wavefront import STRIP_ROWS, Coverage
-    from lippmann.rendering.methods import SAMPLES_LAYER, Job, denoise_whole, one_stream
-    from lippmann.rendering.transport.ray_source import SinglePixelRays, SubpixelRays
+def rays_of(source: OnePicture | QuiltRays, is_chosen: Mask) -> tuple[SinglePixelRays, tuple[Places, Places]]:
+    """Rays of the chosen pixels ``(H, W)`` of a source; their rows and columns ``(n,)`` in the order of the rays."""
+    from lippmann.rendering.film.wavefront import STRIP_ROWS
+    from lippmann.rendering.transport.ray_source import SinglePixelRays
 
-    source = job.sample_source
-    rows, columns = np.nonzero(~np.repeat(is_known, _columns(job), axis=1))
+    rows, columns = np.nonzero(is_chosen)
     order = np.lexsort((rows % STRIP_ROWS, columns, rows // STRIP_ROWS))  # neighbours take much the same paths
     rows, columns = rows[order], columns[order]
+    return SinglePixelRays(source, columns, rows, np.zeros_like(rows)), (rows, columns)
+
+
+def trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
+    """The picture with ``pixels`` where their light ``is_known``; the others are traced and denoised among them."""
+    from lippmann.rendering.film.wavefront import Coverage, Frame
+    from lippmann.rendering.methods import SAMPLES_LAYER, Job, Traced, denoise_whole, one_stream
+    from lippmann.rendering.transport.ray_source import SubpixelRays
+
+    source = job.sample_source
+    shown = source.own_colors(pixels) if isinstance(source, SubpixelRays) else pixels
     share = float(is_known.mean())
+    shares = {"traced": 1 - share, "reprojected": share, "interpolated": 0.0}
     # Few noisy pixels among clean ones keep more of their noise in the denoiser: up to twice as many samples.
     request = replace(job.request, spp=round((1 + share) * job.request.samples))
+    note = f"{100 * share:.0f} % of the pixels have the key frame's light, the others {request.samples} samples"
+    if is_known.all():
+        frame = Frame(shown, shares=shares)
+        frame.maps[SAMPLES_LAYER] = np.zeros(is_known.shape, np.uint32)
+        return Traced(frame, request.samples, notes=(request.judged_by, note))
+    few, places = rays_of(source, ~np.repeat(is_known, columns_of(job), axis=1))
     session = replace(job.session, request=request)
-    few = SinglePixelRays(source, columns, rows, np.zeros_like(rows))
-    note = f"{100 * share:.0f} % of the pixels have the key frame's light, the others {request.spp} samples"
     traced = one_stream(Job(session, job.integrator, few, job.display_from_world), request.judged_by, note)
     frame = traced.frame
 
     def spread(part: Floats, others: Floats | float) -> Floats:
         whole = np.empty((*pixels.shape[:2], part.shape[-1]), dtype=np.float32)
         whole[...] = others
-        whole[rows, columns] = part[0]
+        whole[places] = part[0]
         return whole
 
     frame.pixels = spread(frame.pixels, pixels)
     frame.specular = None if frame.specular is None else spread(frame.specular, 0.0)
     frame.excess = None if frame.excess is None else spread(frame.excess, 0.0)
     if frame.coverage is not None:
-        frame.coverage = Coverage(spread(frame.coverage.share, 1.0), frame.coverage.samples)
+        further = job.denoiser.coverage()
+        covered = 1.0 if further is None else (further[0] + further[1]).share
+        frame.coverage = Coverage(spread(frame.coverage.share, covered), frame.coverage.samples)
     frame.maps[SAMPLES_LAYER] = np.where(is_known, np.uint32(0), np.uint32(traced.samples))
-    frame.shares = {"traced": 1 - share, "reprojected": share, "interpolated": 0.0}
+    frame.shares = shares
     traced = denoise_whole(job, traced)
-    shown = source.own_colors(pixels) if isinstance(source, SubpixelRays) else pixels
     traced.frame.pixels[is_known] = shown[is_known]
     return traced
 
 
-__all__ = ["KeyLight"]
+__all__ = ["KeyLight", "LightOfSurfaces", "columns_of", "light_of", "rays_of", "trace_others"]

@@ -1,0 +1,194 @@
+"""Pixels whose light is that of the key frame, while things move in front of a display at rest.
+
+A display at rest shows a surface at rest along the same rays, so that a pixel keeps its light, gloss and mirrors
+included, as long as no path that ends there meets anything that has moved. Two tests find these pixels, without any
+knowledge of what has moved:
+
+* Their feature buffers are the key frame's, bit for bit. All frames trace them along the same rays.
+* Where a surface is seen, *probes* of the key frame and of this one agree around the pixel: single paths of every
+  fourth pixel with the same random numbers, which differ only where they meet another surface or another shadow (the
+  temporal gradient of Schied et al. 2018, "Gradient Estimation for Real-Time Adaptive Temporal Filtering").
+
+Probes know no caustics, which paths hardly find: pictures with photons are traced whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display.panel import PixelWindow
+from lippmann.sequences.cuts import Moment
+from lippmann.sequences.key_light import Floats, KeyLight, Mask, columns_of, light_of, rays_of, trace_others
+
+if TYPE_CHECKING:
+    from lippmann.rendering.film.wavefront import RayTotals
+    from lippmann.rendering.methods import Job, Traced
+
+#: Of so many pixels one has a probe.
+_PIXELS_OF_PROBE = 4
+#: Pixels to either side whose probes are averaged.
+_REACH = 8
+#: Largest mean change of probes, as a share of the light of both.
+_LARGEST_CHANGE = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class _Picture:
+    """What is kept of a frame, for each column that is traced of a pixel.
+
+    Attributes
+    ----------
+    window:
+        The part of the panel, or of each view of a quilt, that is traced.
+    pixels:
+        ``(H, columns W, 3)`` linear, denoised.
+    features:
+        ``(H, columns W)``: numbers that tell the feature buffers.
+    probes:
+        ``(H, columns W, 3)`` linear, NaN where there are none.
+    """
+
+    window: PixelWindow
+    pixels: Floats
+    features: NDArray[np.float64]
+    probes: Floats
+
+    def seen_in(self, window: PixelWindow, columns: int) -> _Picture:
+        """The part that another window of the panel shows; NaN where it shows more."""
+        if window == self.window:
+            return self
+        common = window.intersection(self.window)
+
+        def part(values: NDArray[Any]) -> NDArray[Any]:
+            there = np.full((window.height, columns * window.width, *values.shape[2:]), np.nan, values.dtype)
+            if common is not None:
+                there[_inside(common, window, columns)] = values[_inside(common, self.window, columns)]
+            return there
+
+        return _Picture(window, part(self.pixels), part(self.features), part(self.probes))
+
+
+def _inside(part: PixelWindow, window: PixelWindow, columns: int) -> tuple[slice, slice]:
+    """Rows and traced columns of a part within a window."""
+    top, left = part.top - window.top, columns * (part.left - window.left)
+    return slice(top, top + part.height), slice(left, left + columns * part.width)
+
+
+class StillPixels(KeyLight):
+    """The pixels of a display at rest that show the same light as in the key frame."""
+
+    keeps_noise = True
+
+    def __init__(self) -> None:
+        self._key: _Picture | None = None
+        self._own: _Picture | None = None
+
+    def trace_next(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
+        self._own = None
+        window, columns = _window_of(job), columns_of(job)
+        if self._key is None or window is None:
+            return trace(job)
+        key = self._key.seen_in(window, columns)
+        probes, rays = _trace_probes(job, window)
+        self._own = own = _Picture(window, key.pixels, _features_of(job), probes)
+        is_known = _find_still(key, own, job)
+        if not is_known.any():
+            return trace(job)
+        traced = trace_others(job, key.pixels, is_known)
+        traced.frame.rays += rays
+        # Changes count from the frame whose samples a pixel shows.
+        is_kept = np.repeat(is_known, columns, axis=1)[..., None]
+        self._own = replace(own, probes=np.where(is_kept, key.probes, probes))
+        return traced
+
+    def holds(self, key: Moment, moment: Moment) -> bool:
+        return np.array_equal(key.placement.world_from_display, moment.placement.world_from_display)
+
+    def _keep(self, job: Job, traced: Traced) -> None:
+        window, pixels = _window_of(job), np.repeat(traced.frame.pixels, columns_of(job), axis=1)
+        if self._own is not None:
+            self._key = replace(self._own, pixels=pixels)
+        elif window is not None:
+            self._key = _Picture(window, pixels, _features_of(job), _trace_probes(job, window)[0])
+        self._own = None
+
+    def _forget(self) -> None:
+        self._key = None
+
+
+def _window_of(job: Job) -> PixelWindow | None:
+    """The window that a picture shows; None of those whose pixels have several sets of rays, or that have photons."""
+    from lippmann.rendering.transport.ray_source import QuiltRays, WindowRays
+
+    light, source = light_of(job), job.source
+    if light is None or light.photons is not None or job.sample_source.channels > 1:
+        return None
+    if isinstance(source, QuiltRays | WindowRays):
+        return source.window
+    return PixelWindow(0, 0, source.width, source.height)
+
+
+def _features_of(job: Job) -> NDArray[np.float64]:
+    """A number for each pixel's feature buffers, which is another one if any of them is."""
+    guides = job.denoiser.guides()
+    assert guides.height is not None
+    roots = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0])
+    return np.asarray(
+        guides.albedo @ roots[:3] + guides.normal @ roots[3:6] + roots[6] * _coverage_of(job) + guides.height
+    )
+
+
+def _coverage_of(job: Job) -> Floats:
+    """Coverage ``(H, columns W)`` by surfaces of any kind."""
+    coverage = job.denoiser.coverage()
+    assert coverage is not None  # guides of one set of rays have it
+    return (coverage[0] + coverage[1]).share[..., 0]
+
+
+def _trace_probes(job: Job, window: PixelWindow) -> tuple[Floats, RayTotals]:
+    """Probes ``(H, columns W, 3)`` of a picture, and the rays traced for them."""
+    from lippmann.device.sobol import named_seed
+    from lippmann.rendering.film.memory_model import cut_wavefronts
+    from lippmann.rendering.film.wavefront import RayTotals, trace_frame
+    from lippmann.rendering.transport.path import PathIntegrator, PreparedLight
+
+    assert isinstance(job.integrator, PathIntegrator)
+    source = job.sample_source
+    probes = np.full((source.height, source.width, 3), np.nan, np.float32)
+    row, column = np.indices((source.height, source.width))
+    column += columns_of(job) * window.left
+    is_probed = ((row + window.top + 2 * column) % _PIXELS_OF_PROBE == 0) & (_coverage_of(job) > 0)
+    if not is_probed.any():
+        return probes, RayTotals()
+    few, places = rays_of(source, is_probed)
+    # Light that was prepared for one scene would make other paths in another.
+    plain = job.integrator.lit_by(PreparedLight())
+    plan = cut_wavefronts(few.width, few.height, 1, channels=1, memory=job.session.memory)
+    frame = trace_frame(plain, few, plan, seed=named_seed("probes"), box_filter=job.request.box_filter)
+    probes[places] = frame.pixels[0]
+    return probes, frame.rays
+
+
+def _find_still(key: _Picture, own: _Picture, job: Job) -> Mask:
+    """The pixels ``(H, W)`` that show the same light in both pictures."""
+    from lippmann.rendering.denoise.noisy_blend import mean_around
+    from lippmann.runtime.row_threads import Bands
+
+    is_same = key.features == own.features
+    change, light = np.abs(own.probes - key.probes).sum(axis=2), (own.probes + key.probes).sum(axis=2)
+    is_lit = light > 0  # paths that find no light in either frame tell nothing
+    # Beside another surface light is taken to change, too.
+    change = np.where(is_same, np.divide(change, light, out=np.zeros_like(light), where=is_lit), is_lit)
+    bands = Bands(job.session.engine.threads)
+    change, lit = (mean_around(part.astype(np.float32), _REACH, bands) for part in (change, is_lit))
+    is_agreed = (lit > 0) & (change <= _LARGEST_CHANGE * lit)
+    is_still = is_same & (is_agreed | (_coverage_of(job) == 0))
+    return np.asarray(is_still.reshape(len(is_still), -1, columns_of(job)).all(axis=2))
+
+
+__all__ = ["StillPixels"]

@@ -1,0 +1,117 @@
+"""Still pixels: those that a moving object leaves as they are, and no others; no ghost of it or of its shadow."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import lippmann
+from lippmann.color.transfer import encode_srgb
+from lippmann.display import load_display
+from lippmann.rendering.methods import SAMPLES_LAYER
+from lippmann.scene.matrices import scaling, translation
+from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
+from lippmann.sequences.frames import render_quilt_sequence, render_sequence
+from lippmann.sequences.motion import Motion
+
+PATHS = {"integrator": "path"}
+
+
+class Sliding(Motion):
+    """A glossy box that slides to the right before a wall, and its shadow, in mm; it begins after frame 1."""
+
+    count = 17
+    content = None
+
+    def __init__(self, places=(-12, -12, -9, -6, -3, 0, *[3] * 11), wall=30):
+        self.places, self.wall = places, wall
+
+    def scene(self, frame):
+        corners = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], np.float32)
+        faces = [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4]]
+        faces += [[2, 6, 3], [3, 6, 7], [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5]]
+        box = Mesh("box", corners - 0.5, np.array(faces), 0)
+        wall = translation((0, 0, -self.wall / 2)) @ scaling(self.wall)
+        return lippmann.load_scene(
+            SceneDescription(
+                "sliding",
+                [box],
+                [Material(base_color=(0.7, 0.5, 0.3), roughness=0.5)],
+                [Instance(0, translation((self.places[frame], 0, 4)) @ scaling(5)), Instance(0, wall)],
+                lights=[Light("point", (6000.0, 6000.0, 6000.0), translation((20, 30, 60)))],
+            )
+        )
+
+    def camera(self, frame, name):
+        return None
+
+    def bounds(self):
+        return np.array([[-15.0, -15.0, -30.0], [15.0, 15.0, 6.5]])
+
+
+@pytest.fixture(scope="module")
+def display():
+    return load_display("seed-lenticular").resized(96, 56)
+
+
+@pytest.fixture(scope="module")
+def frames(display):
+    return dict(render_sequence(Sliding(), display, [*range(6), 16], **PATHS))
+
+
+def error(one, other):
+    """Mean squared difference of codes between two pictures."""
+    return np.mean(np.square(encode_srgb(one.pixels).astype(np.float64) - encode_srgb(other.pixels)))
+
+
+def test_pixels_whose_light_does_not_change_keep_it(frames):
+    np.testing.assert_array_equal(frames[1].pixels, frames[0].pixels)
+    for number in (2, 3, 4, 5):
+        kept = frames[number].maps[SAMPLES_LAYER] == 0
+        assert 0.5 < kept.mean() < 0.95
+        np.testing.assert_array_equal(frames[number].pixels[kept], frames[0 if number < 5 else 4].pixels[kept])
+
+
+def test_pixels_are_found_in_another_window(display):
+    # The second frame shows more of the panel, beside the wall.
+    key, after = dict(render_sequence(Sliding((0, 12), wall=20), display, range(2), **PATHS)).values()
+    kept = after.maps[SAMPLES_LAYER] == 0
+    assert 0.03 < np.mean(kept & (key.pixels > 0).all(axis=2)) < 0.9
+    np.testing.assert_array_equal(after.pixels[kept], key.pixels[kept])
+    assert not kept[(after.pixels > 0).all(axis=2) & (key.pixels == 0).all(axis=2)].any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["slanted sub-pixels", "quilt"])
+def test_pixels_of_any_picture_keep_their_light(form):
+    display = load_display("looking-glass-portrait").resized(96, 64)
+    if form == "quilt":
+        size = {"views": (4, 4), "size": (256, 256)}
+        key, after = dict(render_quilt_sequence(Sliding(), display, [0, 3], **size, **PATHS)).values()
+    else:
+        key, after = dict(render_sequence(Sliding(), display, [0, 3], **PATHS)).values()
+    assert 0.1 < after.provenance.pixel_shares["reprojected"] < 1
+    if form != "quilt":
+        kept = after.maps[SAMPLES_LAYER] == 0
+        np.testing.assert_array_equal(after.pixels[kept], key.pixels[kept])
+
+
+def test_neither_the_box_nor_its_shadow_leaves_a_ghost(frames, display):
+    for number in (3, 5):
+        own, reference = (
+            dict(render_sequence(Sliding(), display, [number], seed=seed, spp=n, **PATHS))[number]
+            for seed, n in ((1, frames[0].provenance.spp), (2, 64))
+        )
+        # Light of the key frame at all pixels that show the same surface has four times that error.
+        assert error(frames[number], reference) < 2 * error(own, reference)
+
+
+def test_a_frame_is_the_same_alone_and_after_others(frames, display):
+    alone = dict(render_sequence(Sliding(), display, [5], **PATHS))[5]
+    np.testing.assert_array_equal(alone.pixels, frames[5].pixels)
+
+
+def test_key_frames_have_one_seed(frames):
+    seeds = {number: frames[number].provenance.seed for number in frames}
+    assert seeds[16] == seeds[0]
+    assert len(set(seeds.values())) == len(seeds) - 1
