@@ -43,6 +43,7 @@ _LONGEST, _LEAST = 1200, 100
 #: without it a picture 4 % too large gives a wrong scale.
 _DARK = 0.15
 #: Samples of the pattern along each axis, and of a block of them; share of the pattern beyond them on each side.
+#: Half or double that share: no change.
 _SAMPLES, _BLOCK, _EDGE = 512, 16, 0.03
 #: Share of full modulation below which no hue is told from grey. Half: a picture mixed over three lenses (0.16) passes;
 #: double: light of half a pitch (0.24), as of lenses out of focus, is called mixed.

@@ -42,7 +42,8 @@ MIRROR_NOTE = "the lights have no surroundings: metal and glass mirror a dim stu
 #: Radiance of even surroundings; surfaces that light a scene less than these would are no light sources.
 _DIMMEST = 0.02
 
-#: Radiance of a white surface that the studio adds to a file's lights, as a share of what these give it.
+#: Radiance of a white surface that the studio adds to a file's lights, as a share of what these give it. Half: a chrome
+#: ball beside a matt one under a lamp looks like dark metal; double: it is nearly white, the picture a third brighter.
 _FILL = 0.25
 
 _FRAMING_FOV = np.radians(30.0)
@@ -399,7 +400,11 @@ def has_lights(description: SceneDescription) -> bool:
 
 
 def _mirrors(material: Material) -> bool:
-    """Whether a quarter of a surface or more is smooth metal or glass."""
+    """Whether a quarter of a surface or more is smooth metal or glass.
+
+    Of four published models with such textures, half the share would take in no other (porcelain flowers have 0.08),
+    double would leave a helmet (0.496) black.
+    """
     roughness, metallic = (np.array([value], np.float32) for value in (material.roughness, material.metallic))
     texture = material.metallic_roughness_texture
     if texture is not None:

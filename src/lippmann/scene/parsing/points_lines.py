@@ -16,7 +16,8 @@ POINT_RADIUS, LINE_RADIUS = 0.01, 0.005
 MOST = 1 << 18
 
 # Up to so many, points are balls of 32 triangles, and lines have 6 sides; of more, which are thinner, 8 and 3. A few
-# points, which may be wide, are balls of 512.
+# points, which may be wide, are balls of 512. Half or double the few moves only where these begin to cost: with 128 000
+# or 512 000 triangles.
 _MOST_ROUND, _FEW = 20_000, 500
 
 Points = NDArray[np.float64]

@@ -19,7 +19,8 @@ from lippmann.scene.values.description import FloatArray, Material, Mesh, Textur
 _Key = tuple[Hashable, ...]
 
 #: Of an inward mesh, the area-weighted mean of what its normals have along the way from its middle is below minus this;
-#: a closed box seen from inside has about 0.8, a sheet 0.
+#: a closed box seen from inside has about 0.8, a sheet 0. Judged on twenty rooms, shells, bowls and terrains. Half: no
+#: change, waves have 0.00; double: a room full of furniture (24 pieces: 0.35) counts as none.
 _INWARD = 0.2
 
 
