@@ -249,6 +249,13 @@ def test_a_picture_used_twice_is_read_once(material, picture):
     assert found.emission == (1.0, 1.0, 1.0)
 
 
+@pytest.mark.parametrize(("space", "srgb"), [("sRGB", True), ("linear", False)])
+def test_the_colour_space_of_a_texture(material, picture, space, srgb):
+    """An option of tinyobjloader's."""
+    picture("x.png", np.full((2, 2, 3), 200))
+    assert material(f"map_Kd -colorspace {space} -s 2 2 x.png\n").base_color_texture.srgb == srgb
+
+
 def test_what_is_not_honoured_is_noted(material, picture):
     picture("x.png", np.full((2, 2, 3), 200))
     notes = material("disp x.png\nrefl -type sphere x.png\nKd spectral a.rfl\naniso 0.5\nKa 1 1 1\n", notes=True)

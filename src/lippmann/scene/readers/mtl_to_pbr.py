@@ -234,6 +234,7 @@ class MaterialMapper:
             self._note_once(f"{reference.where}: not honoured: {', '.join(ignored)}")
         is_clamped = reference.options.get("-clamp", ("off",))[0].lower() == "on"
         wrap: Wrap = "clamp" if is_clamped else "repeat"
+        srgb = srgb and reference.options.get("-colorspace", ("sRGB",))[0].lower() != "linear"
         return Texture(
             image=self._images[path], srgb=srgb, wrap_u=wrap, wrap_v=wrap, uv_transform=_uv_transform(reference)
         )
