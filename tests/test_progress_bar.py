@@ -81,6 +81,7 @@ def test_the_bar_fits_eighty_columns(monkeypatch):
 def test_plain_lines_do_not_repeat_themselves(monkeypatch, capsys):
     monkeypatch.setattr("lippmann.progress_bar.PLAIN_INTERVAL", 0.0)
     tell = PlainProgress()
+    tell(Progress("trace", 0, 2))  # of what has only begun there is nothing to say
     for left in (9, 9, 8):
         tell(Progress("trace", 1, 2, f"about {left} s left"))
     assert capsys.readouterr().err.splitlines() == [f"32 %: tracing, about {left} s left" for left in (9, 8)]

@@ -21,7 +21,7 @@ def depths_in_words(back: float, front: float) -> str:
 def duration_in_words(seconds: float) -> str:
     """``3.2 s``, ``45 s``, ``2.5 min`` or ``1.8 h``."""
     if seconds < _MINUTE:
-        return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
+        return f"{seconds:.2g} s"
     if seconds < _HOUR:
         return f"{seconds / _MINUTE:.1f} min"
     return f"{seconds / _HOUR:.1f} h"

@@ -61,3 +61,8 @@ def test_a_hostile_file_says_nothing_to_the_terminal(lippmann, scene, tmp_path, 
             assert not RAW.search(stream), (words[0], stream)
             assert not any(line.startswith("forged: yes") for line in stream.splitlines())
         assert "internal error" not in done.err
+
+
+def test_values_in_messages_are_cut_to_sixty_characters():
+    assert printable.shorten("x" * 58) == f"'{'x' * 58}'"
+    assert printable.shorten("x" * 59) == f"'{'x' * 56}..."

@@ -55,6 +55,8 @@ def test_a_bleed_by_hand():
     # 40 mm at 400 pixels per inch are 629.92, so 630 pixels of 0.0635 mm; a bleed of 3.175 mm is 50 of them.
     bled = with_bleed(PRINT.display(), 3.175)
     assert bled.sheet == Sheet(bleed=50)
+    # 127 pixels of 0.0635 mm, which rounding makes 127.00000000000001.
+    assert with_bleed(PRINT.display(), 8.0645).sheet == Sheet(bleed=127)
     assert bled.size_mm[0] == pytest.approx(630 * 0.0635 + 2 * 3.175)
     trim = trim_of(bled)
     assert (trim.left, trim.top, trim.width, trim.height) == (50, 50, 630, 394)

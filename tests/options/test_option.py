@@ -1,12 +1,19 @@
 """Options that are several numbers, and settings as files hold them."""
 
+import sys
+
 import numpy as np
 import pytest
 
 from lippmann import LightOptions, PlacementOptions
 from lippmann.errors import UsageError
 from lippmann.options.scene import SceneOptions
-from lippmann.options.texts import settings_of
+from lippmann.options.texts import settings_of, toml_of
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 
 @pytest.mark.parametrize("given", [[0, 0.5, 1], np.array([0.0, 0.5, 1.0], np.float32), (0.0, 0.5, 1.0)])
@@ -30,6 +37,11 @@ def test_lists_and_arrays_become_pythons_own_numbers(given):
 def test_wrong_ones_are_refused(kind, name, value, rule):
     with pytest.raises(UsageError, match=f"{name}: .*{rule}"):
         kind(**{name: value})
+
+
+def test_texts_are_those_that_toml_reads():
+    text = "".join(map(chr, range(128)))
+    assert tomllib.loads(f"text = {toml_of(text)}") == {"text": text}
 
 
 def test_settings_tell_no_folders_and_no_defaults():

@@ -274,3 +274,10 @@ def test_light_that_changes_nothing_is_said(is_unlit):
     )
     assert not any("microfacets" in note for note in scene.notes)
     assert not any("whatever light" in note for note in load_scene(thing, environment="none").notes)
+
+
+def test_exact_microfacets_are_those_of_the_physical_form():
+    assert load_scene("small-balls").is_classic
+    scene = load_scene("small-balls", single_scattering=True)
+    assert not scene.is_classic
+    assert scene.description.multiple_scattering is False
