@@ -39,7 +39,9 @@ _STEPS = 15
 #: Relative errors of radius, thickness and index within which a lens is taken to lie.
 TOLERANCE = 0.03
 
-#: Bands of rows, spread over a picture, by which its correction is judged, and rows of each.
+#: Bands of rows, spread over a picture, by which its correction is judged, and rows of each. The teapot on a print, 512
+#: rows, 64 samples: a share of 0.98 of the correction, by the whole picture 1 in 2.5 times the time. Half the bands: 0,
+#: none of it; half the rows: 0.99.
 _BANDS, _BAND_ROWS = 4, 16
 
 

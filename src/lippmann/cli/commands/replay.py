@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -17,13 +17,16 @@ from lippmann.cli.shared.scene_source import output_of
 from lippmann.errors import UsageError
 from lippmann.options.outputs import SequenceOptions
 from lippmann.options.texts import triple
-from lippmann.progress import Progress
+from lippmann.progress import Progress, ProgressCallback
 
 if TYPE_CHECKING:
     from lippmann.display import Display
+    from lippmann.image import IntegralImage, LargePicture
     from lippmann.image.stored_values import FloatArray
+    from lippmann.quilts.quilt import Quilt
     from lippmann.viewing.stereo import Stereo
 
+Place = tuple[float, float, float]
 Filter = Annotated[
     Literal["nearest", "linear"], typer.Option("--filter", help="Pixel filter: nearest, or linear within one lens.")
 ]
@@ -95,9 +98,9 @@ def replay(
 ) -> None:
     """Simulate what an eye in front of the display sees."""
     from lippmann.codecs.stereo_pairs import PAIRS
-    from lippmann.image.streamed import open_picture
     from lippmann.image.write import write_plain_picture
-    from lippmann.viewing.quilt_views import quilt_display, replay_quilt
+    from lippmann.quilts.quilt import Quilt
+    from lippmann.viewing.quilt_views import replay_quilt
     from lippmann.viewing.replay import default_eye, path_of_eye
     from lippmann.viewing.stereo import head_path, stereo_pair, write_pair
     from lippmann.viewing.video_file import write_animation
@@ -105,9 +108,8 @@ def replay(
     console = Console(quiet, as_json)
     if rgbd is not None:
         others = {"sweep": sweep, "path": path, "sbs": sbs, "anaglyph": anaglyph, "optics": optics, "codec": film.codec}
-        for name, value in others.items():
-            if value:
-                raise UsageError("does not apply to --rgbd", where=f"--{name}", fix="leave one of them out")
+        for name in (name for name, value in others.items() if value):
+            raise UsageError("does not apply to --rgbd", where=f"--{name}", fix="leave one of them out")
         _replay_depth(picture, output, eye, rgbd, white, size, bits, parse.display(display), console)
         return
     if white != "near":
@@ -122,23 +124,19 @@ def replay(
         flag = "--frames" if width is None else "--sweep-width"
         raise UsageError("applies to a sweep only", where=flag, fix="add --sweep")
     places = None if path is None else head_path(path)
-    quilt = quilt_of(picture, layout, aspect)
-    if quilt is None:
-        image = open_picture(picture, display=parse.display(display))
-        target, transfer = image.display, image.provenance.transfer
-    else:
-        target, transfer = quilt_display(quilt, parse.display(display), str(picture)), quilt.provenance.transfer
+    seen, target = _open_seen(picture, display, layout, aspect)
+    transfer = seen.provenance.transfer
     position = default_eye(target) if eye is None else triple(eye, "--eye")
     pixels, framed = _size_of(size, target, console)
 
-    if optics and quilt is not None:
+    if optics and isinstance(seen, Quilt):
         rule = "a quilt is seen without lenses"
         raise UsageError("this is a quilt", where="--optics", rule=rule, fix="weave it for its display first")
 
     def replay_from(place: tuple[float, float, float]) -> FloatArray:
-        if quilt is not None:
-            return framed(replay_quilt(quilt, target, place, size=pixels, linear=filter == "linear"))
-        return framed(image.replay(place, size=pixels, filter=filter, optics=optics))
+        if isinstance(seen, Quilt):
+            return framed(replay_quilt(seen, target, place, size=pixels, linear=filter == "linear"))
+        return framed(seen.replay(place, size=pixels, filter=filter, optics=optics))
 
     def picture_from(place: tuple[float, float, float]) -> FloatArray:
         return replay_from(place) if stereo is None else stereo_pair(replay_from, place, *stereo)
@@ -159,16 +157,19 @@ def replay(
         start, stop = ((position[0] + side * reach / 2, *position[1:]) for side in (-1, 1))
         places = path_of_eye(start, stop, 48 if frames is None else frames)
     with console.progress() as progress:
-
-        def frames_in_turn() -> Iterator[FloatArray]:
-            for number, place in enumerate(places, 1):
-                yield picture_from(place)
-                progress(Progress("draw", number, len(places)))
-
-        write_animation(frames_in_turn(), output, transfer=transfer, codec=film.codec)
+        write_animation(_draw(picture_from, places, progress), output, transfer=transfer, codec=film.codec)
     start, stop = places[0], places[-1]
     result |= {"frames": len(places), "start": list(start), "stop": list(stop)}
     console.result(result, f"{output}: {len(places)} frames, seen{by} from {_position(start)} to {_position(stop)}")
+
+
+def _draw(
+    picture_from: Callable[[Place], FloatArray], places: Sequence[Place], progress: ProgressCallback
+) -> Iterator[FloatArray]:
+    """What the eye sees from place to place."""
+    for number, place in enumerate(places, 1):
+        yield picture_from(place)
+        progress(Progress("draw", number, len(places)))
 
 
 def _check_output(output: Path, film: SequenceOptions, *, moves: bool, stereo: bool, bits: int | None) -> None:
@@ -256,10 +257,10 @@ def refocus(
     quiet: options.Quiet = False,
 ) -> None:
     """Refocus on a plane, or on several, as a camera whose aperture is as wide as the field of view."""
-    from lippmann.image.streamed import open_picture
     from lippmann.image.write import check_output, write_plain_picture
+    from lippmann.quilts.quilt import Quilt
     from lippmann.viewing.focal_stack import check_stack_path, write_planes
-    from lippmann.viewing.quilt_views import quilt_display, refocus_quilt
+    from lippmann.viewing.quilt_views import refocus_quilt
     from lippmann.viewing.refocus import focal_planes
 
     console = Console(quiet, as_json)
@@ -272,15 +273,13 @@ def refocus(
     else:
         check_output(output, bits)
     planes_asked = heights if plane is None else [plane]
-    quilt = quilt_of(picture, layout, aspect)
-    if quilt is None:
-        image = open_picture(picture, display=parse.display(display))
-        pixels, framed = _size_of(size, image.display, console)
-        focused, transfer = focal_planes(image, planes_asked, size=pixels), image.provenance.transfer
+    seen, target = _open_seen(picture, display, layout, aspect)
+    transfer = seen.provenance.transfer
+    pixels, framed = _size_of(size, target, console)
+    if isinstance(seen, Quilt):
+        focused = refocus_quilt(seen, target, planes_asked, size=pixels)
     else:
-        target, transfer = quilt_display(quilt, parse.display(display), str(picture)), quilt.provenance.transfer
-        pixels, framed = _size_of(size, target, console)
-        focused = refocus_quilt(quilt, target, planes_asked, size=pixels)
+        focused = focal_planes(seen, planes_asked, size=pixels)
     focused = (framed(each) for each in focused)
     if plane is not None:
         write_plain_picture(next(focused), output, bits=bits, transfer=transfer)
@@ -290,6 +289,20 @@ def refocus(
         write_planes(focused, heights, output, bits=bits, transfer=transfer, progress=progress)
     line = f"{output}: {len(heights)} planes, focused at {heights[0]:g} to {heights[-1]:g} mm"
     console.result({"output": str(output), "planes": heights}, line)
+
+
+def _open_seen(
+    picture: Path, display: str | None, layout: str | None, aspect: float | None
+) -> tuple[IntegralImage | LargePicture | Quilt, Display]:
+    """The picture or the quilt in a file, and the display that shows it."""
+    from lippmann.image.streamed import open_picture
+    from lippmann.viewing.quilt_views import quilt_display
+
+    quilt = quilt_of(picture, layout, aspect)
+    if quilt is not None:
+        return quilt, quilt_display(quilt, parse.display(display), str(picture))
+    image = open_picture(picture, display=parse.display(display))
+    return image, image.display
 
 
 def _size_of(

@@ -79,27 +79,7 @@ def render_frames(
         raise UsageError(
             "the frames cannot hold layers", where="--layers", rule="OpenEXR can", fix="name them %04d.exr"
         )
-    done: list[dict[str, Any]] = []
-    notes: dict[str, dict[int, str]] = {}
-
-    def noted(frame: SavedFrame) -> SavedFrame:
-        made = frame.provenance
-        seconds = made.seconds.get("total", 0.0)
-        done.append(
-            {
-                "frame": frame.number,
-                "output": str(frame.path),
-                "seconds": seconds,
-                "spp": made.spp,
-                "found": frame.found,
-                "estimate": None if made.estimate is None else dict(made.estimate),
-            }
-        )
-        for note in made.notes:
-            # The same remark of several frames differs in its numbers at most, and in what stands in parentheses.
-            notes.setdefault(_NUMERAL.sub("", note), {})[frame.number] = note
-        return frame
-
+    account = _Account()
     with (
         _places(output, path_of(frames[0]), spec.video),
         console.progress() as progress,
@@ -117,7 +97,7 @@ def render_frames(
             progress=progress,
         ) as saved,
     ):
-        noted_frames = map(noted, saved)
+        noted_frames = map(account.note, saved)
         if filming is None or spec.video is None:
             deque(noted_frames, maxlen=0)
         else:
@@ -130,19 +110,51 @@ def render_frames(
                 quilt=filming.quilt,
                 has_depth=filming.has_depth,
             )
-    for alike in notes.values():
-        where = next(iter(alike))
-        only = f" ({len(alike)} of {len(done)} frames, the first is {where})" if len(alike) < len(done) else ""
-        console.remark(f"{alike[where]}{' and the like' if len(set(alike.values())) > 1 else ''}{only}")
-    if (line := film_in_words([one["estimate"] for one in done])) is not None:
-        console.remark(line)
-    film = "" if spec.video is None else f", {spec.video}"
-    seconds, resumed = sum(one["seconds"] for one in done), sum(one["found"] for one in done)
-    before = f", {resumed} of them found" if resumed else ""
-    console.result(
-        {"output": str(output), "frames": done, "video": None if spec.video is None else str(spec.video)},
-        f"{done[0]['output']} to {Path(done[-1]['output']).name}{film}: {len(done)} frames{before}, {seconds:.1f} s",
-    )
+    account.tell(console, output, spec.video)
+
+
+class _Account:
+    """What is told of frames in the end: each frame, and the remarks on them, alike ones once."""
+
+    def __init__(self) -> None:
+        self._frames: list[dict[str, Any]] = []
+        self._notes: dict[str, dict[int, str]] = {}
+
+    def note(self, frame: SavedFrame) -> SavedFrame:
+        """Add a frame, and pass it on."""
+        made = frame.provenance
+        self._frames.append(
+            {
+                "frame": frame.number,
+                "output": str(frame.path),
+                "seconds": made.seconds.get("total", 0.0),
+                "spp": made.spp,
+                "found": frame.found,
+                "estimate": None if made.estimate is None else dict(made.estimate),
+            }
+        )
+        for note in made.notes:
+            # The same remark of several frames differs in its numbers at most, and in what stands in parentheses.
+            self._notes.setdefault(_NUMERAL.sub("", note), {})[frame.number] = note
+        return frame
+
+    def tell(self, console: Console, output: Path, video: Path | None) -> None:
+        """Print the remarks and the result."""
+        frames, count = self._frames, len(self._frames)
+        for alike in self._notes.values():
+            where = next(iter(alike))
+            only = f" ({len(alike)} of {count} frames, the first is {where})" if len(alike) < count else ""
+            console.remark(f"{alike[where]}{' and the like' if len(set(alike.values())) > 1 else ''}{only}")
+        if (line := film_in_words([one["estimate"] for one in frames])) is not None:
+            console.remark(line)
+        film = "" if video is None else f", {video}"
+        seconds, resumed = sum(one["seconds"] for one in frames), sum(one["found"] for one in frames)
+        before = f", {resumed} of them found" if resumed else ""
+        console.result(
+            {"output": str(output), "frames": frames, "video": None if video is None else str(video)},
+            f"{frames[0]['output']} to {Path(frames[-1]['output']).name}{film}: "
+            f"{count} frames{before}, {seconds:.1f} s",
+        )
 
 
 def _check(spec: SequenceOptions) -> None:
