@@ -6,8 +6,6 @@ import dataclasses
 import shlex
 import subprocess
 import sys
-from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -86,8 +84,7 @@ def test_the_command_line_says_all_but_the_eye(state):
     assert read["display"] == state.display
     for kind in (PlacementOptions, LightOptions, QualityOptions):
         assert read_options(kind, read) == kind.part_of(state)
-    environment = None if state.environment is None else Path(state.environment)
-    assert read_options(SceneOptions, read) == replace(SceneOptions.part_of(state), environment=environment)
+    assert read_options(SceneOptions, read) == SceneOptions.part_of(state)
 
 
 def test_a_draft_is_kept_and_said():
