@@ -28,11 +28,13 @@ OF_THE_LIBRARY = {
     "pupil",
     "light",
     "progress",
+    "number",
 }
-#: Files whose texts are for other programs: pip, a style sheet's variables, Dask's own command, Blender, commands that
-#: are run.
+#: Files whose texts are for other programs: pip, oiiotool, a style sheet's variables, Dask's own command, Blender,
+#: commands that are run.
 OTHER_PROGRAMS = {
     "runtime/engine.py",
+    "codecs/exr.py",
     "scene/mitsuba_plugins.py",
     "scene/readers/blend/export.py",
     "scene/readers/blend/export_script.py",

@@ -62,16 +62,16 @@ def test_without_a_key_frame_light_is_prepared():
 
 
 @pytest.mark.long
-def test_the_light_of_a_flight_is_prepared_once_for_each_key_frame(engine, display, prepared, tmp_path):
+def test_the_light_of_a_flight_is_prepared_once_while_it_is_passed_on(engine, display, prepared, tmp_path):
     path = tmp_path / "flight.cam"
     poses = (f"0 -0.2756 -0.9613  0 0.9613 -0.2756  {x} 174 384\n" for x in range(5))
     path.write_text("".join(poses))
     motion = open_motion("room", camera_path=path)
     options = {"integrator": "path", "device": "cpu"}
     together = dict(render_sequence(motion, display, **options))
-    assert len(prepared) == 2  # of frames 0 and 4
+    assert len(prepared) == 1  # of frame 0, also for frame 4, which passes it on
     ((_, alone),) = render_sequence(motion, display, [2], **options)
-    assert len(prepared) == 3
+    assert len(prepared) == 2
     assert np.array_equal(alone.pixels, together[2].pixels)
     choices = [image.provenance.options.get("light_vertices") for image in together.values()]
     assert choices[0] is not None
