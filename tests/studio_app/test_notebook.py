@@ -128,7 +128,7 @@ def test_a_closed_studio_is_gone(tmp_path, engine):
     [
         ({"scene": "no-such"}, "unknown bundled scene or file"),
         ({"display": "no-such"}, "no-such"),
-        ({"display": 3}, "int is no name of a display"),
+        ({"display": 3}, "must be a text or a path"),
         ({"height": 10}, "200 to 4000"),
         ({"port": 99999}, "port"),
         ({"framed_by": "https://hub.example"}, "say ['https://hub.example']"),

@@ -95,8 +95,8 @@ def test_up_of_what_says_it_itself_is_refused():
         ("gear.sldprt", "STEP"),
         ("wing.cgns", "ParaView"),
         ("party.lfp", "lippmann weave"),
-        ("sky.exr", "--environment"),
-        ("sky.hdr", "--environment"),
+        ("sky.exr", "environment="),
+        ("sky.hdr", "environment="),
     ],
 )
 def test_files_of_other_programs_are_told_how_to_become_gltf(save, name, said):
