@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -12,6 +15,7 @@ from lippmann.rendering.methods import SAMPLES_LAYER
 from lippmann.scene.matrices import scaling, translation
 from lippmann.scene.values.description import Camera, Instance, Light, Material, Mesh, SceneDescription
 from lippmann.scene.values.whitted_scene import CameraPose
+from lippmann.sequences import key_frames
 from lippmann.sequences.frames import FrameRange, render_quilt_sequence, render_sequence
 from lippmann.sequences.motion import Flight, Motion
 from lippmann.sequences.turntable import open_turntable
@@ -132,3 +136,21 @@ def test_animated_cameras_pass_on_light_in_any_picture(form):
     # Frames of their own err alike, so that their difference is no judge.
     own, reference = (render([1], seed=seed, spp=n)[1] for seed, n in ((1, key.provenance.spp), (2, 64)))
     assert error(after, reference) < 1.2 * error(own, reference)
+
+
+def test_what_is_kept_of_a_film_ends_with_it(display, monkeypatch):
+    """At once: scenes that a cycle of references keeps change the numbers of later ones, whose kernels are new then."""
+    kept = []
+
+    class Remembered(key_frames.KeyFrames):
+        def __init__(self, *values):
+            super().__init__(*values)
+            kept.append(weakref.ref(self))
+
+    monkeypatch.setattr("lippmann.sequences.frames.KeyFrames", Remembered)
+    gc.disable()
+    try:
+        list(render_sequence(flight(0.0), display.resized(96, 56), **PATHS))
+        assert [each() for each in kept] == [None]
+    finally:
+        gc.enable()

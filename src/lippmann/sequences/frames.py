@@ -328,10 +328,10 @@ def render_frames(
     def trace(now: Moment, request: RenderRequest, report: ProgressCallback) -> Shown:
         return form.render(now.scene, display, replace(request, placement=now.placement), report, kept.build)
 
-    def render_key(key: Moment, own: RenderRequest) -> Provenance:
-        return trace(key, of_frame(own, keys.noise_of(key.number, request)), silent).provenance
+    def render_key(key: Moment, own: RenderRequest, noise_of: int) -> Provenance:
+        return trace(key, of_frame(own, noise_of), silent).provenance
 
-    keys: KeyFrames = KeyFrames(display, moment, render_key, _shared_light(motion, where))
+    keys = KeyFrames(display, moment, render_key, _shared_light(motion, where))
 
     def render(position: int, frame: int) -> Shown:
         now = moment(frame)

@@ -52,7 +52,7 @@ class KeyFrames:
     moment:
         Returns a frame by its number.
     render:
-        Renders a frame as a request asks, which has no seed of the frame's own yet; its provenance.
+        Renders a frame as a request asks, with the seed of the frame of a number; its provenance.
     shared:
         Takes the light of key frames for those after them; None where all frames are traced.
     """
@@ -61,7 +61,7 @@ class KeyFrames:
         self,
         display: Display,
         moment: Callable[[int], Moment],
-        render: Callable[[Moment, RenderRequest], Provenance],
+        render: Callable[[Moment, RenderRequest, int], Provenance],
         shared: KeyLight | None,
     ) -> None:
         self._display = display
@@ -120,7 +120,8 @@ class KeyFrames:
             return None
         if kept is None:
             before = self.before(last, request)
-            key = self.add(last, self._render(last, self.request_of(request, last, before)), before)
+            made = self._render(last, self.request_of(request, last, before), self.noise_of(number, request))
+            key = self.add(last, made, before)
         else:
             key = kept[1]
         is_told = key.made.estimate is not None and "by_chance" in key.made.estimate
