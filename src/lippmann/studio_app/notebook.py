@@ -161,18 +161,15 @@ class NotebookStudio:
 
 
 def state_of_settings(
-    scene: str, display: object, settings: Mapping[str, object], held: Scene | None = None
+    scene: str, display: str | Path, settings: Mapping[str, object], held: Scene | None = None
 ) -> StudioState:
     """The first state of a scene on a display; the light of a held scene is that of the scene.
 
     Raises
     ------
     UsageError
-        A setting is unknown, its value is out of its range, or the display is no name.
+        A setting is unknown, or its value is out of its range.
     """
-    if not isinstance(display, (str, Path)):
-        rule = "the studio takes a name, a file or a short form"
-        raise UsageError(f"a {type(display).__name__} is no name of a display", parameter="display", rule=rule)
     if held is not None and settings.get("up") is not None:
         raise UsageError("is for files", parameter="up", fix="leave it out")
     values: dict[str, object] = {}
