@@ -71,3 +71,10 @@ def test_stages_are_timed_and_reported():
     assert watch.seconds["build"] >= first
     assert watch.total >= watch.seconds["build"]
     assert [(report.stage, report.done, report.total) for report in reports] == 2 * [("build", 0, 1), ("build", 1, 1)]
+
+
+def test_rays_begin_at_the_eyes_that_a_placement_says(teapot):
+    """A caller that traced the display it had placed forgot that a monitor's eyes may stand closer together."""
+    session, monitor = open_session(teapot, DIRECT), load_display("odyssey-3d")
+    placement = replace(session.place(monitor), eye_share=0.5)
+    assert session.rays(monitor, placement).display.gap == pytest.approx(2 * monitor.gap)

@@ -168,9 +168,9 @@ def forecast(
     placement = session.place(display)
 
     from lippmann.rendering.methods import Job
-    from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
+    from lippmann.rendering.transport.ray_source import WindowRays
 
-    whole = DisplayRays(display, placement.world_from_display, bool(request.subpixels))
+    whole = session.rays(display, placement)
     window = find_window(session, display, placement)
     source = whole if window is None else WindowRays(whole, window)
     probe = _Probe(source, request.seed)

@@ -64,10 +64,10 @@ def render_picture(
     from lippmann.image.integral_image import IntegralImage
     from lippmann.rendering.film.aov import plan_layers, trace_layers
     from lippmann.rendering.methods import Job, trace
-    from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
+    from lippmann.rendering.transport.ray_source import WindowRays
 
     display_from_world = placement.display_from_world
-    source = DisplayRays(display, placement.world_from_display, bool(request.subpixels))
+    source = session.rays(display, placement)
     integrator = session.integrator(source, display_from_world, placement.exposure)
     window = find_window(session, display, placement)
     part = source if window is None else WindowRays(source, window)
@@ -120,10 +120,7 @@ def choose_exposure(scene: Scene, display: Display, request: RenderRequest, buil
     """
     session = open_session(scene, resolve(request, scene, display), build=build)
     placement = session.place(display)
-    from lippmann.rendering.transport.ray_source import DisplayRays
-
-    source = DisplayRays(display, placement.world_from_display, bool(session.request.subpixels))
-    session.integrator(source, placement.display_from_world, placement.exposure)
+    session.integrator(session.rays(display, placement), placement.display_from_world, placement.exposure)
     # A fixed exposure comes on top of the camera's own.
     return cast("float", session.choices.get("exposure", 0.0)) - session.count_exposure(placement.exposure)
 

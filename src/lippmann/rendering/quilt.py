@@ -70,6 +70,7 @@ def render_quilt(
     session = open_session(scene, request, size, progress=progress, build=build)
     request = session.request
     placement = session.place(display)
+    display = placement.traced(display)
 
     from lippmann.device.pbr import BuiltScene
     from lippmann.device.pbr.scene import scene_corners
@@ -81,7 +82,7 @@ def render_quilt(
     background, window = even_background(session.built, request), None
     if background is not None and isinstance(session.built, BuiltScene):
         window = view_window(scene_corners(session.built, display_from_world), display, view_size)
-    source = QuiltRays(placement.traced(display), placement.world_from_display, columns, rows, view_size, window)
+    source = QuiltRays(display, placement.world_from_display, columns, rows, view_size, window)
     integrator = session.integrator(source, display_from_world, placement.exposure)
 
     traced = trace(Job(session, integrator, source, display_from_world))

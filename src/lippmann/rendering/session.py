@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from lippmann.device.whitted.scene import BuiltClassic
     from lippmann.options.placement import PlacementOptions
     from lippmann.rendering.transport.integrator import Integrator
-    from lippmann.rendering.transport.ray_source import RaySource
+    from lippmann.rendering.transport.ray_source import DisplayRays, RaySource
 
 #: Share of the free memory that is used where no limit is given.
 DEFAULT_MEMORY_SHARE = 0.6
@@ -131,6 +131,12 @@ class Session:
             fix = f"pop_out=0 or {fix}"
         what = f"the panel's edge cuts what stands up to {cut.height:.3g} mm in front of it"
         return (f"{what} ({sides}): {fix} sets it behind",)
+
+    def rays(self, display: Display, placement: Placement) -> DisplayRays:
+        """Rays through the native (sub-)pixels of a display that stands at a place."""
+        from lippmann.rendering.transport.ray_source import DisplayRays
+
+        return DisplayRays(placement.traced(display), placement.world_from_display, bool(self.request.subpixels))
 
     def find_place(self, display: Display, bounds_in: Callable[[Matrix], Matrix] | None = None) -> Placement:
         """As :meth:`place`, leaving the light as it is; ``bounds_in`` stands for the scene's, if given."""

@@ -91,7 +91,7 @@ def prepare(job: TileJob, progress: ProgressCallback = silent) -> Prepared:
     request = session.request
     job = replace(job, request=request)
     placement = session.place(job.display)
-    source = DisplayRays(job.display, placement.world_from_display, bool(request.subpixels))
+    source = session.rays(job.display, placement)
     integrator = session.integrator(source, placement.display_from_world, placement.exposure)
     # Tiles are traced in silence, whoever counts them.
     quiet = replace(session, watch=Stopwatch())

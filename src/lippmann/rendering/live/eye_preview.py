@@ -68,9 +68,9 @@ def render_eye_preview(
     from lippmann.rendering.denoise.tuning import TUNING as DENOISE
     from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.transport.ray_source import DisplayRays, SinglePixelRays
+    from lippmann.rendering.transport.ray_source import SinglePixelRays
 
-    whole = DisplayRays(placement.traced(display), placement.world_from_display, bool(resolved.subpixels))
+    whole = session.rays(display, placement)
     source = SinglePixelRays(whole, visible.column, visible.row, visible.channel)
     integrator = session.integrator(whole, placement.display_from_world, placement.exposure)
     plan = cut_wavefronts(source.width, source.height, samples, channels=source.channels, memory=session.memory)

@@ -100,7 +100,7 @@ class LiveFrame:
 
 @dataclass(frozen=True, eq=False)
 class PlacedView:
-    """A view with the display's place in the scene, and what is traced for it."""
+    """A view with its display, as rays are traced, that display's place in the scene, and what is traced for it."""
 
     kernels: SceneKernels
     display: Display
@@ -109,11 +109,6 @@ class PlacedView:
     placement: Placement
     placed: PlacedDisplay
     pixels: PixelSet
-
-    @property
-    def traced(self) -> Display:
-        """The display by whose lenses rays are traced."""
-        return self.placement.traced(self.display)
 
     def light_up(self, exposure: float) -> None:
         """Set the scene's light and exposure to those of this view, if another view was traced in between."""

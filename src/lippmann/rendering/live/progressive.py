@@ -82,7 +82,7 @@ class Progressive:
             self._coming = max(1, self._next // self._count)
         last = min(self._begun + max(1, self._next // self._coming), self._count)
         lanes = Lanes(self._pixels, slice(self._begun, last), STREAMS, self._coming, self._taken)
-        tracer = self._kernels.tracer(self._view.traced, self._view.request)
+        tracer = self._kernels.tracer(self._view.display, self._view.request)
         self._sums[:, lanes.part] += tracer.trace(lanes, self._view.placed, seed=self._view.request.seed).sums
         count = (last - self._begun) * self._coming
         self._begun = last % self._count
@@ -96,7 +96,7 @@ class Progressive:
 
     def _trace_features(self, seconds: dict[str, float]) -> None:
         started = time.perf_counter()
-        tracer = self._kernels.feature_tracer(self._view.traced, self._view.request)
+        tracer = self._kernels.feature_tracer(self._view.display, self._view.request)
         albedo, normal = np.empty((2, self._count, 3), np.float32)
         step, seed = self._kernels.most_lanes // DENOISE.guide_samples, named_seed("guides", self._view.request.seed)
         for start in range(0, self._count, step):

@@ -130,8 +130,8 @@ class LiveRenderer:
         seconds: dict[str, float] = {}
         with exclusive():
             stand = self._stand(kernels, display, view, _moving(view.request), seconds)
-            exposure = kernels.expose(display, stand.request, stand.placement, measure=False)
-            tracer = kernels.tracer(stand.traced, stand.request)
+            exposure = kernels.expose(stand.display, stand.request, stand.placement, measure=False)
+            tracer = kernels.tracer(stand.display, stand.request)
             count, step = len(stand.pixels.column), min(TRANSPORT.lanes, kernels.most_lanes)
             values, heights = np.empty((count, 3), np.float32), np.empty(count, np.float32)
         for start in range(0, count, step):
@@ -168,7 +168,7 @@ class LiveRenderer:
         from lippmann.rendering.live.progressive import Progressive
 
         stand = self._stand(kernels, display, view, _resting(view.request), {})
-        exposure = kernels.expose(display, stand.request, stand.placement, measure=True)
+        exposure = kernels.expose(stand.display, stand.request, stand.placement, measure=True)
         return Progressive(stand, exposure)
 
     @exclusive()
@@ -252,7 +252,7 @@ class LiveRenderer:
                 pixels = self._window(display, view.window, subpixels=subpixels, row_step=view.row_step)
             else:
                 pixels = self._visible(self._map(view.eye_map, display, view.size, subpixels=subpixels), view.eye)
-        stand = PlacedView(kernels, display, view, resolved, placement, placed, pixels)
+        stand = PlacedView(kernels, placement.traced(display), view, resolved, placement, placed, pixels)
         kernels.lit_for = stand
         return stand
 

@@ -99,7 +99,7 @@ class SceneKernels:
         if not isinstance(integrator, PathIntegrator):
             return 0.0
         exposure, sampler = request.exposure, integrator.light.sampler
-        source = DisplayRays(placement.traced(display), placement.world_from_display, bool(request.subpixels))
+        source = DisplayRays(display, placement.world_from_display, bool(request.subpixels))
         if (measure or integrator.light.gain is None) and not self.built.borrowed:
             sampler = make_light_sampler(integrator.scene, trace_pilot(integrator.lit_by(PreparedLight()), source))
         if exposure == "auto":
