@@ -98,7 +98,7 @@ def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
             layout = metadata.layout if metadata and not names_layout(path) else layout_of_name(path)
         if layout.aspect is None and metadata is not None:
             layout = layout._replace(aspect=metadata.layout.aspect)
-        elif layout.aspect is None and names_half_pair(path):
+        if layout.aspect is None and names_half_pair(path):
             layout = layout._replace(aspect=file.size[0] / file.size[1])
         check_size(*file.size, layout, str(path))
         values = file.read()

@@ -174,20 +174,25 @@ def read_photos(
     return Photos(quilt, target, (cropped[0], cropped[1]), notes + of_files.lines())
 
 
-def quilt_of_pair(path: Path) -> Quilt:
+def quilt_of_pair(path: Path, *, half: bool = False) -> Quilt:
     """The two views of a stereo pair in one file (JPS, MPO, HEIF), the left one first, in sRGB.
+
+    The right view is fitted to the size of the left one; ``half`` halves the width of both.
 
     Raises
     ------
     PictureError
-        The file is missing, damaged or holds one picture, or its views differ in size.
+        The file is missing, damaged or holds one picture.
     """
     sources = _views_in(path)
     if len(sources) < 2:
         raise PictureError("holds no stereo pair", where=str(path), rule="two views that are marked as such")
-    size = _header(sources[0]).size
-    read = read_photos([path], size, size, keeps_profile=False)
-    return replace(read.quilt, notes=read.notes)
+    (width, height), second = (_header(source).size for source in sources)
+    size = (width + 1) // 2 if half else width, height
+    read = read_photos([path], size, (width, height), fit="cover", keeps_profile=False)
+    fitted = () if second == (width, height) else ("its views differ in size: the right one is fitted to the left one",)
+    layout = QuiltLayout(2, 1, width / height if half else None)
+    return replace(read.quilt, layout=layout, notes=fitted + read.notes)
 
 
 class _Source(NamedTuple):

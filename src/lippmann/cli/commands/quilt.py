@@ -176,13 +176,18 @@ def pack(
     from lippmann.image.write import check_output
     from lippmann.quilts.files import read_views, write_quilt
     from lippmann.quilts.photos import quilt_of_pair
-    from lippmann.quilts.quilt import layout_of_name
+    from lippmann.quilts.quilt import layout_of_name, names_half_pair
 
     console = Console(quiet, as_json)
-    layout = layout_of_name(output, to_write=True)
+    layout, half = layout_of_name(output, to_write=True), names_half_pair(output)
     check_output(output, bits)
     with console.progress() as progress:
-        packed = quilt_of_pair(folder) if folder.is_file() else read_views(folder, layout, progress=progress)
+        if folder.is_file():
+            packed = quilt_of_pair(folder, half=half)
+        else:
+            packed = read_views(folder, layout, progress=progress)
+            if half:
+                console.remark("its views are taken as halved in width: players show them twice as wide")
         console.remark(*packed.notes)
     write_quilt(packed, output, bits=bits)
     width, height = packed.size
