@@ -50,7 +50,7 @@ def test_dark_models_get_more_light(value, strength):
     scene = Scene("s", squares((grey(value), 1, None)))
     assert scene.in_studio
     assert scene.environment.pixels == pytest.approx(strength * studio().pixels, rel=1e-5)
-    assert scene.environment.studio_scale == pytest.approx(strength * studio().studio_scale)
+    assert scene.environment.scale == pytest.approx(strength * studio().scale)
 
 
 def test_the_bundled_light_is_the_same_object():

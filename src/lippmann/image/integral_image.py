@@ -18,11 +18,12 @@ from lippmann.display import Display
 from lippmann.display.panel import PixelWindow
 from lippmann.errors import PictureError, UsageError
 from lippmann.image.encoding import display_codes, linear_values
-from lippmann.image.metadata import Metadata, Provenance, check_placement
+from lippmann.image.metadata import Metadata, Provenance
 from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, Values
 from lippmann.image.views import Resampling, exact_view_shape, resampled_views, view_grid
 from lippmann.options.option import checked
+from lippmann.scene.matrices import check_placement
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

@@ -8,13 +8,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, get_args
 
-import numpy as np
-
 from lippmann.color.transfer import Transfer
 from lippmann.display import Display
 from lippmann.errors import LippmannError, PictureError
 from lippmann.image.stored_values import Matrix
 from lippmann.printable import shorten
+from lippmann.scene.matrices import check_placement
 
 #: Version of this text; rises when a known name changes its meaning.
 VERSION = 1
@@ -24,9 +23,6 @@ KEY = "lippmann"
 
 #: The key that marks the metadata of a quilt, which is no picture of a panel.
 QUILT_KEY = "quilt"
-
-#: Deviation of ``world_from_display`` from a rotation and scales that rounding may leave.
-_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -262,28 +258,3 @@ def from_dict(values: Mapping[str, object], where: str) -> Metadata:
 
 def _refuse_constant(name: str) -> None:
     raise ValueError(name)
-
-
-def check_placement(matrix: object) -> Matrix:
-    """``matrix`` as a read-only ``(4, 4)`` float64 array; a :class:`PictureError` if it places no display.
-
-    Columns 0 to 2 are the display's axes in the world: right-handed, x and y at a right angle and equally long. That of
-    z may be longer, where the display shows the scene's depth compressed, and lean, where a camera's lens is shifted.
-    """
-    rule = "it must be 4 x 4: a rotation times a scale (z may differ and lean), a translation, and (0, 0, 0, 1) below"
-    try:
-        values: Matrix = np.array(matrix, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise PictureError("world_from_display is no matrix", rule=rule) from None
-    if values.shape != (4, 4) or not np.isfinite(values).all() or list(values[3]) != [0, 0, 0, 1]:
-        raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
-    linear = values[:3, :3]
-    with np.errstate(all="ignore"):  # what overflows places nothing either: NaN is within no tolerance
-        lengths = np.linalg.norm(linear, axis=0)
-        axes = linear / lengths
-        is_regular = np.linalg.det(axes) > 0.0 and abs(lengths[0] / lengths[1] - 1.0) <= _TOLERANCE
-        is_square = abs(axes[:, 0] @ axes[:, 1]) <= _TOLERANCE
-    if not (is_regular and is_square):
-        raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
-    values.flags.writeable = False
-    return values

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.errors import PictureError
 from lippmann.scene.values.description import Matrix
 
 #: Points, or a box by its corners, ``(n, 3)``.
@@ -15,6 +16,9 @@ Vector = tuple[float, float, float]
 
 #: Sine of the angle to the vertical below which a direction is vertical.
 _UPRIGHT = 1e-9
+
+#: Deviation of ``world_from_display`` from a rotation and scales that rounding may leave.
+_TOLERANCE = 1e-6
 
 
 def transform_points(matrix: Matrix, points: Bounds) -> Bounds:
@@ -47,6 +51,31 @@ def rotation_of(world_from_display: Matrix) -> Matrix:
     matrix[:3, :2] = linear[:, :2] / np.linalg.norm(linear[:, :2], axis=0)
     matrix[:3, 2] = np.cross(matrix[:3, 0], matrix[:3, 1])
     return matrix
+
+
+def check_placement(matrix: object) -> Matrix:
+    """``matrix`` as a read-only ``(4, 4)`` float64 array; a :class:`PictureError` if it places no display.
+
+    Columns 0 to 2 are the display's axes in the world: right-handed, x and y at a right angle and equally long. That of
+    z may be longer, where the display shows the scene's depth compressed, and lean, where a camera's lens is shifted.
+    """
+    rule = "it must be 4 x 4: a rotation times a scale (z may differ and lean), a translation, and (0, 0, 0, 1) below"
+    try:
+        values: Matrix = np.array(matrix, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise PictureError("world_from_display is no matrix", rule=rule) from None
+    if values.shape != (4, 4) or not np.isfinite(values).all() or list(values[3]) != [0, 0, 0, 1]:
+        raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
+    linear = values[:3, :3]
+    with np.errstate(all="ignore"):  # what overflows places nothing either: NaN is within no tolerance
+        lengths = np.linalg.norm(linear, axis=0)
+        axes = linear / lengths
+        is_regular = np.linalg.det(axes) > 0.0 and abs(lengths[0] / lengths[1] - 1.0) <= _TOLERANCE
+        is_square = abs(axes[:, 0] @ axes[:, 1]) <= _TOLERANCE
+    if not (is_regular and is_square):
+        raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
+    values.flags.writeable = False
+    return values
 
 
 def normal_matrix(matrix: Matrix) -> Matrix:

@@ -423,9 +423,7 @@ def light_rotation(options: LightOptions) -> Matrix:
 def change_environment(original: Environment, options: LightOptions) -> Environment:
     """An environment as the options have it."""
     if options.environment_strength != 1.0:
-        strength = options.environment_strength
-        pixels = np.asarray(original.pixels, np.float32) * np.float32(strength)
-        original = replace(original, pixels=pixels, studio_scale=original.studio_scale * strength)
+        original = original.brighten(options.environment_strength)
     if any(options.light_turn):
         original = replace(original, world_from_environment=light_rotation(options) @ original.world_from_environment)
     return original

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from types import ModuleType
 from typing import Any
@@ -24,11 +24,13 @@ BRIGHTEST = 2.5
 
 _DARK = 0.25
 
-_HEIGHT = 64
+#: Rows of directions over which its light is summed. Half of them change its brightness by 0.5 %, double by 0.06 %.
+HEIGHT = 64
 
 # Radiance of the walls straight down, at the horizon and straight up, before scaling.
 _FLOOR, _HORIZON, _CEILING = 0.1, 0.25, 0.35
-#: That of a line from floor to ceiling is in proportion to 1 + SLOPE y.
+#: That of a line from floor to ceiling is in proportion to 1 + SLOPE y. Sampled so, the walls' light has a relative
+#: variance of 0.003; with half the slope 0.04, with a slope of 0.9 0.07.
 SLOPE = (_CEILING - _FLOOR) / (_CEILING + _FLOOR)
 
 # A white diffuse surface that faces the viewer, tilted this much upwards (degrees), comes out at radiance 1.
@@ -88,7 +90,17 @@ BOXES = (
 )
 
 
-def studio_for(scene: SceneDescription) -> Environment:
+@dataclass(frozen=True, eq=False)
+class Studio(Environment):
+    """The studio with its radiance times ``scale``: renderers evaluate :func:`radiance`, all else takes ``pixels``."""
+
+    scale: float = 1.0
+
+    def brighten(self, factor: float) -> Studio:
+        return replace(self, pixels=super().brighten(factor).pixels, scale=self.scale * factor)
+
+
+def studio_for(scene: SceneDescription) -> Studio:
     """The studio as it lights a scene: brighter before dark models, up to :data:`BRIGHTEST` times.
 
     A scene whose surfaces are darker than a quarter of white in the mean (:func:`mean_reflectance`) gets as much more
@@ -101,21 +113,21 @@ def studio_for(scene: SceneDescription) -> Environment:
 
 
 @lru_cache(maxsize=4)
-def studio(strength: float = 1.0) -> Environment:
-    """Soft boxes on a grey gradient, as an environment that renderers evaluate by :func:`radiance`.
+def studio(strength: float = 1.0) -> Studio:
+    """Soft boxes on a grey gradient.
 
     The viewer is taken to look along -z with +y up: the key light hangs over the viewer's left shoulder, the fill on
     the right, one box overhead, a narrow one behind the scene on the right. All light is white. It is scaled so that
     a white diffuse surface facing the viewer and 30 degrees upwards has radiance 1, times ``strength``.
     """
-    directions, solid_angles = directions_of(_HEIGHT)
+    directions, solid_angles = directions_of(HEIGHT)
     grey = radiance(np, *np.moveaxis(directions, -1, 0))
     tilt = np.radians(_CALIBRATION_TILT)
     cosine = np.maximum(directions @ np.array([0.0, np.sin(tilt), np.cos(tilt)]), 0.0)
     scale = strength * np.pi / float((grey * cosine * solid_angles).sum())
     pixels = np.repeat(scale * grey[..., None], 3, axis=-1).astype(np.float32)
     pixels.setflags(write=False)
-    return Environment(pixels, name=NAME, follows_viewer=True, studio_scale=scale)
+    return Studio(pixels, name=NAME, follows_viewer=True, scale=scale)
 
 
 def radiance(lib: ModuleType, x: Any, y: Any, z: Any) -> Any:

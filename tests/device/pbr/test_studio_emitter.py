@@ -1,12 +1,11 @@
 """The studio's emitter against Mitsuba's, which looks the same light up in a picture."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from lippmann.scene.matrices import rotation
 from lippmann.scene.studio_light import studio
+from lippmann.scene.values.description import Environment
 
 COUNT = 40_000
 
@@ -18,7 +17,7 @@ def emitters(engine):
     from lippmann.device.pbr.emitters import environment_object, turn_environment
 
     light = studio(1.5)
-    both = environment_object(light), environment_object(replace(light, studio_scale=0.0))
+    both = environment_object(light), environment_object(Environment(light.pixels))
     for emitter in both:
         turn_environment(emitter, rotation((30.0, 20.0, 10.0)))
     return both

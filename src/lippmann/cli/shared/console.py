@@ -97,10 +97,10 @@ def report(output: Path, size: tuple[int, int], provenance: Provenance) -> dict[
 
 
 def depth_line(made: Provenance) -> str:
-    """Range of depth of the scene, beside the range that the display can resolve."""
+    """Range of depth of the scene, beside the depth budget of the display."""
     ranges = (cast("tuple[float, float]", made.options[key]) for key in ("depth_range", "depth_budget"))
     (back, front), (far, near) = ranges
-    return f"scene {depths_in_words(back, front)}; the display resolves {depths_in_words(far, near)}"
+    return f"scene {depths_in_words(back, front)}; depth budget of the display {depths_in_words(far, near)}"
 
 
 def add_seconds(provenance: Provenance, **seconds: float) -> Provenance:

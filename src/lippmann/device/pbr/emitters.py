@@ -27,6 +27,7 @@ from lippmann.device.types import (
     Vector3f,
 )
 from lippmann.errors import SceneError
+from lippmann.scene.studio_light import Studio
 from lippmann.scene.values.description import Environment, Light, Matrix
 
 #: A spot's inner half-angle stays this much (radians) below its outer one: Mitsuba divides by the difference.
@@ -109,10 +110,10 @@ def environment_object(environment: Environment) -> Emitter:
     if (pixels == pixels[0, 0]).all():
         return mi.load_dict({"type": "constant", "radiance": {"type": "rgb", "value": pixels[0, 0].tolist()}})
     to_world = mi.ScalarTransform4f(environment_to_world(environment.world_from_environment).tolist())
-    if environment.studio_scale > 0:
+    if isinstance(environment, Studio):
         from lippmann.device.pbr.studio_emitter import studio_emitter
 
-        return studio_emitter(environment.studio_scale, to_world)
+        return studio_emitter(environment.scale, to_world)
     if len(pixels) <= MAX_EXACT_ROWS:
         pixels = _rows_for_mitsuba(pixels)
     bitmap = mi.Bitmap(np.require(pixels, requirements=["C", "W"]))  # it refuses read-only arrays

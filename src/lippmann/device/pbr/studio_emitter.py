@@ -28,6 +28,7 @@ from lippmann.device.types import (
 from lippmann.scene import studio_light
 
 #: Distance of what lights from infinity, in units of the scene: Mitsuba tells no emitter in Python how large that is.
+#: Shadow rays go so far, beyond all that a scene holds; double and half give the same picture.
 _BEYOND = 1e12
 
 
@@ -149,7 +150,7 @@ def _emitter_class(variant: str) -> type[Emitter]:
 
 def _shares() -> NDArray[np.float64]:
     """Shares of the light of each box, and last of the walls."""
-    directions, solid_angles = studio_light.directions_of(64)
+    directions, solid_angles = studio_light.directions_of(studio_light.HEIGHT)
     x, y, z = np.moveaxis(directions, -1, 0)
     walls = (studio_light.shell(np, y) * solid_angles).sum()
     fluxes = []

@@ -8,7 +8,7 @@ are linear RGB, non-negative. Matrices are 4x4 float64, acting on column vectors
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -250,9 +250,7 @@ class Environment:
 
     Row 0 lies at +y (up), the middle column at -z, ahead of a viewer who looks that way; columns run to the right (+x).
     ``follows_viewer`` says that this holds for whoever looks at the scene, wherever the display or camera stands;
-    ``world_from_environment`` is then set for each picture. ``notes`` say what of its file is not used. A
-    ``studio_scale`` above 0 says that ``pixels`` show the built-in studio with its radiance scaled by this: renderers
-    evaluate the studio itself.
+    ``world_from_environment`` is then set for each picture. ``notes`` say what of its file is not used.
 
     Examples
     --------
@@ -266,7 +264,10 @@ class Environment:
     name: str = ""
     follows_viewer: bool = False
     notes: Sequence[str] = ()
-    studio_scale: float = 0.0
+
+    def brighten(self, factor: float) -> Environment:
+        """The same environment with its radiance times ``factor`` (>= 0)."""
+        return replace(self, pixels=np.asarray(self.pixels, np.float32) * np.float32(factor))
 
 
 @dataclass(frozen=True, eq=False)
