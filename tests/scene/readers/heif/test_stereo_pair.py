@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from lippmann.codecs.icc import profile_of_cicp
 from lippmann.errors import PictureError
 from lippmann.scene.readers.heif import read_heif_pair
 
@@ -53,3 +54,14 @@ def test_a_pair_is_read_by_its_group(tmp_path):
     path.write_bytes(with_group(path.read_bytes()[:-40], 2, 1))
     with pytest.raises(PictureError, match=r"spatial\.heic: cannot be decoded"):
         [each.codes() for each in read_heif_pair(path)]
+
+
+def test_colours_that_code_points_say_are_kept(tmp_path):
+    """Those of a pair were taken for sRGB, whatever the file said without an ICC profile."""
+    pillow_heif = pytest.importorskip("pillow_heif", minversion="1.8")
+    file = pillow_heif.from_pillow(Image.fromarray(RIGHT))
+    file.add_from_pillow(Image.fromarray(LEFT))
+    path = tmp_path / "spatial.heic"
+    file.save(path, quality=100, color_primaries=12, transfer_characteristics=13)  # Display P3, of the first picture
+    path.write_bytes(with_group(path.read_bytes(), 2, 1))
+    assert [profile_of_cicp(12, 13) == each.icc for each in read_heif_pair(path)] == [False, True]

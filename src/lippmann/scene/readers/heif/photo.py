@@ -16,7 +16,7 @@ from lippmann.scene.readers.depth_map import DepthMap, without_stairs
 from lippmann.scene.values.description import Image
 
 #: Bytes of a pixel while it is decoded: what the decoder holds of it, and its values.
-_BYTES_PER_PIXEL = 12
+BYTES_PER_PIXEL = 12
 #: Depth representations that are linear in inverse depth (H.265, G.14.3.3): of inverse depth, and of disparity. Of
 #: others, values would have to be told from near to far.
 _INVERSE = (0, 1)
@@ -46,7 +46,7 @@ def read_heif_photo(data: bytes, where: str) -> tuple[Image, DepthMap | None]:
         depths = file.info.get("depth_images", [])
         for each in (file, *depths):
             width, height = each.size
-            check_input(_BYTES_PER_PIXEL * width * height, f"a picture of {width} x {height} pixels", where=where)
+            check_input(BYTES_PER_PIXEL * width * height, f"a picture of {width} x {height} pixels", where=where)
         pixels = np.array(file)
         values = np.asarray(depths[0], np.float32) if depths else None
     except (ValueError, RuntimeError, EOFError, OSError, SyntaxError, KeyError, IndexError) as error:
@@ -59,7 +59,7 @@ def read_heif_photo(data: bytes, where: str) -> tuple[Image, DepthMap | None]:
         )
     colors = pixels[..., :3] if pixels.shape[2] >= 3 else pixels[..., :1]
     try:
-        image = Image(where, np.ascontiguousarray(convert_codes(colors, _profile(file.info))))
+        image = Image(where, np.ascontiguousarray(convert_codes(colors, profile_of(file.info))))
     except PictureError as error:
         raise SceneError(error.what, where=where, rule=error.rule, fix=error.fix) from None
     if values is None:
@@ -71,7 +71,8 @@ def read_heif_photo(data: bytes, where: str) -> tuple[Image, DepthMap | None]:
     return image, DepthMap(without_stairs(values))
 
 
-def _profile(info: Mapping[str, Any]) -> bytes:
+def profile_of(info: Mapping[str, Any]) -> bytes:
+    """ICC profile of a picture's colours, its own or one made from its code points (ITU-T H.273); empty: sRGB."""
     code_points = info.get("nclx_profile") or {}
     own = info.get("icc_profile") or b""
     if own or not code_points:

@@ -10,9 +10,7 @@ from lippmann.codecs.photograph import Photograph
 from lippmann.errors import PictureError
 from lippmann.runtime.machine import check_input
 from lippmann.runtime.optional_import import check_installed
-
-#: Bytes of a pixel while it is decoded: what the decoder holds of it, and its values.
-_BYTES_PER_PIXEL = 12
+from lippmann.scene.readers.heif.photo import BYTES_PER_PIXEL, profile_of
 
 
 def read_heif_pair(path: Path) -> tuple[Photograph, Photograph] | None:
@@ -37,9 +35,8 @@ def read_heif_pair(path: Path) -> tuple[Photograph, Photograph] | None:
             return None
         left, right = (file[number] for number in groups[0])
         for each in (left, right):
-            check_input(_BYTES_PER_PIXEL * each.size[0] * each.size[1], "a view of the pair", where=str(path))
-        views = [(np.array(each), each.info.get("icc_profile") or b"") for each in (left, right)]
+            check_input(BYTES_PER_PIXEL * each.size[0] * each.size[1], "a view of the pair", where=str(path))
+        (first, icc), (second, other_icc) = ((np.array(each), profile_of(each.info)) for each in (left, right))
     except (ValueError, RuntimeError, EOFError, KeyError, IndexError, TypeError) as error:
         raise PictureError(f"cannot be decoded ({error})", where=str(path), rule="a HEIF picture") from None
-    (first, icc), (second, other_icc) = views
     return Photograph.of_codes(first, icc), Photograph.of_codes(second, other_icc)
