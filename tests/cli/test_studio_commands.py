@@ -149,3 +149,4 @@ def test_a_quilt_goes_through_bridge(lippmann, tmp_path, fake_bridge):
         assert f"{words[0]}: a quilt goes through Bridge" in done.err
     pair = quilt.rename(tmp_path / "seen_2x1.png")
     assert "this is a stereo pair" in lippmann("show", pair).err
+    assert "this is a stereo pair" in lippmann("show", pair, "--no-browser").err

@@ -95,7 +95,13 @@ def test_a_photograph_of_the_pattern_is_answered(open_tab, address, tmp_path):
     """The photograph is the screen's own: without lenses no view is seen alone."""
     tab = opened(open_tab, address)
     check = tab.page.get_by_role("button", name="Check by photograph")
+    # The pattern of a large panel takes seconds.
+    held = []
+    tab.page.route("**/check.png", lambda route: held.append(route))
     check.click()
+    tab.wait_for("document.querySelector('.state').textContent.includes('is being drawn')")
+    tab.wait_until(lambda: held)
+    held[0].continue_()
     tab.wait_for("document.querySelector('.state').textContent.includes('500 mm away')")
     tab.page.keyboard.press("h")
     np.testing.assert_array_equal(screen(tab, tmp_path), draw_photograph_pattern(DISPLAY))

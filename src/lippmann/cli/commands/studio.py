@@ -87,31 +87,26 @@ def show(
 
     A quilt is shown by Looking Glass Bridge on the panels that it finds.
     """
-    from lippmann.quilts.files import is_quilt
+    from lippmann.quilts.cast import cast_quilt
+    from lippmann.quilts.files import is_quilt, read_quilt
 
     if is_quilt(picture):
+        quilt = read_quilt(picture)
+        if quilt.layout.views == 2:
+            rule = "the player of an eye-tracked monitor shows stereo pairs"
+            raise UsageError("this is a stereo pair", where=str(picture), rule=rule, fix="open it there")
         given = {"--display": display is not None, "--host": host != "127.0.0.1", "--port": port != 0}
         for name in (name for name, is_given in {**given, "--no-browser": no_browser}.items() if is_given):
             raise UsageError("a quilt goes through Bridge, which knows its panels", where=name, fix="leave it out")
-        _cast(picture, Console(quiet, as_json))
+        panels = cast_quilt(quilt, picture)
+        line = f"{picture}: shown by Bridge on {', '.join(panels)}"
+        Console(quiet, as_json).result({"picture": str(picture), "panels": panels}, line)
         return
     from lippmann.studio_app.panel_site import PanelSite
     from lippmann.viewer.served_picture import PictureFile
 
     file = PictureFile(picture, parse.display(display), "png" if viewing.is_remote() else "rgb")
     viewing.serve(PanelSite(file), str(picture), Console(quiet, as_json), host=host, port=port, browser=not no_browser)
-
-
-def _cast(picture: Path, console: Console) -> None:
-    from lippmann.quilts.cast import cast_quilt
-    from lippmann.quilts.files import read_quilt
-
-    quilt = read_quilt(picture)
-    if quilt.layout.views == 2:
-        rule = "the player of an eye-tracked monitor shows stereo pairs"
-        raise UsageError("this is a stereo pair", where=str(picture), rule=rule, fix="open it there")
-    panels = cast_quilt(quilt, picture)
-    console.result({"picture": str(picture), "panels": panels}, f"{picture}: shown by Bridge on {', '.join(panels)}")
 
 
 def _state(path: Path | None, model: str | None, display: str | None, asked: SceneOptions) -> StudioState:

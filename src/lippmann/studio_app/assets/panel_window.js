@@ -176,6 +176,7 @@ function show(what) {
 
 async function toggleCheck() {
   if (instead === "check") return show(null);
+  state.textContent = "The pattern is being drawn.";
   const response = await fetch("check.png");
   const options = { colorSpaceConversion: "none", premultiplyAlpha: "none" };
   checkPattern = await createImageBitmap(await response.blob(), options);
@@ -187,6 +188,7 @@ async function toggleCheck() {
 async function sendPhotograph() {
   const [file] = photograph.files;
   if (file === undefined) return;
+  state.textContent = "The photograph is being read.";
   try {
     const whole = await createImageBitmap(file);
     const scale = Math.min(1, LONGEST / Math.max(whole.width, whole.height));
