@@ -573,6 +573,7 @@ _READERS: dict[str, Target] = {
     "spz": Target(_spz),
     "sog": Target(_sog, tree=part_tree(b"meta.json")),
     "stl": Target(_scene("s.stl")),
+    "off": Target(_scene("s.off")),
     "tachyon": Target(_scene("s.dat")),
     "cam": Target(_cam),
     "nff": Target(_scene("s.nff")),

@@ -43,6 +43,7 @@ packed_color min_x max_scale_z min_r nan inf
 version count means scales quats sh0 shN mins maxs files codebook bands shape meta.json l.webp u.webp RIFF WEBP
 VP8L VP8X
 """,
+    "off": "OFF ST C N 4 n BINARY # . 255 -1 1e400",
     "stl": "solid facet normal outer loop vertex endloop endfacet endsolid # // ; nan",
     "tachyon": """
 BEGIN_SCENE END_SCENE CAMERA END_CAMERA TEXTURE TEXDEF TEXALIAS INCLUDE IMAGEDEF s.dat red # SPHERE CYLINDER FCYLINDER

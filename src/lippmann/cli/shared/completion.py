@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 #: Endings of files that hold scenes, and displays.
-_SCENES = (".blend", ".glb", ".gltf", ".obj", ".ply", ".stl", ".xml", ".dat", ".nff")
+_SCENES = (".blend", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl", ".xml", ".dat", ".nff")
 _DISPLAYS = (".toml", ".json")
 
 

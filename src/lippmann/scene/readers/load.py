@@ -58,7 +58,6 @@ _CLOUD_COMPARE = "save it as .ply, in CloudCompare for instance"
 _SLICER_3D = "save it as .nii.gz, in 3D Slicer for instance"
 _NIBABEL = "save it as .nii.gz, in Python by: nibabel.save(nibabel.load('a{0}'), 'a.nii.gz')"
 _MAYA = "export it from Maya as FBX, and that from Blender as glTF 2.0 (.glb)"
-_TRIMESH = "convert it, in Python by trimesh: trimesh.load_mesh('a.off').export('a.ply')"
 _ASSIMP = "convert it by Assimp: assimp export in{0} out.glb"
 _TILES = "take the .glb out of it by: npx 3d-tiles-tools {0}ToGlb -i in.{0} -o out.glb"
 _PARAVIEW = "open it in ParaView, then File > Save Data as .vtu"
@@ -78,7 +77,6 @@ _ELSEWHERE = {
     ".ifc": "convert it by IfcOpenShell: IfcConvert in.ifc out.glb",
     ".pbrt": "its meshes, mostly .ply files beside it, are read one by one",
     **dict.fromkeys((".wrl", ".x3d", ".x3dv", ".vrml"), "open it in MeshLab, and export it as .ply or .obj"),
-    ".off": _TRIMESH,
     **{kind: _ASSIMP.format(kind) for kind in (".x", ".ac", ".ase", ".b3d", ".lws", ".md2", ".ms3d", ".smd")},
     ".drc": "convert it by Draco: draco_decoder -i in.drc -o out.ply",
     **dict.fromkeys((".sldprt", ".sldasm", ".sat", ".x_t", ".jt", ".catpart", ".ipt"), _STEP),
@@ -132,7 +130,7 @@ def load_scene(
     Parameters
     ----------
     source:
-        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.spz``, ``.sog``, ``.stl``, ``.blend``, ``.usd``
+        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.spz``, ``.sog``, ``.stl``, ``.off``, ``.blend``, ``.usd``
         (``.usda``, ``.usdc``, ``.usdz``), Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff`` file; of a volume (``.nii``,
         ``.nii.gz``, ``.vdb``, ``.npy``, ``.npz``, Mitsuba ``.vol``, ``.dcm`` or a folder of such) or of VTK (``.vtp``,
         ``.vtu``, ``.vtk``, ``.vti``); name of a bundled scene; a ``mi.Scene`` or Mitsuba dict; a trimesh scene or
@@ -415,7 +413,7 @@ def _upright(description: SceneDescription, suffix: str, reader: Reader, up: Up 
         notes.append("up is taken as -y, as trainers of splats have it, for nothing in the file says it (else up=y)")
     if is_guessed and suffix == ".spz":
         notes.append("up is taken as +y, as SPZ has it, but some programs leave it at -y (then up=-y)")
-    if is_guessed and suffix == ".ply" and usual == "y":
+    if is_guessed and suffix in (".ply", ".off") and usual == "y":
         notes.insert(0, "up is taken as +y, for nothing in the data says it (else up=z)")
     if is_guessed and suffix in VTK:
         notes.append(f"up is taken as +y, for nothing in {suffix} files says it (else up=z)")

@@ -19,7 +19,7 @@ from lippmann.scene.parsing.far_origin import near_origin
 from lippmann.scene.parsing.files import MissingFileError, NamedFiles, read_bytes, read_image
 from lippmann.scene.parsing.normals import unit_normals
 from lippmann.scene.parsing.ply_body import Columns, Integers, Lists, Numbers, read_body
-from lippmann.scene.parsing.ply_header import Element, read_header
+from lippmann.scene.parsing.ply_header import Element, Header, read_header
 from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.parsing.vertex_colors import full_brightness, without_doubled_colors
 from lippmann.scene.point_clouds import describe_cloud
@@ -67,7 +67,20 @@ def read_ply(path: Path, *, files: NamedFiles | None = None) -> SceneDescription
     header = read_header(data, where)
     if holds_splats(header):
         return read_splat_ply(data, header, path.stem, where)
-    columns = read_body(data, header, where)
+    return describe_polygons(header, read_body(data, header, where), path, files)
+
+
+def describe_polygons(
+    header: Header, columns: Mapping[str, Columns], path: Path, files: NamedFiles | None = None
+) -> SceneDescription:
+    """The mesh or the cloud of points of elements ``vertex`` and ``face`` as :func:`read_body` returns them.
+
+    Raises
+    ------
+    SceneError
+        There are no vertices, or a face names one that is not there.
+    """
+    where = path.name
     if not all(isinstance(columns.get("vertex", {}).get(axis), np.ndarray) for axis in "xyz"):
         raise SceneError("holds no vertices with x, y and z", where=where)
     notes = [*header.notes]

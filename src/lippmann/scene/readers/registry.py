@@ -166,6 +166,7 @@ _OWN = {
     "nff": Reader((".nff",), f"{_HERE}.nff:read_nff"),
     "obj": Reader((".obj",), f"{_HERE}.obj:read_obj", options=("files",), up="y"),
     "ply": Reader((".ply",), f"{_HERE}.ply:read_ply", {b"ply\n": ".ply", b"ply\r": ".ply"}, ("files",), "y"),
+    "off": Reader((".off",), f"{_HERE}.off:read_off", up="y"),
     "sog": Reader((".sog",), f"{_HERE}.splats.sog:read_sog", options=("files",), up="-y"),
     "spz": Reader((".spz",), f"{_HERE}.splats.spz:read_spz", up="y"),
     "stl": Reader((".stl",), f"{_HERE}.stl:read_stl", up="z"),
