@@ -138,6 +138,54 @@ def test_slices_are_not_shown(read):
     assert read(model('<s:slicestack id="3" zbottom="0"/>' + solid(1))).notes == ["slices are not shown"]
 
 
+def lattice(beams, more='radius="0.1"', number=1):
+    inside = f"<b:beamlattice {more}>{beams}</b:beamlattice>"
+    return f'<object id="{number}"><mesh>{VERTICES}{inside}</mesh></object>'
+
+
+def test_beams_are_as_thick_as_they_say(read):
+    scene = read(
+        model(lattice('<b:beams><b:beam v1="0" v2="1" r1="0.2" r2="0.05" cap1="butt" cap2="butt"/></b:beams>'))
+    )
+    (mesh,) = scene.meshes
+    along, across = mesh.positions[:, 0], np.linalg.norm(mesh.positions[:, 1:], axis=1)
+    np.testing.assert_allclose(across[along == 0.0], 0.2, rtol=1e-5)
+    np.testing.assert_allclose(across[along == 1.0], 0.05, rtol=1e-5)
+    assert scene.notes == []
+
+
+def test_beams_end_round_and_balls_are_as_wide_as_the_widest(read):
+    beams = '<b:beam v1="0" v2="1"/><b:beam v1="0" v2="2" r1="0.3" cap2="butt"/><b:ball vindex="2" r="0.5"/>'
+    _, balls = read(model(lattice(beams, 'radius="0.1" cap="hemisphere" ballmode="mixed"'))).meshes
+    middles = np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1]])
+    away = np.linalg.norm(balls.positions.reshape(3, -1, 3) - middles[:, None], axis=2)
+    np.testing.assert_allclose(away, np.broadcast_to([[0.3], [0.1], [0.5]], away.shape), rtol=1e-5)
+
+
+def test_balls_at_all_beams(read):
+    more = 'radius="0.1" cap="butt" ballmode="all" ballradius="0.4"'
+    _, balls = read(model(lattice('<b:beam v1="0" v2="1"/>', more))).meshes
+    np.testing.assert_allclose(np.linalg.norm(balls.positions[: len(balls.positions) // 2], axis=1), 0.4, rtol=1e-5)
+
+
+def test_colours_of_beams(read):
+    group = '<m:colorgroup id="5"><m:color color="#FF0000"/><m:color color="#00FF00"/></m:colorgroup>'
+    beams = '<b:beam v1="0" v2="1" p1="1"/><b:beam v1="0" v2="2" pid="9"/>'
+    rods, balls = read(model(group + lattice(beams, 'radius="0.1" pid="5" pindex="0"'))).meshes
+    assert np.unique(rods.colors, axis=0).tolist() == [[0, 1, 0, 1], pytest.approx([0.7, 0.7, 0.7, 1])]
+    assert len(balls.colors) == len(balls.positions)
+
+
+def test_a_lattice_is_not_clipped(read):
+    scene = read(model(lattice('<b:beam v1="0" v2="1"/>', 'radius="1" clippingmode="inside" clippingmesh="2"')))
+    assert scene.notes == ["clippings of lattices of beams are not shown"]
+
+
+def test_colours_of_functions_are_none_of_a_group(read):
+    volume = '<v:volumedata id="4"><v:color functionid="3" channel="color"/></v:volumedata>'
+    assert read(model(volume + solid(1))).notes == ["volumes of functions are not shown"]
+
+
 @pytest.mark.parametrize(
     ("main", "line"),
     [
@@ -150,15 +198,26 @@ def test_slices_are_not_shown(read):
         (model('<object id="1"><components><component objectid="1"/></components></object>'), "without end"),
         (model(solid(1), ""), "has nothing to build"),
         (
-            model(f'<object id="1"><mesh>{VERTICES}<b:beamlattice/></mesh></object>'),
-            "has nothing to build that is made of triangles; lattices of beams are not shown",
+            model('<object id="1"><v:levelset functionid="3"/></object>'),
+            "has nothing to build that is made of triangles or beams; shapes of functions are not shown",
         ),
+        (model(lattice('<b:beam v1="0" v2="3"/>')), "has a beam or a ball whose vertices are not there"),
+        (model(lattice('<b:beam v1="0" v2="1"/><b:ball vindex="2"/>')), "has a beam or a ball whose vertices"),
+        (model(lattice('<b:beam v1="0" v2="1" r1="nan"/>')), "has a beam whose places or radii are no numbers"),
+        (model(lattice('<b:beam v1="0" v2="1"/>', "")), "'radius' is missing"),
+        (model('<colorgroup id="5"/>' + lattice('<b:beam v1="0" v2="1" pid="5"/>')), "whose colours are not there"),
     ],
 )
 def test_what_cannot_be_read_is_named(read, main, line):
     with pytest.raises(SceneError, match=r"^a\.3mf: ") as caught:
         read(main)
     assert line in str(caught.value)
+
+
+def test_an_encrypted_package(read):
+    with pytest.raises(SceneError, match=r"^a\.3mf: '/3D/model\.model' is no well-formed XML") as caught:
+        read("%3McF~", keystore_xml="<keystore/>")
+    assert str(caught.value).endswith("; the package holds keys: save it unencrypted")
 
 
 def test_what_is_no_package(tmp_path):

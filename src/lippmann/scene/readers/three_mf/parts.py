@@ -1,6 +1,6 @@
 """Parts of a 3MF package: its models as they stand in XML.
 
-By the 3MF Core Specification 1.3 and its extensions Materials and Properties 1.2 and Production 1.1.
+By the 3MF Core Specification 1.3 and its extensions Materials and Properties 1.2, Production 1.1 and Beam Lattice 1.2.
 """
 
 from __future__ import annotations
@@ -30,8 +30,9 @@ _MODEL = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 #: Elements that are not read, and what they would show.
 _UNREAD = {
     "compositematerials": "mixtures of materials",
-    "beamlattice": "lattices of beams",
     "slicestack": "slices",
+    "volumedata": "volumes of functions",
+    "levelset": "shapes of functions",
 }
 _COLOR = re.compile("#([0-9a-fA-F]{6})([0-9a-fA-F]{2})?")
 
@@ -60,14 +61,26 @@ class Group:
 Triangle = tuple[int, int, int, str | None, int, int, int]
 
 
+class Beam(NamedTuple):
+    """A beam between two vertices: its radii there, whether it ends round there, and its colours as of a triangle."""
+
+    ends: tuple[int, int]
+    radii: tuple[float, float]
+    is_round: tuple[bool, bool]
+    group: str | None
+    colors: tuple[int, int]
+
+
 @dataclass
 class Shape:
-    """An object: vertices ``x, y, z``, triangles, or objects that it is made of."""
+    """An object: vertices ``x, y, z``, triangles, beams, radii of balls by their vertex, or objects of which it is."""
 
     group: str | None
     index: int
     vertices: list[tuple[float, float, float]] = field(default_factory=list)
     triangles: list[Triangle] = field(default_factory=list)
+    beams: list[Beam] = field(default_factory=list)
+    balls: dict[int, float] = field(default_factory=dict)
     components: list[Placed] = field(default_factory=list)
 
 
@@ -140,7 +153,9 @@ class Package:
         try:
             parser.Parse(self.bytes_of(name), True)
         except expat.ExpatError as error:
-            raise SceneError(f"'{name}' is no well-formed XML ({error})", where=self.where) from None
+            is_locked = any("keystore" in each.lower() for each in self._archive.namelist())
+            fix = "the package holds keys: save it unencrypted" if is_locked else ""
+            raise SceneError(f"'{name}' is no well-formed XML ({error})", where=self.where, fix=fix) from None
         except (KeyError, ValueError, LookupError) as error:
             fault = f"'{name}', line {parser.CurrentLineNumber}: {error} is missing or no value of its kind"
             raise SceneError(fault, where=self.where, fix="is the file whole?") from None
@@ -153,6 +168,7 @@ class _PartReader:
         self.part = Part()
         self._name = name
         self._group, self._shape = Group(), Shape(None, 0)
+        self._lattice: dict[str, str] = {}
         self._first, self._last, self._layer = Group(), Group(), 0  # what properties in layers are taken from
         self._take = {
             "model": self._model,
@@ -167,6 +183,9 @@ class _PartReader:
             "tex2coord": self._tex2coord,
             "multiproperties": self._multiproperties,
             "multi": self._multi,
+            "beamlattice": self._beamlattice,
+            "beam": self._beam,
+            "ball": self._ball,
         }
 
     def begin(self, tag: str, given: dict[str, str]) -> None:
@@ -186,7 +205,7 @@ class _PartReader:
             return
         plain = {key.rpartition(":")[2]: value for key, value in given.items()}
         name = tag.rpartition(":")[2]
-        if name in self._take:
+        if name in self._take and "functionid" not in plain:  # "color" is a channel of a function, too
             self._take[name](plain)
         elif name in _UNREAD:
             self.part.unread[_UNREAD[name]] = None
@@ -238,6 +257,30 @@ class _PartReader:
 
     def _color(self, given: dict[str, str]) -> None:
         self._group.values.append(_color(given["color"]))
+
+    def _beamlattice(self, given: dict[str, str]) -> None:
+        self._lattice = given
+        if "clippingmesh" in given and given.get("clippingmode") != "none":
+            self.part.unread["clippings of lattices of beams"] = None
+
+    def _beam(self, given: dict[str, str]) -> None:
+        group = given.get("pid", self._lattice.get("pid", self._shape.group))
+        first = int(given.get("p1", self._lattice.get("pindex", self._shape.index)))
+        radius = float(given.get("r1", self._lattice["radius"]))
+        cap = self._lattice.get("cap", "sphere")
+        beam = Beam(
+            (int(given["v1"]), int(given["v2"])),
+            (radius, float(given.get("r2", radius))),
+            (given.get("cap1", cap) != "butt", given.get("cap2", cap) != "butt"),
+            group,
+            (first, int(given.get("p2", first))),
+        )
+        self._shape.beams.append(beam)
+        if self._lattice.get("ballmode") == "all":
+            self._shape.balls |= dict.fromkeys(beam.ends, float(self._lattice["ballradius"]))
+
+    def _ball(self, given: dict[str, str]) -> None:
+        self._shape.balls[int(given["vindex"])] = float(given.get("r", self._lattice.get("ballradius", "0")))
 
     def _texture2d(self, given: dict[str, str]) -> None:
         self.part.pictures[given["id"]] = given["path"], given.get("tilestyleu", "wrap")

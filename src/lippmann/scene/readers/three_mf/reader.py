@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.color.transfer import encode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import decode_image
+from lippmann.scene.parsing.points_lines import as_mesh
 from lippmann.scene.parsing.texture_maps import unit
 from lippmann.scene.parsing.vertex_colors import COLORED, GREY, linear_colors, material_of
-from lippmann.scene.readers.three_mf.parts import Package, Part, Placed, Shape, Triangle
+from lippmann.scene.readers.three_mf.parts import Beam, Package, Part, Placed, Shape, Triangle
 from lippmann.scene.values.description import Image, Instance, Material, Mesh, SceneDescription, Texture, Wrap
 
 #: Objects within others, and copies of objects, at most.
@@ -51,7 +53,7 @@ class _Reader:
         for item in start.build:
             self._place(item, np.diag([start.scale, start.scale, start.scale, 1.0]), 0)
         if not self._places:
-            raise self._error("; ".join(["has nothing to build that is made of triangles", *self._notes]))
+            raise self._error("; ".join(["has nothing to build that is made of triangles or beams", *self._notes]))
         return SceneDescription(
             self._name,
             self._meshes,
@@ -75,8 +77,49 @@ class _Reader:
         key = placed.part, placed.number
         if key not in self._shown:
             self._shown[key] = self._meshes_of(part, shape) if shape.triangles else []
+            self._shown[key] += self._lattice_of(part, shape) if shape.beams else []
         for mesh in self._shown[key]:
             self._places.setdefault(mesh, []).append(world)
+
+    def _lattice_of(self, part: Part, shape: Shape) -> list[int]:
+        """Numbers of the meshes of an object's beams, and of balls at their ends, which are as wide as the widest."""
+        vertices = np.array(shape.vertices, np.float64).reshape(-1, 3)
+        ends = np.array([beam.ends for beam in shape.beams]).ravel()
+        radii = np.array([beam.radii for beam in shape.beams]).ravel()
+        is_round = np.array([beam.is_round for beam in shape.beams]).ravel()
+        at = np.concatenate([ends[is_round], np.array([*shape.balls], np.int64)])
+        if not (0 <= ends.min() <= ends.max() < len(vertices) and np.isin(at, ends).all()):
+            raise self._error("has a beam or a ball whose vertices are not there")
+        widths = np.concatenate([radii[is_round], [*shape.balls.values()]])
+        if not all(np.isfinite(values).all() for values in (vertices[ends], radii, widths)):
+            raise self._error("has a beam whose places or radii are no numbers")
+        wide = np.zeros(len(vertices))
+        np.maximum.at(wide, at, widths)
+        codes = np.concatenate([self._colors_of(part, beam) for beam in shape.beams])
+        colors, balls = linear_colors(codes), np.unique(at)
+        of_balls = np.zeros((len(vertices), colors.shape[1]), np.float32)
+        of_balls[ends] = colors
+        order = np.arange(len(ends), dtype=np.uint32)
+        number, points = len(self._materials), vertices.astype(np.float32)
+        rods = Mesh(self._name, points[ends], order.reshape(-1, 2), number, colors=colors)
+        thin = [(rods, radii.astype(np.float32))]
+        if len(balls):
+            one = Mesh(self._name, points[balls], order[: len(balls), None], number, colors=of_balls[balls])
+            thin.append((one, wide[balls].astype(np.float32)))
+        first = len(self._meshes)
+        self._meshes += [replace(as_mesh(mesh, np.eye(4)[None], width, number), points=0) for mesh, width in thin]
+        self._materials.append(material_of(codes))
+        return [*range(first, len(self._meshes))]
+
+    def _colors_of(self, part: Part, beam: Beam) -> NDArray[np.float64]:
+        """sRGB codes ``(2, 4)`` of a beam's ends, as those of a plain surface where it has no colours."""
+        group = part.groups.get(beam.group or "")
+        if group is None or group.picture:
+            return np.tile(255.0 * np.append(encode_srgb(np.array(GREY.base_color)), 1.0), (2, 1))
+        try:
+            return np.rint(255.0 * np.array([group.values[at] for at in beam.colors]))
+        except IndexError:
+            raise self._error("has a beam whose colours are not there") from None
 
     def _meshes_of(self, part: Part, shape: Shape) -> list[int]:
         """Numbers of the meshes of an object: one for each picture, one for all colours, one for what has neither."""
