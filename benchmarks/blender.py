@@ -20,7 +20,7 @@ from typing import Any
 
 from harness import save, summary
 from lippmann.scene.readers.blend.find_blender import find_blender
-from lippmann.scene.readers.blend.reader import complete, exported, read_world
+from lippmann.scene.readers.blend.reader import complete, export_file, read_world
 from lippmann.scene.readers.gltf import read_gltf
 
 SCENE = Path(__file__).parent.parent / "examples" / "blender_scene.py"
@@ -53,7 +53,7 @@ def _measure(path: Path, runs: int) -> dict[str, Any]:
     exports, reads = [], []
     for _ in range(runs + 1):
         begin = time.perf_counter()
-        with exported(path, None) as files:
+        with export_file(path, None) as files:
             middle = time.perf_counter()
             description = complete(read_gltf(files.scene), files, path.stem, read_world(files))
             size = files.scene.stat().st_size

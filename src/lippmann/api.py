@@ -233,9 +233,9 @@ def preview(
     >>> lippmann.preview("teapot", (16, 16), display="seed-lenticular", integrator="normal").pixels.shape
     (16, 16, 3)
     """
-    from lippmann.viewing.replay import checked_size, eye_before
+    from lippmann.viewing.replay import check_size, eye_before
 
-    request, within = _request(placement, options), checked_size(size)
+    request, within = _request(placement, options), check_size(size)
     if display is None:
         from lippmann.rendering.preview import render_preview
 

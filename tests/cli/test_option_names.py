@@ -10,7 +10,7 @@ import pytest
 
 import lippmann as package
 from lippmann.cli.app import make_app
-from lippmann.cli.shared.command_options import in_options, option_of, translated
+from lippmann.cli.shared.command_options import in_options, option_of, translate
 from lippmann.errors import UsageError
 
 assert make_app  # whose module says which commands there are
@@ -99,7 +99,7 @@ def test_the_library_says_no_flag():
     ],
 )
 def test_settings_become_options(text, said):
-    assert translated(text) == said
+    assert translate(text) == said
 
 
 def test_an_error_says_the_option_after_the_file():

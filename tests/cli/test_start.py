@@ -68,9 +68,9 @@ def test_a_command_leaves_no_threads_waiting_for_linear_algebra():
 
 def test_an_option_of_the_command_at_hand_is_known_without_loading_the_others():
     code = (
-        "import sys\nfrom lippmann.cli.app import app_of\nfrom lippmann.cli.shared.command_options import translated\n"
-        "app_of(['preview'])\nprint(translated('spp=3'), 'lippmann.cli.commands.interlace' in sys.modules)\n"
-        "print(translated('photos=...'), 'lippmann.cli.commands.interlace' in sys.modules)"
+        "import sys\nfrom lippmann.cli.app import app_of\nfrom lippmann.cli.shared.command_options import translate\n"
+        "app_of(['preview'])\nprint(translate('spp=3'), 'lippmann.cli.commands.interlace' in sys.modules)\n"
+        "print(translate('photos=...'), 'lippmann.cli.commands.interlace' in sys.modules)"
     )
     assert run_python(code).stdout.splitlines() == ["--spp 3 False", "PHOTOS True"]
 

@@ -31,7 +31,7 @@ from uvicorn.server import ServerState
 
 from lippmann.api import render
 from lippmann.cli import run
-from lippmann.cli.commands.sequence import frame_range, numbered
+from lippmann.cli.commands.sequence import frame_range, name_frames
 from lippmann.cli.shared import parse
 from lippmann.cluster import job_pickle
 from lippmann.cluster.address import parse_target
@@ -365,7 +365,7 @@ def _words(data: bytes, folder: Path) -> object:
     text = data.decode("utf-8", "surrogateescape")
     readers: tuple[Callable[[], object], ...] = (
         lambda: frame_range(text),
-        lambda: numbered(folder / text.replace("/", "_").replace("\0", "_")[:80], 2)(7),
+        lambda: name_frames(folder / text.replace("/", "_").replace("\0", "_")[:80], 2)(7),
         lambda: texts.numbers(text, "--eye", (1, 3)),
         lambda: parse.size(text, "--resolution"),
         lambda: texts.memory(text, "--memory"),

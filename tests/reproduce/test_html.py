@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 
 from markupsafe import Markup
 
-from lippmann.reproduce.html import element, figure, folded, joined, table
+from lippmann.reproduce.html import element, figure, folded, join, table
 
 NASTY = "<b>a & \"b\" 'c'</b>"
 
@@ -29,11 +29,11 @@ def test_text_and_attributes_are_escaped():
 
 def test_markup_is_not():
     assert element("p", element("b", "a"), Markup("<br>")) == "<p><b>a</b><br></p>"
-    assert joined(NASTY, Markup("<br>")) == element("p", NASTY)[3:-4] + Markup("<br>")
+    assert join(NASTY, Markup("<br>")) == element("p", NASTY)[3:-4] + Markup("<br>")
 
 
 def test_parts_of_the_page_escape_what_they_are_given():
-    shown = joined(
+    shown = join(
         table((NASTY,), [(NASTY,)], caption=NASTY, spans=[(NASTY, 1)]),
         figure("data:,", (3, 2), NASTY, NASTY),
         folded(NASTY, NASTY),

@@ -376,7 +376,7 @@ def test_a_child_of_a_fork_during_a_render_is_refused(end, code_of_child):
     def fail(code):
         raise RuntimeError(code)
 
-    from lippmann.runtime.quiet_stderr import libraries_silenced
+    from lippmann.runtime.quiet_stderr import silence_libraries
     alone, done = render(), threading.Event()
 
     def work():

@@ -12,9 +12,9 @@ from lippmann.errors import SceneError, UsageError
 from lippmann.scene.cloud_selection import SplatSelection
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.scene import Scene
-from lippmann.scene.splat_clouds import check_splats, crop, moved, typical_points
+from lippmann.scene.splat_clouds import check_splats, crop, move, typical_points
 from lippmann.scene.values.description import SceneDescription
-from lippmann.scene.values.splats import Splats, joined, real_harmonics
+from lippmann.scene.values.splats import Splats, join, real_harmonics
 
 
 def random_splats(count=20, degree=3, seed=0):
@@ -47,7 +47,7 @@ def test_a_move_takes_places_shapes_and_colors_along(seed, degree, stretches, mi
     stretch = np.diag(random.uniform(0.2, 3, 3)) if stretches else random.uniform(0.2, 3) * np.eye(3)
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = turn @ stretch, random.normal(size=3)
-    found = moved(splats, matrix)
+    found = move(splats, matrix)
     np.testing.assert_allclose(found.centers, splats.centers @ matrix[:3, :3].T + matrix[:3, 3], atol=1e-5)
     true = matrix[:3, :3] @ covariances(splats) @ matrix[:3, :3].T
     np.testing.assert_allclose(covariances(found), true, atol=2e-5 * np.abs(true).max())
@@ -83,7 +83,7 @@ def test_one_splat_has_an_extent():
 
 def test_clouds_are_joined_with_the_higher_degree():
     low, high = random_splats(3, 0), random_splats(2, 2)
-    both = joined([low, high])
+    both = join([low, high])
     assert (both.count, both.degree) == (5, 2)
     np.testing.assert_array_equal(both.harmonics[:3, 0], low.harmonics[:, 0])
     assert not both.harmonics[:3, 1:].any()

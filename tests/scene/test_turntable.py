@@ -8,7 +8,7 @@ import pytest
 import lippmann
 from lippmann.options.placement import PlacementOptions
 from lippmann.scene.matrices import inverse, rotation, transform_points
-from lippmann.scene.turntable import outline, swept_points, turn_about, turning_axis, with_lights_moved
+from lippmann.scene.turntable import move_lights, outline, swept_points, turn_about, turning_axis
 from lippmann.scene.values.whitted_surfaces import Background, ClassicLight
 from lippmann.scene.whitted.world_frame import world_from_scene
 
@@ -80,7 +80,7 @@ def test_classic_light_moves_in_the_world():
     plane = Background("sky-plane", up=(1.0, 1.0, 0.0), top_value=5.0, bottom_value=-1.0)
     classic = replace(scene.classic, lights=(light,), background=plane)
     turn = turn_about((0.0, 1.0, 0.0), (4.0, 0.0, -2.0), 40.0)
-    moved = with_lights_moved(replace(scene, classic_form=classic), turn).classic
+    moved = move_lights(replace(scene, classic_form=classic), turn).classic
     mirror = world_from_scene(classic)
     before, after = (transform_points(mirror, np.array([one.lights[0].center])) for one in (classic, moved))
     assert after == pytest.approx(transform_points(turn, before))

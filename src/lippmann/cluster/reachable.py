@@ -32,12 +32,12 @@ def check_reachable(address: str, ca: Path | None, certificate: Path | None, key
     place = urlsplit(address)
     if place.scheme not in ("tcp", "tls") or place.hostname is None or place.port is None:
         return
-    with closing(_connected(address, place.hostname, place.port)) as plain:
+    with closing(_connect(address, place.hostname, place.port)) as plain:
         if place.scheme == "tls" and ca is not None and certificate is not None:
             _agree(plain, address, place.hostname, ca, certificate, key)
 
 
-def _connected(address: str, host: str, port: int) -> socket.socket:
+def _connect(address: str, host: str, port: int) -> socket.socket:
     end = time.monotonic() + SECONDS
     while True:
         try:

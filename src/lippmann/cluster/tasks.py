@@ -87,7 +87,7 @@ def render_part(
         With the text of any error: not every error can be pickled.
     """
     from lippmann.runtime import engine
-    from lippmann.tiles.tile_render import packed, trace_tile
+    from lippmann.tiles.tile_render import pack, trace_tile
 
     try:
         with _engine:
@@ -95,7 +95,7 @@ def render_part(
             request = prepared.job.request
             engine.start(request.device, request.threads)  # each thread of a worker chooses its variant
             traced = trace_tile(prepared, index)
-        return encode(packed(prepared, traced))
+        return encode(pack(prepared, traced))
     except Exception as error:  # noqa: BLE001 - every error has to reach the client
         raise ClusterError(f"{type(error).__name__}: {error}") from None
 

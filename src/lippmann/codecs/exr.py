@@ -22,7 +22,7 @@ from lippmann.codecs.types import Pixels
 from lippmann.color.primaries import REC709, rec709_from_rgb, to_rec709
 from lippmann.errors import PictureError
 from lippmann.runtime.machine import check_input
-from lippmann.runtime.quiet_stderr import libraries_silenced
+from lippmann.runtime.quiet_stderr import silence_libraries
 
 SIGNATURE = b"\x76\x2f\x31\x01"
 
@@ -197,7 +197,7 @@ def read_exr(path: Path, header: ExrHeader) -> dict[str, Pixels]:
     stored = header.window[2] * header.window[3]
     check_input(2 * pixel * max(header.width * header.height, stored), "its picture", where=str(path))
     # The binding prints a warning where it should raise; what it read then has no parts.
-    with contextlib.redirect_stdout(io.StringIO()), libraries_silenced():
+    with contextlib.redirect_stdout(io.StringIO()), silence_libraries():
         try:
             file = OpenEXR.File(str(path), separate_channels=True)
         except (RuntimeError, ValueError) as error:

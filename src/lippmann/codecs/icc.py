@@ -103,7 +103,7 @@ def read_profile(path: Path) -> Profile:
     except OSError as error:
         raise unreadable(path, error, PictureError) from None
     try:
-        colors = _opened(data).profile.xcolor_space.strip()
+        colors = _open(data).profile.xcolor_space.strip()
     except OSError:
         colors = ""
     if colors != "RGB":
@@ -122,7 +122,7 @@ def name_of(data: bytes) -> str:
     from PIL import ImageCms
 
     try:
-        return " ".join(ImageCms.getProfileDescription(_opened(data)).split())
+        return " ".join(ImageCms.getProfileDescription(_open(data)).split())
     except (ImageCms.PyCMSError, OSError):
         return ""
 
@@ -182,7 +182,7 @@ def convert_cmyk(picture: Image.Image, icc: bytes) -> NDArray[np.uint8]:
         from PIL import ImageCms
 
         try:
-            converted = ImageCms.profileToProfile(picture, _opened(icc), _opened(b""), outputMode="RGB")
+            converted = ImageCms.profileToProfile(picture, _open(icc), _open(b""), outputMode="RGB")
             assert converted is not None  # it is not done in place
             return np.asarray(converted)
         except (ImageCms.PyCMSError, OSError) as error:
@@ -203,7 +203,7 @@ def convert_picture(picture: Image.Image, source: bytes, target: bytes) -> Image
     from PIL import ImageCms
 
     try:
-        converted = ImageCms.profileToProfile(picture, _opened(source), _opened(target), outputMode="RGB")
+        converted = ImageCms.profileToProfile(picture, _open(source), _open(target), outputMode="RGB")
     except (ImageCms.PyCMSError, OSError) as error:
         rule = "profiles are those of RGB devices"
         raise PictureError(f"its colours cannot be converted: {error}", rule=rule) from None
@@ -244,7 +244,7 @@ def convert_codes(codes: Pixels, source: bytes, target: bytes = b"") -> Pixels:
     return np.asarray(converted).reshape(*codes.shape[:2], 3)
 
 
-def _opened(data: bytes) -> ImageCms.ImageCmsProfile:
+def _open(data: bytes) -> ImageCms.ImageCmsProfile:
     from PIL import ImageCms
 
     return ImageCms.ImageCmsProfile(io.BytesIO(data or srgb_profile()))

@@ -22,7 +22,7 @@ from lippmann.codecs.types import Pixels
 from lippmann.color.primaries import REC709
 from lippmann.errors import PictureError
 from lippmann.runtime.machine import check_input
-from lippmann.runtime.quiet_stderr import libraries_silenced
+from lippmann.runtime.quiet_stderr import silence_libraries
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
@@ -169,7 +169,7 @@ def decode_png(file: BinaryIO, header: PngHeader, path: Path) -> Pixels:
         pass
     file.seek(0)
     try:
-        with libraries_silenced():
+        with silence_libraries():
             codes: Pixels = imagecodecs.png_decode(file.read())
     except (RuntimeError, ValueError) as error:
         raise _damaged(path, str(error)) from error

@@ -211,7 +211,7 @@ class TiffPicture:
 
         self._path, self._file = path, file
         file.seek(0)
-        with _reported(path):
+        with _report_damage(path):
             pages = tifffile.TiffFile(file).pages
             page: Any = pages[0]
             self.notes = _notes(page, len(pages))
@@ -252,7 +252,7 @@ class TiffPicture:
         """
         page = self._page
         check_input(2 * int(page.size) * np.dtype(page.dtype).itemsize, "its picture", where=str(self._path))
-        with _reported(self._path):
+        with _report_damage(self._path):
             self._check_segments()
             values = gray_or_rgb(page, page.asarray())
         return orientations.upright(values, self.orientation)
@@ -266,7 +266,7 @@ class TiffPicture:
         PictureError
             If the file is too short for its tiles or strips, or they have no size.
         """
-        with _reported(self._path):
+        with _report_damage(self._path):
             self._check_segments()
             if self._page.is_tiled:
                 chunk = int(self._page.tilelength), int(self._page.tilewidth)
@@ -287,7 +287,7 @@ class TiffPicture:
         high, wide = self.chunk
         number = row * -(-self.width // wide) + column
         shape = min(high, self.height - row * high), min(wide, self.width - column * wide)
-        with _reported(self._path):
+        with _report_damage(self._path):
             page = self._page
             self._file.seek(page.dataoffsets[number])
             segment = page.decode(self._file.read(page.databytecounts[number]), number)[0]
@@ -311,7 +311,7 @@ class TiffPicture:
 
 
 @contextlib.contextmanager
-def _reported(path: Path) -> Iterator[None]:
+def _report_damage(path: Path) -> Iterator[None]:
     import tifffile
 
     # The library logs what it then raises or mends; the one line of the error is enough.

@@ -105,7 +105,7 @@ def gray_or_rgb(page: Any, values: Pixels) -> Pixels:
         values = ((values.astype(np.uint32) * top + most // 2) // most).astype(values.dtype)
     if kind == _WHITE_IS_ZERO:
         values = np.concatenate([~values[..., :1], values[..., 1:]], axis=-1)
-    return _unassociated(values) if _is_associated(page) else values
+    return _unassociate(values) if _is_associated(page) else values
 
 
 def _is_plain_ycbcr(page: Any) -> bool:
@@ -138,7 +138,7 @@ def _is_associated(page: Any) -> bool:
     return _ASSOCIATED in (page.extrasamples or ())[:1]
 
 
-def _unassociated(values: Pixels) -> Pixels:
+def _unassociate(values: Pixels) -> Pixels:
     """Codes whose colours were multiplied by alpha, without that."""
     top, alpha = np.iinfo(values.dtype).max, values[..., -1:].astype(np.float64)
     colors = np.minimum(values[..., :-1] * (top / np.maximum(alpha, 1.0)), top)

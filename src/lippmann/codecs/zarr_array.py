@@ -62,13 +62,13 @@ def write_zarr(
     """
     zarr = load_zarr(folder)
     shape = {"shape": (size[1], size[0], 3), "chunks": (side, side, 3), "dtype": dtype, "fill_value": 0}
-    array = _created(zarr, str(folder), shape)
+    array = _create(zarr, str(folder), shape)
     array.attrs.update({TEXT_KEY: json.loads(text or "null"), "dimensions": DIMENSIONS})
     for place, values in tiles:
         array[place] = values
 
 
-def _created(zarr: ZarrModule, folder: str, shape: Attributes) -> ZarrArray:
+def _create(zarr: ZarrModule, folder: str, shape: Attributes) -> ZarrArray:
     """An empty array packed by Zstandard with check sums, so that a changed byte does not become a colour."""
     if hasattr(zarr, "create_array"):
         packing = zarr.codecs.ZstdCodec(level=_LEVEL, checksum=True)

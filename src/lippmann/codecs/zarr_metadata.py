@@ -114,7 +114,7 @@ class ArrayMetadata:
             raise PictureError(what, where=where, rule=f"at most {_MOST_CHUNKS} are read")
 
 
-def admitted(values: Document, version: int, where: str) -> ArrayMetadata:
+def admit(values: Document, version: int, where: str) -> ArrayMetadata:
     """The metadata of an array, checked.
 
     Parameters
@@ -210,7 +210,7 @@ class _Check:
 
     def damaged(self, name: str, value: object) -> PictureError:
         """The error for a value that no array has."""
-        return PictureError(f"is damaged: {name} is {_quoted(value)}", where=self.where, fix="make it anew")
+        return PictureError(f"is damaged: {name} is {_quote(value)}", where=self.where, fix="make it anew")
 
     def refused(self, what: str, rule: str) -> PictureError:
         """The error for what a sound array may name, but none that is read here."""
@@ -233,13 +233,13 @@ class _Check:
     def choice(self, name: str, value: object, known: Sequence[str]) -> str:
         """A text out of a few."""
         if not isinstance(value, str) or value not in known:
-            raise self.refused(f"the {name} {_quoted(value)}", f"read are {', '.join(known)}")
+            raise self.refused(f"the {name} {_quote(value)}", f"read are {', '.join(known)}")
         return value
 
     def type_2(self, name: str, value: object) -> StoredType:
         """A type in the words of the second version: numbers and booleans."""
         if not isinstance(value, str) or not _TYPE_2.fullmatch(value):
-            raise self.refused(f"the {name} {_quoted(value)}", "arrays of numbers are read")
+            raise self.refused(f"the {name} {_quote(value)}", "arrays of numbers are read")
         return np.dtype(value)
 
     def codec_2(self, kind: str, value: object, known: Sequence[str]) -> str:
@@ -265,11 +265,11 @@ class _Check:
             raise PictureError(f"its chunks have {size} bytes each", where=self.where, rule=rule)
 
 
-def _quoted(value: object) -> str:
+def _quote(value: object) -> str:
     """A value for a message, cut where it is long or nested."""
     if isinstance(value, Mapping):
         return "{...}"
     if isinstance(value, list):
-        return f"[{', '.join('...' if isinstance(entry, (list, dict)) else _quoted(entry) for entry in value[:8])}]"
+        return f"[{', '.join('...' if isinstance(entry, (list, dict)) else _quote(entry) for entry in value[:8])}]"
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:60]}..."

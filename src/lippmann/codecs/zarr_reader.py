@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from lippmann.codecs.types import Attributes, ZarrArray, ZarrModule
-from lippmann.codecs.zarr_metadata import ARRAY_2, ATTRIBUTES_2, GROUP_2, NODE_3, ArrayMetadata, admitted
+from lippmann.codecs.zarr_metadata import ARRAY_2, ATTRIBUTES_2, GROUP_2, NODE_3, ArrayMetadata, admit
 from lippmann.errors import PictureError
 from lippmann.runtime.machine import check_input
 
@@ -85,7 +85,7 @@ def read_attributes(folder: Path) -> Attributes:
 
 
 def read_array_metadata(folder: Path, root: Path | None = None) -> ArrayMetadata:
-    """Metadata of an array, checked by :func:`lippmann.codecs.zarr_metadata.admitted`.
+    """Metadata of an array, checked by :func:`lippmann.codecs.zarr_metadata.admit`.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def _array_metadata(folder: Path, root: Path) -> tuple[ArrayMetadata, Attributes
     for name, version in ((NODE_3, 3), (ARRAY_2, 2)):
         values = _json(folder, name, root)
         if values is not None:
-            return admitted(values, version, str(folder / name)), values
+            return admit(values, version, str(folder / name)), values
     raise _damaged(folder, "there is no array in it")
 
 

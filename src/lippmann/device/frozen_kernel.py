@@ -20,7 +20,7 @@ from lippmann.runtime.engine_lock import no_collection
 Numbers = NDArray[np.uint32]
 
 
-def aligned(numbers: Numbers) -> Numbers:
+def align(numbers: Numbers) -> Numbers:
     """A copy that begins at a whole number of 64 bytes, the widest vector of a processor.
 
     The device reads host memory in place and would record the kernel anew for every new alignment.

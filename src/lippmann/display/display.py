@@ -355,13 +355,13 @@ class Display:
 
     def pinhole_offset(self, dx: Array, dy: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
         """:meth:`pinhole_place` of a panel point: its offset from the lens's centre, or the level point of its axis."""
-        return self._distorted(Distortion.pinhole_place, dx, dy, ops)
+        return self._distort(Distortion.pinhole_place, dx, dy, ops)
 
     def panel_offset(self, dx: Array, dy: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
         """The inverse of :meth:`pinhole_offset`."""
-        return self._distorted(Distortion.place, dx, dy, ops)
+        return self._distort(Distortion.place, dx, dy, ops)
 
-    def _distorted(
+    def _distort(
         self, way: Callable[..., tuple[Array, Array]], dx: Array, dy: Array, ops: ArrayOps
     ) -> tuple[Array, Array]:
         """An offset by one of the distortion's two ways; what lies along a cylinder stays."""

@@ -49,11 +49,11 @@ class Distortion:
 
     def pinhole_place(self, dx: Array, dy: Array, ops: ArrayOps) -> tuple[Array, Array]:
         """The pinhole's place of a place: offsets from the lens's axis in millimetres."""
-        return _scaled(dx, dy, self.reach, self.factors, ops)
+        return _scale(dx, dy, self.reach, self.factors, ops)
 
     def place(self, dx: Array, dy: Array, ops: ArrayOps) -> tuple[Array, Array]:
         """The place of a pinhole's place, the inverse of :meth:`pinhole_place`."""
-        return _scaled(dx, dy, self.reach * self.factors[-1], self.inverse_factors, ops)
+        return _scale(dx, dy, self.reach * self.factors[-1], self.inverse_factors, ops)
 
     @cached_property
     def inverse_factors(self) -> tuple[float, ...]:
@@ -69,7 +69,7 @@ class Distortion:
         return np.arange(count) / (count - 1)
 
 
-def _scaled(dx: Array, dy: Array, reach: float, factors: tuple[float, ...], ops: ArrayOps) -> tuple[Array, Array]:
+def _scale(dx: Array, dy: Array, reach: float, factors: tuple[float, ...], ops: ArrayOps) -> tuple[Array, Array]:
     last = len(factors) - 1
     at = ops.minimum(ops.sqrt(dx * dx + dy * dy) * (last / reach), 1.0 * last)
     factor = ops.interpolate(factors, at)

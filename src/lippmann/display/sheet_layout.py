@@ -13,7 +13,6 @@ from dataclasses import replace
 from lippmann.display.display import Display
 from lippmann.display.panel import PixelWindow
 from lippmann.display.sheet import Sheet
-from lippmann.display.validation import is_real
 from lippmann.errors import UsageError
 
 #: Largest bleed in mm: print shops ask for 2 to 5, stretched canvas for some 50.
@@ -33,7 +32,7 @@ def trim_of(display: Display) -> PixelWindow:
 def trimmed(display: Display) -> Display:
     """The display of the finished print alone, behind the same lenses; the display itself where nothing is cut off."""
     sheet = display.sheet
-    return display if sheet is None or not sheet.border else _resized(display, replace(sheet, bleed=0, margin=0))
+    return display if sheet is None or not sheet.border else _resize(display, replace(sheet, bleed=0, margin=0))
 
 
 def with_bleed(display: Display, bleed: float) -> Display:
@@ -46,25 +45,24 @@ def with_bleed(display: Display, bleed: float) -> Display:
     """
     if bleed == 0:
         return display
-    if not is_real(bleed) or not 0 < bleed <= MOST_BLEED:
+    if not 0 < bleed <= MOST_BLEED:
         rule = f"it must be 0 to {MOST_BLEED:g} mm"
-        what = f"{bleed:g} mm is out of range" if is_real(bleed) else repr(bleed)
-        raise UsageError(what, parameter="bleed", rule=rule)
+        raise UsageError(f"{bleed:g} mm is out of range", parameter="bleed", rule=rule)
     if display.sheet is None:
         rule = "it applies to prints only"
         raise UsageError(f"does not apply to the display {display.name}", parameter="bleed", rule=rule)
     if display.sheet.border:
         raise UsageError("the print has a bleed or a margin already", parameter="bleed", fix="leave it out")
     pixels = math.ceil(bleed / display.panel.pixel_pitch - _WHOLE)
-    return _resized(display, replace(display.sheet, bleed=pixels))
+    return _resize(display, replace(display.sheet, bleed=pixels))
 
 
 def with_margin(display: Display, margin: int) -> Display:
     """The display of a sheet with a margin of so many pixels on every side; a display without a sheet is given one."""
-    return _resized(display, replace(display.sheet or Sheet(), margin=margin))
+    return _resize(display, replace(display.sheet or Sheet(), margin=margin))
 
 
-def _resized(display: Display, sheet: Sheet) -> Display:
+def _resize(display: Display, sheet: Sheet) -> Display:
     """The display with another sheet around the same trim, and the same lenses at the same positions."""
     trim, lattice = trim_of(display), display.lattice
     border = 2 * sheet.border

@@ -159,7 +159,7 @@ def export_image(
     light_field = light_field_of(image, stored_in(layout, image.stored, bits))
     values = {"distance": distance, "progress": progress}
     chosen = {name: value for name, value in values.items() if name in target.write_options}
-    with plugin.guarded(OutputError, str(path)):
+    with plugin.guard(OutputError, str(path)):
         function_of(target.write)(light_field, image.display, path, **chosen)
     return Exported(light_field.stored, light_field.shape, tuple(_notes(image, layout)))
 
@@ -269,7 +269,7 @@ def _read(path: Path, name: str, display: Display | None, progress: ProgressCall
     shape = None if display is None else view_shape(display)
     values = {"grid": None if shape is None else (shape[1], shape[0]), "progress": progress}
     chosen = {option: value for option, value in values.items() if option in layout.read_options}
-    with plugin.guarded(PictureError, str(path)):
+    with plugin.guard(PictureError, str(path)):
         result = function_of(layout.read)(path, **chosen)
     if not isinstance(result, LightField):
         what = f"the plugin {plugin} made a {type(result).__name__} of it"

@@ -221,12 +221,12 @@ def open_file(path: str | Path) -> PictureFile:
         raise unreadable(path, error, PictureError) from error
     with contextlib.ExitStack() as stack:
         stack.callback(file.close)
-        opened = _plausible(_opened(path, file, start), path.stat().st_size)
+        opened = _plausible(_open(path, file, start), path.stat().st_size)
         weakref.finalize(opened, stack.pop_all().close)  # pieces are decoded as long as the object lives
         return opened
 
 
-def _opened(path: Path, file: BufferedReader, start: bytes) -> PictureFile:
+def _open(path: Path, file: BufferedReader, start: bytes) -> PictureFile:
     """The file with its header, in the format that its first bytes show."""
     if start == png.SIGNATURE:
         header = png.png_header(file, path)

@@ -13,7 +13,7 @@ from typing import IO
 from lippmann.errors import OutputError
 
 
-def locked(path: Path, where: Path) -> IO[bytes]:
+def take_lock(path: Path, where: Path) -> IO[bytes]:
     """Open a file for reading and appending, and lock it until it is closed.
 
     File systems without locks give an unlocked file.

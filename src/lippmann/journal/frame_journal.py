@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import IO, Any, TypeGuard
 
 from lippmann.errors import LippmannError, OutputError, PictureError
-from lippmann.journal.file_lock import locked
+from lippmann.journal.file_lock import take_lock
 from lippmann.journal.fingerprint import differences
 from lippmann.runtime.atomic_write import Unfinished, output_error, remark
 
@@ -72,7 +72,7 @@ class FrameJournal:
         with ExitStack() as stack:
             stack.callback(begun.undo)
             try:
-                file = stack.enter_context(locked(path, path))
+                file = stack.enter_context(take_lock(path, path))
             except OSError as error:
                 raise output_error(path, error) from error
             file.seek(0)
@@ -161,7 +161,7 @@ def _remove_without_frames(path: Path) -> None:
     """Remove a journal to which no frame came, unless another process works on it."""
     with suppress(OSError, LippmannError):
         if path.exists():
-            with locked(path, path) as file:
+            with take_lock(path, path) as file:
                 file.seek(0)
                 _head_of(file.readline(_MOST_HEAD), path)
                 if not _frames_of(file.read())[0]:

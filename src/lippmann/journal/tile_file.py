@@ -103,12 +103,12 @@ def decode(data: bytes, most: int | None = None) -> TileResult:
     if _SUM(body).digest() != digest:
         raise DamagedTile("its check sum is wrong")
     try:
-        return _unpacked(data, most)
+        return _unpack(data, most)
     except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError) as error:
         raise DamagedTile("its sum agrees with a head that makes no sense") from error
 
 
-def _unpacked(data: bytes, most: int | None) -> TileResult:
+def _unpack(data: bytes, most: int | None) -> TileResult:
     """The tile of undamaged bytes; any error if the head is not one of :func:`encode`."""
     import imagecodecs
 

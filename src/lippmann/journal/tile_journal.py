@@ -22,7 +22,7 @@ from typing import IO, NamedTuple
 
 from lippmann.display.panel import TileGrid
 from lippmann.errors import OutputError, PictureError
-from lippmann.journal.file_lock import locked
+from lippmann.journal.file_lock import take_lock
 from lippmann.journal.fingerprint import differences
 from lippmann.journal.journal_folder import JOB, LOCK, TILE, clear, foreign_names, holds_tiles, is_tile, no_tile, sweep
 from lippmann.journal.tile_file import MARK, DamagedTile, TileResult, decode, encode, whole_length
@@ -106,7 +106,7 @@ class TileStore:
             if (folder / LOCK).is_symlink():
                 raise _no_journal(folder, "its lock is a symbolic link")
             with _report_errors(folder):
-                lock = stack.enter_context(locked(folder / LOCK, folder))
+                lock = stack.enter_context(take_lock(folder / LOCK, folder))
                 sweep(folder)
             if not _is_begun(output, folder, job, resume):  # again: another process may have begun and ended meanwhile
                 text = json.dumps({_KEY: _VERSION, **job._asdict()}, indent=1, sort_keys=True) + "\n"
@@ -320,7 +320,7 @@ def _remove_without_tiles(folder: Path) -> None:
     """Remove a journal to which no tile came, unless another process works on it."""
     with suppress(OSError, OutputError):
         if folder.is_dir() and not (folder / LOCK).is_symlink():
-            with locked(folder / LOCK, folder) as lock:
+            with take_lock(folder / LOCK, folder) as lock:
                 if not holds_tiles(folder):
                     clear(folder, no_tile, lock.close)
 

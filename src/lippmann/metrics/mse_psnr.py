@@ -34,7 +34,7 @@ def psnr(mean_squared_error: float, peak: float = 1.0) -> float:
     return math.inf if mean_squared_error == 0 else 10 * math.log10(peak * peak / mean_squared_error)
 
 
-def coded(image: Picture, rows: tuple[int, int] | None = None) -> Real:
+def encode_rows(image: Picture, rows: tuple[int, int] | None = None) -> Real:
     """Coded values in [0, 1] of the rows ``first`` to before ``last`` (all if None), ``(rows, W, 3)`` float64."""
     first, last = rows or (0, image.display.panel.height)
     return coded_values(image.held_rows(first, last), image.provenance.transfer)
@@ -75,7 +75,7 @@ def squared_errors(reference: Picture, test: Picture) -> Real:
     height, width = reference.display.panel.height, reference.display.panel.width
     errors = np.empty((height, width))
     for rows in row_blocks(height, width):
-        errors[slice(*rows)] = squared_differences(coded(reference, rows), coded(test, rows))
+        errors[slice(*rows)] = squared_differences(encode_rows(reference, rows), encode_rows(test, rows))
     return errors
 
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from lippmann.image import Picture
 from lippmann.image.stored_values import Layer
 from lippmann.metrics.bands import Band, bands
-from lippmann.metrics.mse_psnr import coded
+from lippmann.metrics.mse_psnr import encode_rows
 
 Real = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -68,7 +68,7 @@ def find_silhouettes(image: Picture) -> Silhouettes:
     panel, depth = image.display.panel, depth_of(image)
     mask = np.empty((panel.height, panel.width), dtype=np.bool_)
     for band in bands(image.display):
-        mask[band.first : band.last] = mark_silhouettes(band, coded(image, (band.top, band.bottom)), depth)
+        mask[band.first : band.last] = mark_silhouettes(band, encode_rows(image, (band.top, band.bottom)), depth)
     return Silhouettes(mask, source_of(depth))
 
 

@@ -61,12 +61,12 @@ def similarity_sum(
     :func:`window_weights`.
     """
     a, b = (np.asarray(picture, np.float64) for picture in (a, b))
-    mean_a, mean_b, squares, products = (_windowed(each, windows) for each in (a, b, a * a + b * b, a * b))
+    mean_a, mean_b, squares, products = (_average_windows(each, windows) for each in (a, b, a * a + b * b, a * b))
     centred = None
     if mask is not None:
         # Missing values weigh nothing. A window without any weight is not centred on a value and does not count.
         centred = mask[_centres(mask, windows)]
-        weights = np.where(centred, _windowed(mask.astype(np.float64), windows), 1.0)[..., None]
+        weights = np.where(centred, _average_windows(mask.astype(np.float64), windows), 1.0)[..., None]
         mean_a, mean_b, squares, products = (each / weights for each in (mean_a, mean_b, squares, products))
     # Both variances are needed as a sum only.
     both, alike = mean_a * mean_a + mean_b * mean_b, 2 * mean_a * mean_b
@@ -77,7 +77,7 @@ def similarity_sum(
     return float(values.sum()), values.size
 
 
-def _windowed(values: Real, windows: tuple[Real, Real]) -> Real:
+def _average_windows(values: Real, windows: tuple[Real, Real]) -> Real:
     """Weighted means over the windows that lie inside ``(H, W, ...)``."""
     from scipy.ndimage import correlate1d
 

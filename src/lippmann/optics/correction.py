@@ -199,7 +199,7 @@ class LensCorrection:
                 light_of = own([*plain, self.rows(exchanged, first, 0.0)], first)
                 *lights, light = (each[inside].astype(np.float64) for each in light_of)
                 rows = (light, lights[0] + lights[1] - light), (goal, goals[0] + goals[1] - goal)
-                level += 0.5 * (_crossed(lights, goals) - _crossed(*rows))
+                level += 0.5 * (_cross_fit(lights, goals) - _cross_fit(*rows))
 
         def parabola(eyes: Eyes) -> Real:
             """Error of the plain picture and of that of least squares, and mean square of what is between them."""
@@ -209,7 +209,7 @@ class LensCorrection:
                 pairs = [(lights[k], lights[k + len(goals) - 1]) for k in (0, len(goals))]
                 plain, solved = (0.5 * (a + b) for a, b in pairs)
                 errors = [
-                    light @ light - _crossed(pair, goals) for light, pair in zip((plain, solved), pairs, strict=True)
+                    light @ light - _cross_fit(pair, goals) for light, pair in zip((plain, solved), pairs, strict=True)
                 ]
                 sums += (*errors, (solved - plain) @ (solved - plain))
                 count += plain.size
@@ -245,7 +245,7 @@ class LensCorrection:
         return SlantedRows(self.display, offsets, parts_beside())
 
 
-def _crossed(lights: Sequence[Real], goals: Sequence[Real]) -> float:
+def _cross_fit(lights: Sequence[Real], goals: Sequence[Real]) -> float:
     """The light of two halves and what is meant by the other one: what cross-fitting takes from ``|W x|^2``."""
     return float(lights[0] @ goals[-1] + lights[-1] @ goals[0] - goals[0] @ goals[-1])
 

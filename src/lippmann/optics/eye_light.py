@@ -56,7 +56,7 @@ class EyeLight:
         """The light of a pupil whose image on the panel is so many millimetres wide; this one's is a point."""
         shape, weights = _disc(width, self.step), self.weights
         for axis in (3,) if weights.shape[2] == 1 else (2, 3):
-            weights = _convolved(weights, shape, axis=axis)
+            weights = _convolve(weights, shape, axis=axis)
         return replace(self, weights=weights)
 
     def at(self, slope_x: Real, slope_y: Real) -> tuple[Real, Real]:
@@ -132,11 +132,11 @@ def eye_light(
     if lens.is_cylinder:
         shape = np.convolve(kernel(pixel_trapezoid(display), blur, step), eye)
         room = pixel * math.cos(math.radians(display.lens_array.slant)) / step
-        weights = _convolved(spreads, shape, axis=3) * room
+        weights = _convolve(spreads, shape, axis=3) * room
     else:
         wide, high = (np.convolve(kernel(Trapezoid(side, side), blur, step), eye) for side in lit)
-        weights = _convolved(_convolved(spreads, wide, axis=3), high, axis=2) * (pixel / step) ** 2
-    return EyeLight(across, along, places, _trimmed(weights), step)
+        weights = _convolve(_convolve(spreads, wide, axis=3), high, axis=2) * (pixel / step) ** 2
+    return EyeLight(across, along, places, _trim(weights), step)
 
 
 def _spreads(lens: Lens, across: Real, along: Real, per_lens: int) -> tuple[Real, Real]:
@@ -171,7 +171,7 @@ def _about(lines: Real, middle: float, reach: int) -> Real:
     return interpolated
 
 
-def _convolved(values: Real, shape: Real, axis: int) -> Real:
+def _convolve(values: Real, shape: Real, axis: int) -> Real:
     """Values convolved with a shape of an odd number of weights; longer by what that reaches beyond them."""
     from scipy.ndimage import convolve1d
 
@@ -191,7 +191,7 @@ def _disc(width: float, step: float) -> Real:
     return np.diff((u * np.sqrt(1.0 - u * u) + np.arcsin(u)) / math.pi)
 
 
-def _trimmed(weights: Real) -> Real:
+def _trim(weights: Real) -> Real:
     """Weights without the outer ones that hardly count in any direction, as many on both sides."""
     for axis in (2, 3):
         lines = weights.sum(axis=5 - axis)

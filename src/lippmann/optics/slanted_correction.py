@@ -293,7 +293,7 @@ class SlantedRows:
                         chosen = near == each
                         right_of, which = divmod(int(each), len(self.parts))
                         add(of_meant, (which, rows, right_of), at[chosen], (windows * value * weight)[chosen])
-        return _pruned(normal), _pruned(of_meant)
+        return _prune(normal), _prune(of_meant)
 
 
 def _even_light(display: Display, there: Display) -> EyeLight:
@@ -321,7 +321,7 @@ def _cubic(at: Real, low: Real, high: Real) -> Iterator[tuple[Real, Real]]:
         yield np.clip(first + step, low, high), weight
 
 
-def _pruned(entries: dict[Offset, Real]) -> _Stencil:
+def _prune(entries: dict[Offset, Real]) -> _Stencil:
     largest = max(float(weights.max()) for weights in entries.values())
     chosen = {key: weights for key, weights in sorted(entries.items()) if weights.max() >= _LEAST * largest}
     return _Stencil(np.array(list(chosen)), np.array(list(chosen.values()), dtype=np.float32))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import get_args
 
-from lippmann.display.validation import is_real
 from lippmann.errors import UsageError
 from lippmann.options.choices import Correction
 
@@ -22,7 +21,7 @@ def check_correction(correct: Correction, headroom: float) -> None:
     """
     if correct not in get_args(Correction):
         raise UsageError.unknown("correction", correct, get_args(Correction), parameter="correct")
-    if not is_real(headroom) or not 0.0 <= headroom <= MOST_HEADROOM:
+    if not 0.0 <= headroom <= MOST_HEADROOM:
         raise UsageError(f"{headroom!r} is out of range", parameter="headroom", rule=f"it is 0 to {MOST_HEADROOM:g}")
     if headroom and correct == "none":
         fix = 'add correct="lens", or leave it out'

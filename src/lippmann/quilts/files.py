@@ -129,7 +129,7 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
     PictureError
         If a view is missing or damaged, or differs from the first in size.
     """
-    paths, taken = _numbered(folder)
+    paths, taken = _list_numbered(folder)
     if layout is None:
         layout = QuiltLayout(len(paths), 1, None)
     if len(paths) != layout.views:
@@ -259,7 +259,7 @@ def write_views(
             progress(Progress("write", number + 1, quilt.layout.views))
 
 
-def _numbered(folder: Path) -> tuple[Sequence[Path], tuple[str, ...]]:
+def _list_numbered(folder: Path) -> tuple[Sequence[Path], tuple[str, ...]]:
     """The views of a folder in order, and notes; a gap, a double or a name without a number raises
     :class:`PictureError`."""
     if (folder / MANIFEST).exists():

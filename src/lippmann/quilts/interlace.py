@@ -1,4 +1,4 @@
-"""Interlaced prints: photographs woven for a lens sheet, written strip by strip with resolution and ICC profile.
+"""Interlaced prints: photographs weave_rows for a lens sheet, written strip by strip with resolution and ICC profile.
 
 The photographs cover the whole sheet with its bleed.
 
@@ -36,7 +36,7 @@ Lenses = Literal["along", "across"]
 #: View columns per lens: bilinear samples between them stay sharp.
 _COLUMNS_PER_LENS = 2
 
-#: Rows of a PNG that are woven at a time.
+#: Rows of a PNG that are weave_rows at a time.
 _ROWS = 64
 
 
@@ -124,12 +124,12 @@ def write_interlaced(
     metadata = Metadata(finished, np.eye(4), weave_provenance(photos.quilt, choice, scene, options, notes))
     text = "" if across else to_text(metadata)  # a display with lying lenses cannot be described
 
-    def woven(first: int, last: int) -> FloatArray:
+    def weave_rows(first: int, last: int) -> FloatArray:
         if across:
             return np.rot90(weave_window(photos.quilt, whole, choice, (0, panel.height), (first, last)), -1)
         return weaving.rows(first, last)
 
-    printed = replace(finish, profile=None).rows(woven, display)
+    printed = replace(finish, profile=None).rows(weave_rows, display)
 
     def rows(first: int, last: int) -> Pixels:
         return mirrored_in_file(converted_values(printed(first, last), "uint8", "srgb"), finished)

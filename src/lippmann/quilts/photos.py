@@ -163,9 +163,9 @@ def read_photos(
     values = np.empty((height, width * len(sources), 3), dtype=np.uint8)
     quilt = Quilt(values, QuiltLayout(len(sources), 1, None), "uint8")
     for number, source in enumerate(sources):
-        with _opened(source) as photograph:
+        with _open_source(source) as photograph:
             colors = _in_profile(_on_paper(photograph.codes(), turned=turned), headers[number].icc, target, source.path)
-            quilt.view_values(number)[...] = np.asarray(_fitted(colors, windows[number], (width, height)))
+            quilt.view_values(number)[...] = np.asarray(_fit(colors, windows[number], (width, height)))
         progress(Progress("read", number + 1, len(sources)))
     cropped = tuple(max(window.cropped[axis] for window in windows) for axis in (0, 1))
     of_files = FileNotes()
@@ -262,7 +262,7 @@ def fit_window(
     return FitWindow(box, visible, (1 - (visible[2] - visible[0]) / width, 1 - (visible[3] - visible[1]) / height))
 
 
-def _fitted(picture: Image.Image, window: FitWindow, size: tuple[int, int]) -> Image.Image:
+def _fit(picture: Image.Image, window: FitWindow, size: tuple[int, int]) -> Image.Image:
     """The window of a picture as a view of ``size``, on white paper."""
     from PIL import Image
 
@@ -279,7 +279,7 @@ def _fitted(picture: Image.Image, window: FitWindow, size: tuple[int, int]) -> I
 
 
 @contextmanager
-def _opened(source: _Source) -> Iterator[Photograph]:
+def _open_source(source: _Source) -> Iterator[Photograph]:
     """An opened photograph; errors of Pillow become :class:`PictureError`."""
     if source.view is not None:
         yield source.view
@@ -304,7 +304,7 @@ def _report_errors(path: Path) -> Iterator[None]:
 
 
 def _header(source: _Source) -> _Header:
-    with _opened(source) as photograph:
+    with _open_source(source) as photograph:
         return _Header(photograph.size, photograph.icc, photograph.notes)
 
 

@@ -12,7 +12,7 @@ Real = NDArray[np.float64]
 
 
 @inlined
-def _between(view: FloatArray, channel: int, across: float, down: float) -> float:
+def _interpolate(view: FloatArray, channel: int, across: float, down: float) -> float:
     """Bilinear interpolation of ``view`` ``(rows, width, 3)`` at a position in pixels."""
     left, top = int(across), int(down)
     right, bottom = min(left + 1, view.shape[1] - 1), min(top + 1, view.shape[0] - 1)
@@ -35,9 +35,9 @@ def weave_channel(
     for y in range(woven.shape[0]):
         for x in range(woven.shape[1]):
             first = number[y, x]
-            color = _between(views[first], channel, across[y, x], down[y, x])
+            color = _interpolate(views[first], channel, across[y, x], down[y, x])
             if share[y, x] > 0.0:
                 color += share[y, x] * (
-                    _between(views[min(first + 1, last)], channel, across[y, x], down[y, x]) - color
+                    _interpolate(views[min(first + 1, last)], channel, across[y, x], down[y, x]) - color
                 )
             woven[y, x, channel] = color

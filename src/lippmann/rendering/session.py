@@ -345,7 +345,7 @@ def make_integrator(built: BuiltScene | BuiltClassic, request: RenderRequest, fr
     """The integrator that a resolved request names, with no light prepared; see :meth:`Session.integrator`."""
     plugin = INTEGRATORS.find(request.integrator)
     assert plugin is not None  # options know no others
-    with plugin.guarded(EngineError):
+    with plugin.guard(EngineError):
         integrator: Integrator = function_of(plugin.value.make)(built, request, frame_from_world)
     return integrator
 

@@ -7,21 +7,21 @@ from collections.abc import Sequence
 from markupsafe import Markup
 
 
-def joined(*parts: str) -> Markup:
+def join(*parts: str) -> Markup:
     """Pieces of markup as one; plain text among them is escaped."""
     return Markup("").join(parts)
 
 
 def element(name: str, *inside: str, **attributes: object) -> Markup:
     """An element; a ``_`` at the end of an attribute's name is dropped, other ones become ``-``."""
-    written = joined(
+    written = join(
         *(
             Markup(' {}="{}"').format(key.rstrip("_").replace("_", "-"), value)
             for key, value in attributes.items()
             if value is not None
         )
     )
-    return Markup("<{0}{1}>{2}</{0}>").format(name, written, joined(*inside))
+    return Markup("<{0}{1}>{2}</{0}>").format(name, written, join(*inside))
 
 
 def paragraph(*inside: str, class_: str | None = None) -> Markup:
@@ -52,7 +52,7 @@ def table(
     inside = element("table", *columns, element("thead", *heads), body, class_="wrap" if wrap else None)
     # The caption stays while the table scrolls; a scrolling region must be reachable by keyboard.
     scrolling = element("div", inside, class_="scroll", tabindex=0, role="region", aria_label=caption)
-    return joined(paragraph(caption, class_="caption"), scrolling)
+    return join(paragraph(caption, class_="caption"), scrolling)
 
 
 def _row(cells: Sequence[str]) -> Markup:

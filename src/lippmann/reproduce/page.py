@@ -11,7 +11,7 @@ from lippmann.reproduce import charts, tables
 from lippmann.reproduce import paper_values as printed
 from lippmann.reproduce.experiment import COMPARED, METHODS, Manner, Results, Variant
 from lippmann.reproduce.figures import gloss_figures, missed_figures, scene_figures
-from lippmann.reproduce.html import element, joined, paragraph, section, table
+from lippmann.reproduce.html import element, join, paragraph, section, table
 from lippmann.reproduce.style import STYLE
 
 TITLE = "The paper's system, measured again"
@@ -89,7 +89,7 @@ def _facts(results: Results, manner: Manner) -> Markup:
     )
     cards = (element("div", element("dt", text), element("dd", value)) for text, value in entries)
     heading = element("h3", f"{manner.value}: interpolation")
-    return joined(heading, element("dl", *cards, class_="facts"))
+    return join(heading, element("dl", *cards, class_="facts"))
 
 
 def _decibels(value: float) -> str:
@@ -210,7 +210,7 @@ def _lens_chart(results: Results, scene: str) -> Markup:
         dashed=() if level is None else [(0, level), (last, level)],
     )
     said = "" if level is None else f"Dashed: the paper's mean, {level:g} dB. "
-    return joined(chart, paragraph(f"{said}Gaps are micro-images without any error.", class_="soft"))
+    return join(chart, paragraph(f"{said}Gaps are micro-images without any error.", class_="soft"))
 
 
 def _ray_chart(results: Results) -> list[Markup]:

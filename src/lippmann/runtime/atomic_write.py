@@ -29,7 +29,7 @@ from pathlib import Path
 
 from lippmann.errors import OutputError
 from lippmann.printable import one_line
-from lippmann.runtime.folder_list import CONTENTS_FILE, listed, write_list
+from lippmann.runtime.folder_list import CONTENTS_FILE, read_list, write_list
 
 #: Bytes of a name that are kept.
 _KEPT = 64
@@ -354,7 +354,7 @@ def _files(folder: Path) -> Iterator[str]:
 def _refuse_foreign_files(place: Path, path: Path) -> None:
     if not place.exists():
         return
-    foreign = sorted(set(_files(place)) - {CONTENTS_FILE} - listed(place))
+    foreign = sorted(set(_files(place)) - {CONTENTS_FILE} - read_list(place))
     if foreign:
         raise OutputError(
             f"the folder holds {foreign[0]!r}, which Lippmann did not write, or which was changed since",

@@ -22,7 +22,7 @@ def write_list(folder: Path, names: Iterable[str]) -> None:
     (folder / CONTENTS_FILE).write_text("".join(lines), encoding="utf-8", errors="surrogateescape")
 
 
-def listed(folder: Path) -> set[str]:
+def read_list(folder: Path) -> set[str]:
     """Files of ``folder`` that are listed there and as they were."""
     path = folder / CONTENTS_FILE
     try:

@@ -80,7 +80,7 @@ def choose() -> Library:
     """
     named = os.environ.get(PATH_VARIABLE)
     if named:
-        return _named(named)
+        return _find_named(named)
     libraries: list[Library] = []
     # The system's list of libraries comes last: it takes a child process, and the folders usually suffice.
     for files in (files_in(search_folders()), listed_files()):
@@ -161,7 +161,7 @@ def listed_files() -> Iterator[Path]:
         return
 
 
-def _named(name: str) -> Library:
+def _find_named(name: str) -> Library:
     path: Path | None = Path(name).absolute()
     if not {os.sep, os.altsep} & set(name):
         # The dynamic loader looks such a name up in its folders, never in the current one.

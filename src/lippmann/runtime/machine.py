@@ -44,7 +44,7 @@ def available_memory() -> int:
     limit = _limit()
     if limit is None:
         return available
-    return max(0, min(available, limit - _used()))
+    return max(0, min(available, limit - _measure_used()))
 
 
 def _limit() -> int | None:
@@ -59,7 +59,7 @@ def _limit() -> int | None:
     return None
 
 
-def _used() -> int:
+def _measure_used() -> int:
     """Memory in bytes that counts against the container's limit and cannot be reclaimed."""
     for usage, statistics, key in (
         ("memory.current", "memory.stat", "inactive_file"),

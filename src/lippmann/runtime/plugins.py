@@ -68,7 +68,7 @@ class Plugin(Generic[P]):
         return f"{self.name} of {self.distribution}"
 
     @contextmanager
-    def guarded(self, error: type[LippmannError], where: str = "") -> Iterator[None]:
+    def guard(self, error: type[LippmannError], where: str = "") -> Iterator[None]:
         """A context in which code of another package runs: ``error`` is raised where that fails."""
         try:
             yield

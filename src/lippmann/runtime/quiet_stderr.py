@@ -20,7 +20,7 @@ _stream: TextIO | None = None
 
 
 @contextlib.contextmanager
-def libraries_silenced() -> Iterator[None]:
+def silence_libraries() -> Iterator[None]:
     """Context in which nothing appears on standard error.
 
     Standard error belongs to the whole process: the first thread that enters redirects it, and the last that leaves

@@ -12,7 +12,7 @@ from lippmann.options.scene import Crop
 from lippmann.scene.matrices import scaling
 from lippmann.scene.point_clouds import crop_cloud, is_cloud
 from lippmann.scene.scene import Scene
-from lippmann.scene.splat_clouds import check_splats, crop, moved
+from lippmann.scene.splat_clouds import check_splats, crop, move
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import Splats
 from lippmann.scene.values.volume import TransferFunction, Volume
@@ -84,7 +84,7 @@ class SplatSelection:
             )
         splats = description.splats
         if self.unit_scale is not None:
-            splats = moved(splats, scaling(self.unit_scale))
+            splats = move(splats, scaling(self.unit_scale))
             check_splats(splats, scene.name)
         if self.crop is not None:
             splats = _some(crop(splats, np.array([self.crop[:3], self.crop[3:]])), "crop", scene.name)

@@ -30,7 +30,7 @@ def mean_reflectance(scene: SceneDescription) -> float | None:
         if mesh.material not in colors:
             colors[mesh.material] = _luminance(scene.materials[mesh.material])
         own = _placed_area(mesh, places)
-        total += own * colors[mesh.material] * _painted(mesh)
+        total += own * colors[mesh.material] * _average_paint(mesh)
         area += own
     return total / area if area > 0.0 and np.isfinite(total) else None
 
@@ -61,7 +61,7 @@ def _area(mesh: Mesh) -> float:
     return float(np.linalg.norm(np.cross(*sides), axis=-1).sum() / 2.0)
 
 
-def _painted(mesh: Mesh) -> float:
+def _average_paint(mesh: Mesh) -> float:
     """The factor that colours of vertices bring."""
     return 1.0 if mesh.colors is None else float((mesh.colors[:, :3].astype(np.float64) @ _LUMINANCE).mean())
 

@@ -63,7 +63,7 @@ def check_splats(splats: Splats, where: str) -> None:
         raise SceneError("splats' scales or opacities are out of range", where=where, rule="0 or more, and 0 to 1")
 
 
-def moved(splats: Splats, matrix: Numbers) -> Splats:
+def move(splats: Splats, matrix: Numbers) -> Splats:
     """The cloud moved by an affine ``matrix`` ``(4, 4)``: centres, axes, and what they show from where.
 
     The harmonics turn by the matrix's rotation, or rotation and mirroring; a stretch leaves them alone.
@@ -91,11 +91,11 @@ def moved(splats: Splats, matrix: Numbers) -> Splats:
         centers=centers.astype(np.float32),
         scales=scales,
         rotations=rotations,
-        harmonics=_turned(splats.harmonics, turn),
+        harmonics=_turn(splats.harmonics, turn),
     )
 
 
-def _turned(harmonics: NDArray[np.float32], turn: Numbers) -> NDArray[np.float32]:
+def _turn(harmonics: NDArray[np.float32], turn: Numbers) -> NDArray[np.float32]:
     """Coefficients of the same functions on the sphere, turned by an orthogonal matrix ``(3, 3)``."""
     count = harmonics.shape[1]
     if count == 1 or np.array_equal(turn, np.eye(3)):

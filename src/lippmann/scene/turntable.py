@@ -63,7 +63,7 @@ def turning_axis(scene: Scene, options: PlacementOptions) -> Vector:
     return axis[0], axis[1], axis[2]
 
 
-def with_lights_moved(scene: Scene, matrix: Matrix) -> Scene:
+def move_lights(scene: Scene, matrix: Matrix) -> Scene:
     """The scene with its light sources, environment and background moved by a rigid ``matrix``; its shapes stay.
 
     Light sources in a scene of Mitsuba's are parts of it and stay, too; an environment that was given instead moves.
@@ -71,7 +71,7 @@ def with_lights_moved(scene: Scene, matrix: Matrix) -> Scene:
     if scene.description is not None:
         return scene.with_light_moved(matrix)
     assert scene.classic is not None
-    return replace(scene, classic_form=_classic_lights_moved(scene.classic, matrix))
+    return replace(scene, classic_form=_move_classic_lights(scene.classic, matrix))
 
 
 def outline(scene: Scene, axis: Vector, center: Vector | Bounds) -> Bounds:
@@ -114,21 +114,21 @@ def _frame_along(axis: Vector) -> Matrix:
     return matrix
 
 
-def _classic_lights_moved(scene: ClassicScene, matrix: Matrix) -> ClassicScene:
+def _move_classic_lights(scene: ClassicScene, matrix: Matrix) -> ClassicScene:
     """``matrix`` moves in the world, whose z the scene's own numbers may have negated."""
     mirror = world_from_scene(scene)
     own = mirror @ matrix @ mirror
-    lights = tuple(_light_moved(light, own) for light in scene.lights)
-    return replace(scene, lights=lights, background=_background_moved(scene.background, own))
+    lights = tuple(_move_light(light, own) for light in scene.lights)
+    return replace(scene, lights=lights, background=_move_background(scene.background, own))
 
 
-def _light_moved(light: ClassicLight, matrix: Matrix) -> ClassicLight:
+def _move_light(light: ClassicLight, matrix: Matrix) -> ClassicLight:
     center = transform_points(matrix, np.asarray([light.center], np.float64))[0]
     direction = matrix[:3, :3] @ np.asarray(light.direction, np.float64)
     return replace(light, center=_vector(center), direction=_vector(direction))
 
 
-def _background_moved(background: Background, matrix: Matrix) -> Background:
+def _move_background(background: Background, matrix: Matrix) -> Background:
     up = matrix[:3, :3] @ np.asarray(background.up, np.float64)
     # A gradient over a plane is told by places, which move along.
     offset = float(up @ matrix[:3, 3]) if background.kind == "sky-plane" else 0.0

@@ -18,10 +18,10 @@ from lippmann.scene.placement import Placement, face_viewer, place
 from lippmann.scene.scene import Scene
 from lippmann.scene.turntable import (
     STEP,
+    move_lights,
     swept_points,
     turn_about,
     turning_axis,
-    with_lights_moved,
 )
 from lippmann.scene.values.description import Camera, Matrix
 from lippmann.sequences.motion import Motion
@@ -86,7 +86,7 @@ class Turntable(Motion):
         return 360.0 * share if self._swing is None else self._swing / 2.0 * math.sin(2.0 * math.pi * share)
 
     def scene(self, frame: int) -> Scene:
-        return with_lights_moved(self._scene, self.display_turn(frame))
+        return move_lights(self._scene, self.display_turn(frame))
 
     def camera(self, frame: int, name: str | None) -> Camera | None:
         return None

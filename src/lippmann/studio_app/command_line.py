@@ -46,10 +46,10 @@ def option_values(state: StudioState) -> Mapping[str, str | bool | list[str]]:
     """The options of a render by name, as they are typed; switches are bool. What commands assume is left out."""
     given = changed_options(state, _ASSUMED)
     first = {name: given[name] for name in ("display",) if name in given}
-    return {name: _typed(value) for name, value in (first | given).items() if name not in _OTHERS and value is not None}
+    return {name: _spell(value) for name, value in (first | given).items() if name not in _OTHERS and value is not None}
 
 
-def _typed(value: object) -> str | bool | list[str]:
+def _spell(value: object) -> str | bool | list[str]:
     if isinstance(value, Mapping):
         return [f"{name}={choice}" for name, choice in value.items()]
     return value if isinstance(value, bool) else _text(value)

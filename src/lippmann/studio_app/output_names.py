@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import IO
 
 from lippmann.errors import LippmannError, OutputError
-from lippmann.journal.file_lock import locked
+from lippmann.journal.file_lock import take_lock
 from lippmann.journal.frame_journal import ENDING as FRAMES_ENDING
 from lippmann.journal.tile_journal import journal_of, read_job
 from lippmann.runtime.atomic_write import disk_name, output_error
@@ -91,7 +91,7 @@ def _claim(output: Path) -> OutputClaim | None:
     """The claim of a name; None if another studio has it."""
     file = _claim_file(output)
     try:
-        lock = locked(file, output)
+        lock = take_lock(file, output)
     except OutputError:  # held by another studio
         return None
     except OSError as error:

@@ -15,7 +15,7 @@ Real = NDArray[np.float64]
 
 
 @inlined
-def _between(tables: Real, at: Real, down: float, right: float) -> float:
+def _interpolate(tables: Real, at: Real, down: float, right: float) -> float:
     """The weight of a distance, interpolated between the tables of the four directions around ``at``."""
     row = min(max(int(at[0]), 0), tables.shape[0] - 2)
     column = min(max(int(at[1]), 0), tables.shape[1] - 2)
@@ -86,7 +86,7 @@ def weigh(
                 for channel in range(1 if is_even else 3):
                     place_x, place_y = x + cell[channel, 0] * pixel, y - cell[channel, 1] * pixel
                     right = (place_x * cosine - place_y * sine - across) / step
-                    weight = share * _between(tables, at[n], (place_y - along) / step, right)
+                    weight = share * _interpolate(tables, at[n], (place_y - along) / step, right)
                     if channel == 0:
                         red = weight
                     elif channel == 1:

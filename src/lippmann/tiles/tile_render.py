@@ -100,7 +100,7 @@ def prepare(job: TileJob, progress: ProgressCallback = silent) -> Prepared:
 
 def render_tile(prepared: Prepared, index: int) -> TileResult:
     """One tile, ready to be kept: the same whenever, wherever and beside whatever it is rendered."""
-    return packed(prepared, trace_tile(prepared, index))
+    return pack(prepared, trace_tile(prepared, index))
 
 
 @exclusive()
@@ -163,7 +163,7 @@ def _trace_window(prepared: Prepared, index: int) -> TracedTile:
     return TracedTile(index, traced.frame.pixels[inside], errors, traced.frame.rays, maps, traced.notes)
 
 
-def packed(prepared: Prepared, traced: TracedTile) -> TileResult:
+def pack(prepared: Prepared, traced: TracedTile) -> TileResult:
     """The part of :func:`render_tile` that needs no engine: values as the file holds them, errors as sums."""
     job = prepared.job
     sums, maps = {}, {}

@@ -147,7 +147,7 @@ def render_to_file(
         prepared = prepare(job, progress)
         built = time.perf_counter()
         resumed = store.resumed
-        provenance = _completed(prepared, store, runner or render_here, progress)
+        provenance = _complete(prepared, store, runner or render_here, progress)
         traced = time.perf_counter()
         progress(Progress("write", 0, len(job.grid)))
         try:
@@ -167,10 +167,10 @@ def render_to_file(
 
 def render_here(prepared: Prepared, missing: Sequence[int], put: Put) -> None:
     """The runner of one process: packs and writes one tile while it traces the next."""
-    from lippmann.tiles.tile_render import TracedTile, packed, trace_tile
+    from lippmann.tiles.tile_render import TracedTile, pack, trace_tile
 
     def keep(traced: TracedTile) -> None:
-        put(packed(prepared, traced))
+        put(pack(prepared, traced))
 
     with ThreadPoolExecutor(_WRITERS) as pool:
         waiting: set[Future[None]] = set()
@@ -188,7 +188,7 @@ def _raise_failure(futures: set[Future[None]]) -> None:
         future.result()
 
 
-def _completed(prepared: Prepared, store: TileStore, runner: Runner, progress: ProgressCallback) -> Provenance:
+def _complete(prepared: Prepared, store: TileStore, runner: Runner, progress: ProgressCallback) -> Provenance:
     """Render what is missing until every tile is there and whole; how the picture was made."""
     grid = prepared.job.grid
     for _ in range(_MOST_REPAIRS):
@@ -197,7 +197,7 @@ def _completed(prepared: Prepared, store: TileStore, runner: Runner, progress: P
             counted = _Counted(store, grid, progress, len(grid) - len(missing))
             runner(prepared, missing, counted.put)
         try:
-            return _summed(prepared, store)
+            return _sum_up(prepared, store)
         except DamagedTile:
             continue
     raise EngineError(
@@ -220,7 +220,7 @@ class _Counted:
         self._progress(Progress("tiles", self._done, len(self._grid), f"tile {self._done} of {len(self._grid)}"))
 
 
-def _summed(prepared: Prepared, store: TileStore) -> Provenance:
+def _sum_up(prepared: Prepared, store: TileStore) -> Provenance:
     """Rays and the estimate from all tiles, in their order; each is checked on the way."""
     from lippmann.rendering.film.wavefront import Frame, RayTotals
     from lippmann.rendering.picture import describe_placement

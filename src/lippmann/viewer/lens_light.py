@@ -61,7 +61,7 @@ def light_everywhere(display: Display) -> EyeLight:
     slope = _largest_slope(display)
     if display.lens_array.layout == "lenticular":
         halves = (0.0, 0.5 * slope), (0.5 * slope, slope)
-        return _joined(*(eye_light(display, (-slope, slope), half) for half in halves))
+        return _join(*(eye_light(display, (-slope, slope), half) for half in halves))
     return eye_light(display, (-slope, slope), (-slope, slope))
 
 
@@ -72,7 +72,7 @@ def _largest_slope(display: Display) -> float:
     return min(_SLOPE, max(aside + half / distance, half / (_NEAREST * distance)))
 
 
-def _joined(low: EyeLight, high: EyeLight) -> EyeLight:
+def _join(low: EyeLight, high: EyeLight) -> EyeLight:
     """The light of slopes along cylinders of which ``high`` begins where ``low`` ends."""
     width = max(light.weights.shape[3] for light in (low, high))
     sides = [((width - light.weights.shape[3]) // 2,) * 2 for light in (low, high)]

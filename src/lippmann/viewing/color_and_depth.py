@@ -95,13 +95,13 @@ def rgbd_codes(
     near, far = range_of(distance) if between is None else between
     depth = depth_codes(distance, near, far, bits, form.white)
     if form.half:
-        color = _halved(color)
+        color = _halve(color)
         depth = depth[:, ::2]  # a mean of two depths is that of no surface
     gray: NDArray[np.generic] = np.repeat(depth[..., None], 3, axis=2)
     return np.ascontiguousarray(np.concatenate([color, gray], axis=1))
 
 
-def _halved(codes: Pixels) -> Pixels:
+def _halve(codes: Pixels) -> Pixels:
     pair = codes[:, 0::2].astype(np.uint32) + codes[:, 1::2]
     return ((pair + 1) // 2).astype(codes.dtype)
 

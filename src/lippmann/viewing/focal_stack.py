@@ -63,7 +63,7 @@ def focal_stack(
     >>> lippmann.focal_stack(image, [-10.0, 0.0, 10.0], size=(34, 34)).shape
     (3, 34, 34, 3)
     """
-    return np.stack(list(_reported(focal_planes(image, planes, size=size), len(planes), progress)))
+    return np.stack(list(_report(focal_planes(image, planes, size=size), len(planes), progress)))
 
 
 def check_stack_path(path: Path, bits: int | None = None) -> None:
@@ -111,7 +111,7 @@ def write_planes(
         Coding of the values.
     """
     check_stack_path(path, bits)
-    checked = _reported(_finite(pictures, path), len(planes), progress)
+    checked = _report(_finite(pictures, path), len(planes), progress)
     if not path.suffix:
         _write_folder(checked, planes, path, bits, transfer)
     elif is_film(path):
@@ -139,7 +139,7 @@ def _finite(pictures: Iterable[FloatArray], path: Path) -> Iterator[FloatArray]:
         yield picture
 
 
-def _reported(pictures: Iterable[FloatArray], count: int, progress: ProgressCallback) -> Iterator[FloatArray]:
+def _report(pictures: Iterable[FloatArray], count: int, progress: ProgressCallback) -> Iterator[FloatArray]:
     for number, picture in enumerate(pictures, start=1):
         progress(Progress("refocus", number, count))
         yield picture

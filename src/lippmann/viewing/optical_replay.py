@@ -15,9 +15,10 @@ from lippmann.errors import UsageError
 from lippmann.image.integral_image import Picture
 from lippmann.image.stored_values import FloatArray
 from lippmann.optics.eye_light import EyeLight, eye_light, panel_frame
+from lippmann.options.option import checked
 from lippmann.runtime.machine import usable_cores
 from lippmann.runtime.row_threads import Bands
-from lippmann.viewing.replay import Eye, Real, checked_size, default_size, eye_before
+from lippmann.viewing.replay import Eye, Real, check_size, default_size, eye_before
 
 #: Diameter of an eye's pupil in mm, indoors.
 PUPIL = 4.0
@@ -26,6 +27,7 @@ PUPIL = 4.0
 _BLOCK = 1 << 18
 
 
+@checked
 def replay_optics(
     image: Picture, eye: Eye | None = None, *, size: tuple[int, int] | None = None, pupil: float = PUPIL
 ) -> FloatArray:
@@ -49,7 +51,7 @@ def replay_optics(
     """
     display = image.display
     eye = eye_before(display, eye)
-    width, height = checked_size(default_size(display) if size is None else size)
+    width, height = check_size(default_size(display) if size is None else size)
     if not 0.0 <= pupil <= 20.0:
         raise UsageError(f"{pupil:g} mm", parameter="pupil", rule="a pupil is 0 to 20 mm wide")
     light = _light_of(display, eye, pupil)
@@ -62,7 +64,7 @@ def replay_optics(
     lines = max(1, _BLOCK // (width * finer_x * finer_y))
     for first in range(0, height, lines):
         last = min(first + lines, height)
-        fine = _gathered(image, light, eye, (width * finer_x, height * finer_y), slice(first * finer_y, last * finer_y))
+        fine = _gather(image, light, eye, (width * finer_x, height * finer_y), slice(first * finer_y, last * finer_y))
         picture[first:last] = fine.reshape(last - first, finer_y, width, finer_x, 3).mean(axis=(1, 3))
     return picture
 
@@ -84,7 +86,7 @@ def slopes_to_eye(display: Display, eye: Eye, x: Real, y: Real) -> tuple[Real, R
     return display.lattice.across(right, up), display.lattice.along(right, up)
 
 
-def _gathered(image: Picture, light: EyeLight, eye: Eye, size: tuple[int, int], rows: slice) -> FloatArray:
+def _gather(image: Picture, light: EyeLight, eye: Eye, size: tuple[int, int], rows: slice) -> FloatArray:
     """Rows of a picture of ``size`` (width, height), each point of which shows one lens."""
     from lippmann.optics.eye_light_kernel import gather_light
 

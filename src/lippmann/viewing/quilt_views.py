@@ -18,7 +18,7 @@ from lippmann.errors import PictureError
 from lippmann.image.stored_values import FloatArray
 from lippmann.quilts.quilt import Quilt
 from lippmann.viewing.refocus import check_planes
-from lippmann.viewing.replay import Eye, Real, checked_size, eye_before, eye_of_offset, lens_plane_points
+from lippmann.viewing.replay import Eye, Real, check_size, eye_before, eye_of_offset, lens_plane_points
 
 #: Default limit on the width of a picture, in pixels.
 _WIDEST = 2048
@@ -69,7 +69,7 @@ def replay_quilt(
         If the eye is not in front of the lens plane, or the size is out of range.
     """
     eye = eye_before(display, eye)
-    width, height = checked_size(_default_size(quilt, display) if size is None else size)
+    width, height = check_size(_default_size(quilt, display) if size is None else size)
     lattice, count = display.lattice, quilt.layout.views
     convergence = 1 / display.viewing_distance if math.isfinite(display.viewing_distance) else 0.0
     views = quilt.view_rows(0, quilt.view_size[1])
@@ -110,11 +110,11 @@ def refocus_quilt(
         If a plane or the size is out of range; raised at once.
     """
     check_planes(planes, display)
-    width, height = checked_size(_default_size(quilt, display) if size is None else size)
-    return (_refocused(quilt, display, plane, width, height) for plane in planes)
+    width, height = check_size(_default_size(quilt, display) if size is None else size)
+    return (_refocus(quilt, display, plane, width, height) for plane in planes)
 
 
-def _refocused(quilt: Quilt, display: Display, plane: float, width: int, height: int) -> FloatArray:
+def _refocus(quilt: Quilt, display: Display, plane: float, width: int, height: int) -> FloatArray:
     picture = np.zeros((height, width, 3), dtype=np.float32)
     count = np.zeros((height, width), dtype=np.float32)
     pixel, (across, _) = display.panel.pixel_pitch, display.pixels_per_lens

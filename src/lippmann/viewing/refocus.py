@@ -17,15 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import NUMPY, Display
-from lippmann.display.validation import is_real
 from lippmann.errors import UsageError
 from lippmann.image.integral_image import IntegralImage
 from lippmann.image.stored_values import FloatArray
 from lippmann.image.streamed import LargePicture
 from lippmann.image.views import pixels_of_view, view_grid
+from lippmann.options.option import checked
 from lippmann.runtime.machine import usable_cores
 from lippmann.runtime.row_threads import Bands
-from lippmann.viewing.replay import Eye, Real, checked_size, default_size, eye_of_offset, lens_plane_points, pixel_at
+from lippmann.viewing.replay import Eye, Real, check_size, default_size, eye_of_offset, lens_plane_points, pixel_at
 
 Index = NDArray[np.intp]
 Flags = NDArray[np.bool_]
@@ -35,6 +35,7 @@ View = tuple[int, int]
 DEFAULT_WIDTH = 1024
 
 
+@checked
 def refocus(image: IntegralImage | LargePicture, plane: float, *, size: tuple[int, int] | None = None) -> FloatArray:
     """Picture focused on the plane at z = ``plane``.
 
@@ -63,7 +64,7 @@ def refocus(image: IntegralImage | LargePicture, plane: float, *, size: tuple[in
 def check_planes(planes: Sequence[float], display: Display) -> None:
     """Refuse a plane that is no finite height in mm below the viewing distance."""
     for plane in planes:
-        if not is_real(plane) or not -math.inf < plane < display.viewing_distance:
+        if not -math.inf < plane < display.viewing_distance:
             rule = f"it must be finite mm below the viewing distance of {display.viewing_distance:g} mm"
             raise UsageError(f"{plane!r}", parameter="plane", rule=rule)
 
@@ -86,13 +87,13 @@ def focal_planes(
     """
     display = image.display
     check_planes(planes, display)
-    width, height = checked_size(default_size(display, DEFAULT_WIDTH) if size is None else size)
+    width, height = check_size(default_size(display, DEFAULT_WIDTH) if size is None else size)
     if isinstance(image, IntegralImage) and display.lens_array.layout != "lenticular":
-        return _compiled(image, planes, width, height)
-    return _interpreted(image, planes, width, height)
+        return _refocus_compiled(image, planes, width, height)
+    return _refocus_interpreted(image, planes, width, height)
 
 
-def _interpreted(
+def _refocus_interpreted(
     image: IntegralImage | LargePicture, planes: Sequence[float], width: int, height: int
 ) -> Iterator[FloatArray]:
     """:func:`focal_planes` for all pictures and lenses."""
@@ -112,7 +113,7 @@ def _interpreted(
         yield picture
 
 
-def _compiled(image: IntegralImage, planes: Sequence[float], width: int, height: int) -> Iterator[FloatArray]:
+def _refocus_compiled(image: IntegralImage, planes: Sequence[float], width: int, height: int) -> Iterator[FloatArray]:
     """:func:`focal_planes` of a picture in memory behind square or hexagonal lenses, compiled and on all cores."""
     from lippmann.viewing.refocus_kernel import add_views
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from operator import index
 from typing import Literal, get_args
 
 import numpy as np
@@ -22,6 +21,7 @@ from lippmann.display import NUMPY, Display
 from lippmann.errors import UsageError
 from lippmann.image.integral_image import Picture
 from lippmann.image.stored_values import FloatArray
+from lippmann.options.option import checked
 
 Eye = tuple[float, float, float]
 Real = NDArray[np.float64]
@@ -43,6 +43,7 @@ _ON_BOUNDARY = 1e-6
 _BLOCK = 1 << 15
 
 
+@checked
 def replay(
     image: Picture,
     eye: Eye | None = None,
@@ -79,7 +80,7 @@ def replay(
         If the eye is not in front of the lens plane, the size is out of range, or the filter is unknown.
     """
     eye = eye_before(image.display, eye)
-    width, height = checked_size(default_size(image.display) if size is None else size)
+    width, height = check_size(default_size(image.display) if size is None else size)
     if filter not in get_args(Filter):
         raise UsageError.unknown("filter", filter, get_args(Filter))
     subpixels = image.provenance.subpixels if subpixels is None else subpixels
@@ -131,7 +132,7 @@ def path_of_eye(start: Eye, stop: Eye, frames: int) -> list[Eye]:
     """Positions of an eye that moves from ``start`` to ``stop`` in equal steps; errors are those of :func:`sweep`."""
     if not 1 <= frames <= MOST_FRAMES:
         raise UsageError(f"{frames} is out of range", parameter="frames", rule=f"it must be from 1 to {MOST_FRAMES}")
-    places = np.linspace(checked_eye(start), checked_eye(stop), frames)
+    places = np.linspace(check_eye(start), check_eye(stop), frames)
     return [(float(x), float(y), float(z)) for x, y, z in places]
 
 
@@ -150,8 +151,8 @@ def default_eye(display: Display) -> Eye:
 
 
 def eye_before(display: Display, eye: Eye | None) -> Eye:
-    """``eye`` before a display, checked as by :func:`checked_eye`; by default :func:`default_eye`."""
-    return checked_eye(default_eye(display) if eye is None else eye)
+    """``eye`` before a display, checked as by :func:`check_eye`; by default :func:`default_eye`."""
+    return check_eye(default_eye(display) if eye is None else eye)
 
 
 def eye_of_offset(display: Display, right: float, down: float) -> Eye:
@@ -306,7 +307,7 @@ def _cell_values(image: Picture, x: Real, y: Real, channel: int, filter_: Filter
     return values.astype(np.float32)[..., None]
 
 
-def checked_eye(eye: Eye) -> Eye:
+def check_eye(eye: Eye) -> Eye:
     """``eye`` as floats; :class:`UsageError` unless it is finite and in front of the lens plane."""
     try:
         x, y, z = (float(value) for value in eye)
@@ -318,12 +319,9 @@ def checked_eye(eye: Eye) -> Eye:
     return x, y, z
 
 
-def checked_size(size: tuple[int, int]) -> tuple[int, int]:
-    """``size`` itself; :class:`UsageError` unless it is two whole numbers from 1 to 65535."""
-    try:
-        width, height = (index(side) for side in size)
-    except (TypeError, ValueError):
-        width = height = 0
+def check_size(size: tuple[int, int]) -> tuple[int, int]:
+    """``size`` itself; :class:`UsageError` unless both sides are 1 to 65535."""
+    width, height = size
     if not (1 <= width <= 65535 and 1 <= height <= 65535):
-        raise UsageError(f"the size is {size!r}", rule="it must be two whole numbers from 1 to 65535")
+        raise UsageError(f"the size is {size!r}", rule="both sides must be 1 to 65535")
     return width, height

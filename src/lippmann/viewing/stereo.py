@@ -23,7 +23,7 @@ from lippmann.image.stored_values import FloatArray
 from lippmann.options.option import checked
 from lippmann.runtime.atomic_write import replacing
 from lippmann.runtime.regular_file import check_kind, unreadable
-from lippmann.viewing.replay import Eye, Filter, checked_eye, default_eye, replay
+from lippmann.viewing.replay import Eye, Filter, check_eye, default_eye, replay
 
 #: How a pair becomes one picture: side by side at full or half width, or for red-cyan glasses.
 Stereo = Literal["full", "half", "anaglyph"]
@@ -119,7 +119,7 @@ def eyes_of(head: Eye, eyes: float = EYE_DISTANCE) -> tuple[Eye, Eye]:
     if not (math.isfinite(eyes) and 0 < eyes <= WIDEST_EYES):
         rule = f"it must be above 0 and at most {WIDEST_EYES:g} mm"
         raise UsageError(f"{eyes:g} mm is out of range", parameter="eyes", rule=rule)
-    x, y, z = checked_eye(head)
+    x, y, z = check_eye(head)
     return (x - eyes / 2, y, z), (x + eyes / 2, y, z)
 
 
@@ -198,7 +198,7 @@ def _position(text: str, where: str) -> Eye:
     except ValueError:
         raise UsageError(f"'{text[:40]}' is no position", where=where, rule=rule) from None
     try:
-        return checked_eye((x, y, z))
+        return check_eye((x, y, z))
     except UsageError as error:
         raise UsageError(error.what, where=where, rule=rule) from None
 

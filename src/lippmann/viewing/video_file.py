@@ -127,7 +127,7 @@ def write_codes(
     values = {"codec": codec, "quilt": quilt, "place": path, "has_depth": has_depth}
     chosen = {name: values[name] for name in film.value.options}
     write = function_of(film.value.write)
-    with replacing(path) as temporary, film.guarded(OutputError, str(path)):
+    with replacing(path) as temporary, film.guard(OutputError, str(path)):
         _beside(lambda taken: write(taken, temporary, frames_per_second, **chosen), frames)
 
 

@@ -91,7 +91,7 @@ def view_of_quilt(quilt: Quilt, number: int) -> FloatArray:
     width, height = quilt.view_size
     aspect = quilt.layout.aspect or width / height
     view_width = min(width, height * aspect, DEFAULT_WIDTH)
-    return _resized(quilt.view(number), max(1, round(view_width)), max(1, round(view_width / aspect)))
+    return _resize(quilt.view(number), max(1, round(view_width)), max(1, round(view_width / aspect)))
 
 
 def quilt_of_video(quilt: Quilt, widest: int = WIDEST_QUILT) -> Pixels:
@@ -102,7 +102,7 @@ def quilt_of_video(quilt: Quilt, widest: int = WIDEST_QUILT) -> Pixels:
         return quilt.values[quilt.size[1] - rows * height :, : columns * width].astype(np.uint8, copy=False)
     small = Quilt(np.empty((size[1] * rows, size[0] * columns, 3), dtype=np.uint8), quilt.layout)
     for number in range(quilt.layout.views):
-        small.view_values(number)[...] = quantize(_resized(quilt.view(number), *size), 8, quilt.provenance.transfer)
+        small.view_values(number)[...] = quantize(_resize(quilt.view(number), *size), 8, quilt.provenance.transfer)
     return small.values.astype(np.uint8, copy=False)
 
 
@@ -113,7 +113,7 @@ def view_size_of_video(view: tuple[int, int], layout: QuiltLayout, widest: int) 
     return max(1, int(width * shrink)), max(1, int(height * shrink))
 
 
-def _resized(pixels: FloatArray, width: int, height: int) -> FloatArray:
+def _resize(pixels: FloatArray, width: int, height: int) -> FloatArray:
     """Linear RGB in another size: each pixel the mean of what it covers."""
     from PIL import Image
 

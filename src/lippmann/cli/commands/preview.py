@@ -74,7 +74,7 @@ def preview(
     """Show in a second or two what a display will show to an eye in front of its middle."""
     from lippmann.image.write import check_output, write_plain_picture
     from lippmann.rendering.request.render_request import RenderRequest
-    from lippmann.viewing.replay import checked_size, eye_before
+    from lippmann.viewing.replay import check_size, eye_before
 
     console = Console(quiet, as_json)
     output = output_of(output, scene, "-preview.png")
@@ -84,7 +84,7 @@ def preview(
     target = display_of(display, printed)
     request = RenderRequest.from_options(how, machine, placement=placement).for_file(output, bits)
     source = SceneSource(scene, asked, light, access)
-    size = checked_size(parse.size(pixels or "512x512", "--pixels"))
+    size = check_size(parse.size(pixels or "512x512", "--pixels"))
     at = eye_before(target, None if eye is None else triple(eye, "--eye"))
     with console.progress() as progress:
         started = time.perf_counter()

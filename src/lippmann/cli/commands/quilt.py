@@ -118,9 +118,9 @@ def render(
     moving, file = moving.with_film(path)
     shows_all = moving.eye is None and moving.shows == "eye"
     if moving.video is not None and shows_all and (file != path or quilt.pair):
-        moving = replace(moving, video=_named(moving.video, quilt.ending))
+        moving = replace(moving, video=_name(moving.video, quilt.ending))
     if file == path and (not moving or (path.suffix and not path.is_dir())):
-        file = _named(path, quilt.ending)
+        file = _name(path, quilt.ending)
     if not moving:
         if resume:
             raise UsageError("a quilt is rendered in one piece", where="--resume", fix="leave it out")
@@ -310,7 +310,7 @@ def weave(
     console.result(result, f"{output}: {views.layout.views} views on {width}x{height} pixels of {target.name}")
 
 
-def _named(path: Path, ending: str) -> Path:
+def _name(path: Path, ending: str) -> Path:
     """``path`` with the ending of its quilt's layout; as it is, to be refused, without an ending of its format."""
     from lippmann.errors import OutputError
     from lippmann.quilts.quilt import ending_of_name

@@ -309,11 +309,11 @@ def _size_of(
     size: str | None, display: Display, console: Console
 ) -> tuple[tuple[int, int] | None, Callable[[FloatArray], FloatArray]]:
     """Pixels of the panel in a picture of ``--size``, None where it is not given, and what frames it to that size."""
-    from lippmann.viewing.replay import checked_size, in_middle
+    from lippmann.viewing.replay import check_size, in_middle
 
     if size is None:
         return None, lambda picture: picture
-    whole = checked_size(parse.size(size, "--size"))
+    whole = check_size(parse.size(size, "--size"))
     inside = display.panel.size_inside(*whole)
     if inside != whole:
         console.remark(f"the panel has another shape than {size}: it fills {inside[0]}x{inside[1]} in the middle")

@@ -68,7 +68,7 @@ def render_frames(
     motion = open_moving(source, spec, request)
     frames = chosen.of(motion)
     ending = form.quilt.ending if isinstance(form, QuiltForm) else ""
-    path_of = numbered(output, len(frames), ending)
+    path_of = name_frames(output, len(frames), ending)
     name, _ = format_for(path_of(frames[0]), files.bits)
     filming = _filming(spec, motion, display, request, form, len(frames))
     if filming is not None and filming.note is not None:
@@ -259,7 +259,7 @@ def frame_range(text: str) -> FrameRange:
     return FrameRange(int(match[2] or 0), int(match[3]) if match[3] else None, int(match[4] or 1))
 
 
-def numbered(output: Path, frames: int, ending: str = "") -> Callable[[int], Path]:
+def name_frames(output: Path, frames: int, ending: str = "") -> Callable[[int], Path]:
     """Path of each frame: ``output`` has one ``%d`` or ``%04d`` in its name, or is a folder.
 
     The stems of the files in a folder end in ``ending``.

@@ -31,7 +31,7 @@ def doctor(
 
     diagnosis = engine.diagnose()
     if fix and not diagnosis.ok:
-        diagnosis = _fixed(diagnosis, Console(as_json=as_json))
+        diagnosis = _fix(diagnosis, Console(as_json=as_json))
     width = max(len(check.name) for check in diagnosis.checks)
     lines = []
     for check in diagnosis.checks:
@@ -61,7 +61,7 @@ def doctor(
     raise typer.Exit(0 if diagnosis.ok else 1)
 
 
-def _fixed(diagnosis: Diagnosis, console: Console) -> Diagnosis:
+def _fix(diagnosis: Diagnosis, console: Console) -> Diagnosis:
     """Install what is missing, or say how; the diagnosis afterwards."""
     import os
 

@@ -302,7 +302,7 @@ _SETTING = re.compile(r"\b([a-z_]+)=(?:\"([^\"]*)\"|(\.\.\.|[\w+-]+(?:\.\w+)*))"
 def in_options(error: LippmannError, words: Sequence[str] = ()) -> str:
     """The line that says ``error`` on the command line; of an option's names it says the one among ``words``."""
     where = ": ".join(part for part in (error.where, option_of(error.parameter, words)) if part)
-    texts = {name: translated(getattr(error, name)) for name in ("what", "rule", "fix")}
+    texts = {name: translate(getattr(error, name)) for name in ("what", "rule", "fix")}
     return str(LippmannError(texts["what"], where=where, rule=texts["rule"], fix=texts["fix"]))
 
 
@@ -312,7 +312,7 @@ def option_of(parameter: str, words: Sequence[str] = ()) -> str:
     return next((name for name in _names(parameter) if name in said), _option(parameter) or parameter)
 
 
-def translated(text: str) -> str:
+def translate(text: str) -> str:
     """``text`` with settings of parameters as options."""
     return _SETTING.sub(_as_option, text)
 

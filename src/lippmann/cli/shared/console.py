@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from lippmann import printable
-from lippmann.cli.shared.command_options import translated
+from lippmann.cli.shared.command_options import translate
 from lippmann.progress import ProgressCallback, silent
 from lippmann.progress_bar import PlainProgress, bar
 from lippmann.wording import depths_in_words
@@ -40,7 +40,7 @@ class Console:
     def remark(self, *lines: str) -> None:
         """Lines that are no result: notes and warnings, their parameters as options."""
         for line in () if self.quiet else lines:
-            print(printable.one_line(translated(line)), file=sys.stderr)
+            print(printable.one_line(translate(line)), file=sys.stderr)
 
     @contextmanager
     def progress(self) -> Iterator[ProgressCallback]:

@@ -66,7 +66,7 @@ def decode_ktx2(data: bytes) -> Bytes:
     elif header.model == _UASTC:
         from lippmann.codecs.ktx2.uastc import decode_uastc
 
-        decoded = decode_uastc(_uncompressed(header), across, down)
+        decoded = decode_uastc(_uncompress(header), across, down)
         if decoded is None:
             raise Ktx2Error("a block is of no known mode")
         texels = decoded
@@ -120,7 +120,7 @@ def _read_descriptor(descriptor: bytes) -> tuple[int, tuple[int, ...]]:
     return descriptor[12], tuple(byte & 15 for byte in known[3::16])
 
 
-def _uncompressed(header: _Header) -> bytes:
+def _uncompress(header: _Header) -> bytes:
     """The blocks of the largest picture, of 16 bytes each."""
     across, down = header.blocks
     size = 16 * across * down

@@ -81,13 +81,13 @@ class DiffusePixels:
 
     def point(self, pixel: UInt32, ray: Ray3f) -> Point3f:
         """The world-space points that pixels show."""
-        origin, direction = (_turned(self.frame_from_world[2:3], part)[0] for part in (ray.o, ray.d))
+        origin, direction = (_turn(self.frame_from_world[2:3], part)[0] for part in (ray.o, ray.d))
         offset = dr.opaque(mi.Float, self.frame_from_world[2, 3])
         return ray((dr.gather(mi.Float, self._height, pixel) - offset - origin) / direction)
 
     def normal(self, pixel: UInt32) -> Normal3f:
         """Mean normals of pixels in world space, at most of length 1."""
-        return mi.Normal3f(*_turned(self._rotation[:, :3], dr.gather(mi.Normal3f, self._normal, pixel)))
+        return mi.Normal3f(*_turn(self._rotation[:, :3], dr.gather(mi.Normal3f, self._normal, pixel)))
 
     def albedo(self, pixel: UInt32) -> Array:
         """Albedo of pixels."""
@@ -136,8 +136,8 @@ class KeyPicture:
         is_known = others.is_diffuse(ray, normal)
         normal = dr.normalize(normal)
         to_key = self._to_frame
-        in_key = [mi.Float64(value) for value in _moved(to_key, point)]
-        origin, direction = _moved(to_key, ray.o), _turned(to_key[:3, :3], ray.d)
+        in_key = [mi.Float64(value) for value in _move(to_key, point)]
+        origin, direction = _move(to_key, ray.o), _turn(to_key[:3, :3], ray.d)
         slopes = [mi.Float64(direction[axis] / -direction[2]) for axis in (0, 1)]
         x, y = (mi.Float64(origin[axis]) + mi.Float64(origin[2]) * slopes[axis] for axis in (0, 1))
         phase = others.place(pixel)[0] % self._step if self._step > 1 else mi.UInt32(0)
@@ -195,12 +195,12 @@ class KeyPicture:
         return active & (total > 0), light / dr.maximum(albedo, 1e-6), least, most
 
 
-def _turned(rows: Matrix, vector: Array) -> list[Float]:
+def _turn(rows: Matrix, vector: Array) -> list[Float]:
     """A vector by the rows of a matrix, which are opaque to the compiler: all pictures share a kernel."""
     return [sum(dr.opaque(mi.Float, float(m)) * a for m, a in zip(row[:3], vector, strict=True)) for row in rows]
 
 
-def _moved(matrix: Matrix, point: Point3f) -> list[Float]:
+def _move(matrix: Matrix, point: Point3f) -> list[Float]:
     """A point by an affine map."""
-    turned = _turned(matrix[:3, :3], point)
+    turned = _turn(matrix[:3, :3], point)
     return [value + dr.opaque(mi.Float, float(offset)) for value, offset in zip(turned, matrix[:3, 3], strict=True)]

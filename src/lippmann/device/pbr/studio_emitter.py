@@ -90,7 +90,7 @@ def _emitter_class(variant: str) -> type[Emitter]:
             on_shell = sample.x >= starts[-1]
             start, share = dr.select(on_shell, starts[-1], start), dr.select(on_shell, float(shares[-1]), share)
             point = mi.Point2f((sample.x - start) / share, sample.y)
-            in_box = dr.normalize(center + right * _faded(point.x) + up * _faded(point.y))
+            in_box = dr.normalize(center + right * _sample_fade(point.x) + up * _sample_fade(point.y))
             d = dr.select(on_shell, _on_shell(point), in_box)
 
             ds = dr.zeros(mi.DirectionSample3f)
@@ -136,7 +136,7 @@ def _emitter_class(variant: str) -> type[Emitter]:
         radius = dr.safe_sqrt(1 - y * y)
         return mi.Vector3f(radius * cosine, y, radius * sine)
 
-    def _faded(number: Float) -> Float:
+    def _sample_fade(number: Float) -> Float:
         """A place in [-1, 1] whose density is that of a box's fade, from a number in [0, 1)."""
         full, fade = studio_light.FULL, studio_light.FADE
         mean = full + fade / 2

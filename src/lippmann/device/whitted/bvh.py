@@ -80,7 +80,7 @@ def make_bvh(boxes: Numbers) -> Bvh:
         down = octant >> np.arange(3) & 1 == 1
         near, far = np.where(down, sides[::-1], sides)
         nodes = np.column_stack([near | far << 16, last])
-        first, second = _visited(tree, octant)
+        first, second = _visit(tree, octant)
         layouts[octant, _places(tree, entries, octant)[inner]] = np.hstack([nodes[first], nodes[second]])[inner]
     return Bvh(layouts, origin, step)
 
@@ -204,7 +204,7 @@ def _gather_up(tree: _Tree, boxes: Numbers) -> tuple[Numbers, Numbers]:
     return low, high
 
 
-def _visited(tree: _Tree, octant: int) -> tuple[Whole, Whole]:
+def _visit(tree: _Tree, octant: int) -> tuple[Whole, Whole]:
     """Children of each node in the order in which rays of an octant come to them; any numbers for leaves."""
     swap = octant >> tree.axis & 1
     return tree.left + swap, tree.left + 1 - swap
@@ -213,7 +213,7 @@ def _visited(tree: _Tree, octant: int) -> tuple[Whole, Whole]:
 def _places(tree: _Tree, entries: Whole, octant: int) -> Whole:
     """Place of each inner node in the layout that rays of this octant walk."""
     places = np.zeros(len(tree.start), np.int64)
-    firsts, seconds = _visited(tree, octant)
+    firsts, seconds = _visit(tree, octant)
     for start, end in zip(tree.levels, [*tree.levels[1:], len(tree.start)], strict=True):
         nodes = np.arange(start, end)
         nodes = nodes[tree.left[nodes] >= 0]

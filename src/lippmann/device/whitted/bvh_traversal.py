@@ -51,7 +51,7 @@ class ShapeTracer:
             else:
                 t, index = self._nearest_of_list(rows, o, d, t, index, active)
         if self._table.walked:
-            t, index = self._nearest_walked(o, d, t, index, active)
+            t, index = self._walk_to_nearest(o, d, t, index, active)
         return t, index
 
     def passing(self, o: Point3f, d: Vector3f, t: Float, light: Float, source: UInt32 | None = None) -> Float:
@@ -67,13 +67,13 @@ class ShapeTracer:
         else:
             light = self._past_list(rows, o, d, t, light)
         if source is not None and self._light_buffer is not None:
-            light = self._past_buffered(self._light_buffer, source, o, d, t, light)
+            light = self._look_up_past(self._light_buffer, source, o, d, t, light)
         elif self._table.walked:
-            light = self._past_walked(o, d, t, light)
+            light = self._walk_past(o, d, t, light)
         return light
 
     @syntax
-    def _nearest_walked(self, o: Point3f, d: Vector3f, t: Float, index: UInt32, active: Bool) -> tuple[Float, UInt32]:
+    def _walk_to_nearest(self, o: Point3f, d: Vector3f, t: Float, index: UInt32, active: Bool) -> tuple[Float, UInt32]:
         kinds = self._formulas(self._table.walked_rows)
         foot, scale, shift, node, end = self._start(o, d)
         node = dr.select(active, node, end)
@@ -125,7 +125,7 @@ class ShapeTracer:
         return t, index
 
     @syntax
-    def _past_walked(self, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
+    def _walk_past(self, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
         kinds = self._formulas(self._table.walked_rows)
         foot, scale, shift, node, end = self._start(o, d)
         while dr.hint((node < end) & (light > 0), label="shadows of shapes"):
@@ -138,7 +138,7 @@ class ShapeTracer:
         return light
 
     @syntax
-    def _past_buffered(
+    def _look_up_past(
         self, buffer: LightBufferLookup, source: UInt32, o: Point3f, d: Vector3f, t: Float, light: Float
     ) -> Float:
         kinds = self._formulas(self._table.walked_rows)

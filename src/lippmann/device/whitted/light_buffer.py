@@ -109,7 +109,7 @@ def make_light_buffer(table: ShapeTable, lights: Sequence[ClassicLight]) -> Ligh
     # By entries, not by cells: where shapes are, there are the rays.
     if len(entries) and np.square(filled).sum() > MOST_IN_CELL * filled.sum():
         return None
-    grids = np.stack([_scaled(view, side) for view in views]).astype(np.float32)
+    grids = np.stack([_scale(view, side) for view in views]).astype(np.float32)
     directional = np.array([light.kind == "directional" for light in lights])
     return LightBuffer(side, grids, np.array(of_light, np.uint32), directional, starts, entries)
 
@@ -274,7 +274,7 @@ def _sort_in(views: Sequence[_View], side: int, first_row: int) -> tuple[NDArray
     return starts, np.column_stack([depths.view(np.uint32), (shape[order] + first_row).astype(np.uint32)])
 
 
-def _scaled(view: _View, side: int) -> Numbers:
+def _scale(view: _View, side: int) -> Numbers:
     """The matrix of a view with u and v in cells."""
     matrix = view.matrix.copy()
     low, high = view.frame

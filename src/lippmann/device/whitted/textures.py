@@ -244,13 +244,13 @@ class ImageTable:
             return mi.Color3f(packed & 255, (packed >> 8) & 255, packed >> 16)
 
         def layer_color(layer: UInt32) -> Color3f:
-            lower = _between(texel(x, y, layer), texel(next_x, y, layer), fx)
-            upper = _between(texel(x, next_y, layer), texel(next_x, next_y, layer), fx)
-            return _between(lower, upper, fy)
+            lower = _mix(texel(x, y, layer), texel(next_x, y, layer), fx)
+            upper = _mix(texel(x, next_y, layer), texel(next_x, next_y, layer), fx)
+            return _mix(lower, upper, fy)
 
         color = layer_color(z)
         if self._volumes:
-            color = _between(color, layer_color(next_z), fz)
+            color = _mix(color, layer_color(next_z), fz)
         return color * (1 / 255)
 
 
@@ -261,7 +261,7 @@ def _place(coordinate: Float, size: UInt32) -> tuple[UInt32, Float]:
     return below, place - mi.Float(below)
 
 
-def _between(a: Color3f, b: Color3f, share: Float) -> Color3f:
+def _mix(a: Color3f, b: Color3f, share: Float) -> Color3f:
     return a + (b - a) * share
 
 

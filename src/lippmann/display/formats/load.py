@@ -276,7 +276,7 @@ def _of_plugin(name: str, path: Path) -> Display | None:
     if name in plugin.value.presets:
         return _from_preset(name, plugin.value.presets)
     assert plugin.value.read is not None
-    with plugin.guarded(DisplayError, name):
+    with plugin.guard(DisplayError, name):
         display = function_of(plugin.value.read)(path)
     if not isinstance(display, Display):
         what = f"the plugin {plugin} made a {type(display).__name__} of it"

@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.frozen_kernel import Frozen, aligned
+from lippmann.device.frozen_kernel import Frozen, align
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
 from lippmann.device.types import Array, Float, Float64, Ray3f, UInt32
 from lippmann.display import Display
@@ -78,7 +78,7 @@ class Lanes:
         sample = np.tile(np.arange(first, first + samples, dtype=np.uint32), len(column) * streams)
         places = (values if each == 1 else np.repeat(values, each) for values in (column, row, channel))
         # Kept alive, as the device reads them in place.
-        self._host = [aligned(values) for values in (*places, stream, sample)]
+        self._host = [align(values) for values in (*places, stream, sample)]
         self.arrays = [mi.UInt32(values) for values in self._host]
 
     def sums(self, values: Floats) -> Floats:

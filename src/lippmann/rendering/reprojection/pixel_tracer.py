@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.frozen_kernel import Frozen, aligned
+from lippmann.device.frozen_kernel import Frozen, align
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Array, Float, Ray3f, UInt32
@@ -78,7 +78,7 @@ class PixelTracer:
 
     def _trace(self, numbers: Pixels) -> tuple[NDArray[np.generic], ...]:
         """Red, green, blue, disparity and fragility of all samples, ordered by pixel."""
-        pixel = mi.UInt32(aligned(numbers))
+        pixel = mi.UInt32(align(numbers))
         sample = mi.UInt32(0)
         if self._samples > 1:
             chosen, sample = divide(dr.arange(mi.UInt32, len(numbers) * self._samples), self._samples)

@@ -97,15 +97,15 @@ def make() -> ClassicScene:
 def _add_back_row(builder: ClassicSceneBuilder) -> None:
     x, z = LAYOUT.column
     # It leans like the wall, or its upper part would come out in front of the points where rays begin.
-    builder.cylinders((x, 0.0, z), STAGE.rotation[:, 1], 0.26, _textured(builder, "marble", (x, 0.0, z)))
+    builder.cylinders((x, 0.0, z), STAGE.rotation[:, 1], 0.26, _add_texture(builder, "marble", (x, 0.0, z)))
 
     x, z = LAYOUT.globe
     center = (x, 0.6, z)
     image = builder.image(ClassicImage("composition", textures.composition()[None]))
-    builder.spheres(center, 0.6, _textured(builder, "spherical-image", center, image=image, scale=(2.0, 1.0, 1.0)))
+    builder.spheres(center, 0.6, _add_texture(builder, "spherical-image", center, image=image, scale=(2.0, 1.0, 1.0)))
 
     x, z = LAYOUT.drum
-    wood = _textured(builder, "wood", (x, 0.0, z))
+    wood = _add_texture(builder, "wood", (x, 0.0, z))
     builder.tubes((x, 0.0, z), (x, 1.4, z), 0.42, wood)
     builder.rings((x, 1.4, z), (0.0, 1.0, 0.0), 0.0, 0.42, wood)
     # An upright ring stands on the drum.
@@ -117,19 +117,19 @@ def _add_back_row(builder: ClassicSceneBuilder) -> None:
 
     x, z = LAYOUT.cone
     image = builder.image(ClassicImage("parquet", textures.parquet()[None]))
-    wrapped = _textured(builder, "cylindrical-image", (x, 0.0, z), image=image, scale=(3.0, 1.2, 1.0))
+    wrapped = _add_texture(builder, "cylindrical-image", (x, 0.0, z), image=image, scale=(3.0, 1.2, 1.0))
     builder.tubes((x, 0.0, z), (x, 2.4, z), 0.48, wrapped, apex_radius=0.0)
 
 
 def _add_front_row(builder: ClassicSceneBuilder) -> None:
     x, z = LAYOUT.cube
-    cloudy = _textured(builder, "noise", (x, 0.0, z), color=(0.95, 0.45, 0.40))
+    cloudy = _add_texture(builder, "noise", (x, 0.0, z), color=(0.95, 0.45, 0.40))
     builder.boxes((x - 0.3, 0.0, z - 0.3), (x + 0.3, 0.6, z + 0.3), cloudy)
 
     x, z = LAYOUT.checkers
-    builder.spheres((x, 0.35, z), 0.35, _textured(builder, "checker", (x, 0.35, z)))
+    builder.spheres((x, 0.35, z), 0.35, _add_texture(builder, "checker", (x, 0.35, z)))
     # A plate lies under it.
-    builder.rings((x, 0.01, z), (0.0, 1.0, 0.0), 0.0, 0.6, _textured(builder, "cylindrical-checker", (x, 0.0, z)))
+    builder.rings((x, 0.01, z), (0.0, 1.0, 0.0), 0.0, 0.6, _add_texture(builder, "cylindrical-checker", (x, 0.0, z)))
 
     x, z = LAYOUT.field
     vertices, faces, normals, colors = height_field((x, z), size=1.0, cells=24)
@@ -168,7 +168,7 @@ def _add_triangles(builder: ClassicSceneBuilder, x: float, z: float) -> None:
     builder.triangles(corners[2], matt, normals=unit(corners[2] - (x, 0.5, z - 0.6), "a normal"), colors=np.eye(3))
 
     image = builder.image(ClassicImage("hills", textures.hills()[None]))
-    picture = _textured(
+    picture = _add_texture(
         builder,
         "planar-image",
         (x + 0.1, 1.0, z - 0.2),
@@ -213,7 +213,7 @@ def height_field(
     )
 
 
-def _textured(
+def _add_texture(
     builder: ClassicSceneBuilder,
     kind: TextureKind,
     center: Vector,

@@ -185,11 +185,11 @@ class NamedFiles:
 
 def names_on_line(body: str) -> tuple[str, str, str]:
     """Names that the rest of a line may be: all of it, what stands before a comment, and that without its quotes."""
-    plain = uncommented(body)
+    plain = strip_comment(body)
     return body, plain, plain.strip('"')
 
 
-def uncommented(body: str) -> str:
+def strip_comment(body: str) -> str:
     """The rest of a line without the comment at its end: ``#`` begins one only after a space."""
     return re.split(r"\s#", body, maxsplit=1)[0].rstrip()
 

@@ -77,7 +77,7 @@ def as_material(material: Material) -> Material:
     )
 
 
-def thinned(thin: Mesh, step: int) -> Mesh:
+def thin_out(thin: Mesh, step: int) -> Mesh:
     """One in ``step`` of the points or lines of a mesh whose ``faces`` are ``(m, 1)`` or ``(m, 2)``."""
     chosen = thin.faces[::step]
     used, faces = np.unique(chosen, return_inverse=True)
@@ -129,7 +129,7 @@ def balls(points: Points, elements: Integers, width: float | FloatArray) -> Soli
     return Solids(
         points.astype(np.float32)[sources] + _radii(width, sources) * normals,
         normals,
-        _repeated(triangles, len(elements), len(corners)),
+        _repeat(triangles, len(elements), len(corners)),
         sources,
     )
 
@@ -161,7 +161,7 @@ def rods(points: Points, elements: Integers, width: float | FloatArray) -> Solid
     return Solids(
         points.astype(np.float32)[sources] + _radii(width, sources) * normals,
         normals,
-        _repeated(triangles, len(elements), 2 * sides),
+        _repeat(triangles, len(elements), 2 * sides),
         sources,
     )
 
@@ -171,7 +171,7 @@ def _radii(width: float | FloatArray, sources: Integers) -> FloatArray:
     return radii[sources, None] if radii.ndim else radii
 
 
-def _repeated(triangles: Integers, count: int, step: int) -> IndexArray:
+def _repeat(triangles: Integers, count: int, step: int) -> IndexArray:
     """``triangles`` of ``step`` vertices, ``count`` times one after the other."""
     faces: IndexArray = (triangles + step * np.arange(count)[:, None, None]).reshape(-1, 3).astype(np.uint32)
     return faces

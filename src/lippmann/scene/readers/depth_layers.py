@@ -112,20 +112,20 @@ def _pull_push(values: Plane, weight: Plane) -> Plane:
     """Values ``(h, w, c)`` as far as their weights ``(h, w, 1)`` of at most 1 go, the rest from coarser values."""
     if weight.min() >= 1.0 or values.shape[0] * values.shape[1] == 1:
         return values
-    shares = _quartered(weight)
-    coarse = np.asarray(_quartered(values * weight) / np.maximum(shares, 1e-9), np.float32)
-    rest = _doubled(_pull_push(coarse, np.minimum(shares, 1.0).astype(np.float32)), values.shape[:2])
+    shares = _quarter(weight)
+    coarse = np.asarray(_quarter(values * weight) / np.maximum(shares, 1e-9), np.float32)
+    rest = _double(_pull_push(coarse, np.minimum(shares, 1.0).astype(np.float32)), values.shape[:2])
     return np.asarray(weight * values + (1 - weight) * rest, np.float32)
 
 
-def _quartered(values: Plane) -> Plane:
+def _quarter(values: Plane) -> Plane:
     """Sums ``(ceil(h / 2), ceil(w / 2), c)`` of two by two values ``(h, w, c)``."""
     for axis in (0, 1):
         values = np.add.reduceat(values, np.arange(0, values.shape[axis], 2), axis=axis)
     return values
 
 
-def _doubled(values: Plane, shape: tuple[int, ...]) -> Plane:
+def _double(values: Plane, shape: tuple[int, ...]) -> Plane:
     """Values of twice the resolution, or one row or column less, between those of ``(h, w, c)``: bilinear."""
     for axis, count in enumerate(shape):
         edges = [(1, 1) if each == axis else (0, 0) for each in range(3)]

@@ -128,11 +128,11 @@ def _exr(path: Path) -> NDArray[np.float32]:
     depth = np.asarray(channels[name], np.float32)
     others = [f"{name[:-1]}{letter}" for letter in "GB"] if name[-1] == "R" else []
     if any(other in channels and not np.array_equal(channels[other], depth, equal_nan=True) for other in others):
-        raise _colored(path.name)
+        raise _color_error(path.name)
     return depth
 
 
-def _colored(where: str) -> SceneError:
+def _color_error(where: str) -> SceneError:
     return SceneError("is a picture in colours", where=where, rule="depth is grey", fix="save it without a colour map")
 
 
@@ -183,7 +183,7 @@ def _gray(data: bytes, where: str, turn: int | None = None) -> tuple[NDArray[np.
 
 def _check_grey(codes: NDArray[np.uint8], where: str) -> None:
     if np.ptp(codes, axis=2).mean() > _MOST_TINT:
-        raise _colored(where)
+        raise _color_error(where)
 
 
 def _luminance(values: NDArray[np.generic], where: str) -> tuple[NDArray[np.generic], bool]:

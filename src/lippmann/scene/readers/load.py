@@ -23,7 +23,7 @@ from lippmann.scene.parsing.files import NamedFiles, read_bytes
 from lippmann.scene.readers.registry import READERS, VTK, MovingScene, Reader, ReaderOption, suffixes_with
 from lippmann.scene.readers.splats.sog_folder import holds_sog
 from lippmann.scene.scene import Scene, check_description, override_light
-from lippmann.scene.splat_clouds import moved
+from lippmann.scene.splat_clouds import move
 from lippmann.scene.values.description import (
     Camera,
     Direction,
@@ -32,7 +32,7 @@ from lippmann.scene.values.description import (
     Matrix,
     SceneDescription,
 )
-from lippmann.scene.volumes.grid import moved as moved_volume
+from lippmann.scene.volumes.grid import move as move_volume
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -184,7 +184,7 @@ def read_scene(
         scene = _from_object(source)
     chosen = asked.crop, asked.unit_scale, asked.min_opacity, asked.transfer_function, asked.window
     if any(value is not None for value in chosen):
-        scene = _selected(scene, asked)
+        scene = _select(scene, asked)
     scene = replace(scene, light=light or scene.light, settings=(*scene.settings, *settings_of(asked)))
     scene = scene if color is None else replace(scene, has_chosen_background=True)
     studio = scene.studio and str(asked.environment) != NO_ENVIRONMENT
@@ -203,7 +203,7 @@ def read_scene(
     return replace(scene, description=description, studio=studio)
 
 
-def _selected(scene: Scene, asked: SceneOptions) -> Scene:
+def _select(scene: Scene, asked: SceneOptions) -> Scene:
     """The scene with what is asked for of its splats and of its volume."""
     from lippmann.scene.cloud_selection import SplatSelection, VolumeSelection
 
@@ -287,7 +287,7 @@ def _from_name(source: str | Path, allow_outside: bool, asked: SceneOptions) -> 
     plugin = _reader_of(path, suffix)
     reader = plugin.value
     keywords = _keywords(reader, path, asked, allow_outside)
-    with plugin.guarded(SceneError, path.name):
+    with plugin.guard(SceneError, path.name):
         description = function_of(reader.read)(path, **keywords)
     if isinstance(description, SceneDescription):
         description = _upright(_with_remarks(check_description(description, path.name)), suffix, reader, asked.up)
@@ -346,7 +346,7 @@ def open_moving(
     path = Path(source)
     _check_options(path, kind_of_name(path), asked)
     keywords = _keywords(plugin.value, path, asked, allow_outside)
-    with plugin.guarded(SceneError, path.name):
+    with plugin.guard(SceneError, path.name):
         moving: MovingScene = function_of(plugin.value.moving)(path, animation=animation, **keywords)
     return moving
 
@@ -424,8 +424,8 @@ def _upright(description: SceneDescription, suffix: str, reader: Reader, up: Up 
         replace(each, world_from_mesh=matrix @ np.asarray(each.world_from_mesh, np.float64))
         for each in description.instances
     ]
-    splats = None if splats is None else moved(splats, matrix)
-    volume = None if description.volume is None else moved_volume(description.volume, matrix)
+    splats = None if splats is None else move(splats, matrix)
+    volume = None if description.volume is None else move_volume(description.volume, matrix)
     return replace(description, instances=instances, splats=splats, volume=volume, notes=notes)
 
 

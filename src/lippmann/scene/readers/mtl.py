@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from lippmann.errors import SceneError
-from lippmann.scene.parsing.files import decode_text, read_bytes, uncommented
+from lippmann.scene.parsing.files import decode_text, read_bytes, strip_comment
 
 # keyword (lower case) -> numbers it takes: least, most
 _NUMBERS = {
@@ -122,7 +122,7 @@ def parse_mtl(path: Path) -> dict[str, MtlRecord]:
         if key == "newmtl":
             current = MtlRecord(body)
             records.setdefault(body, current)
-            commented.setdefault(uncommented(body), current)
+            commented.setdefault(strip_comment(body), current)
         elif current is None:
             raise SceneError(f"'{words[0][:40]}' before any newmtl", where=where, fix="is it an MTL file?")
         else:

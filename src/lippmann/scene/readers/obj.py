@@ -24,7 +24,7 @@ from lippmann.scene.parsing.files import (
     is_file,
     names_on_line,
     read_bytes,
-    uncommented,
+    strip_comment,
 )
 from lippmann.scene.parsing.points_lines import as_material
 from lippmann.scene.parsing.triangulation import triangulate
@@ -133,7 +133,7 @@ def read_obj(path: Path, *, files: NamedFiles | None = None) -> SceneDescription
         solids = [mesh for mesh in thin if mesh.material == index]
         if len(rows) == 0 and not solids:
             continue
-        record = records.get(name) or records.get(uncommented(name))
+        record = records.get(name) or records.get(strip_comment(name))
         if record is None and name and not missing:
             notes.append(f"material '{name}' is in no material library: taken as plain grey")
         material = mapper.material(record) if record else mapper.default(name)

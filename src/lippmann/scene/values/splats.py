@@ -68,7 +68,7 @@ class Splats:
         )
 
 
-def joined(parts: Sequence[Splats]) -> Splats:
+def join(parts: Sequence[Splats]) -> Splats:
     """All splats of several clouds (at least one) of one kind of colour; missing harmonics are 0."""
     most = max(part.harmonics.shape[1] for part in parts)
     harmonics = [np.pad(part.harmonics, ((0, 0), (0, most - part.harmonics.shape[1]), (0, 0))) for part in parts]

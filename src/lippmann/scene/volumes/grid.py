@@ -83,7 +83,7 @@ def check_values(grid: NDArray[np.generic], slope: float, intercept: float, wher
         raise SceneError(f"the volume's values reach {ends[1]:g}", where=where, rule=f"numbers up to {_LARGEST:g}")
 
 
-def moved(volume: Volume, matrix: Numbers) -> Volume:
+def move(volume: Volume, matrix: Numbers) -> Volume:
     """The volume moved by an affine ``matrix`` ``(4, 4)``."""
     return replace(volume, world_from_voxel=np.asarray(matrix, np.float64) @ volume.world_from_voxel)
 

@@ -106,7 +106,7 @@ def _linear(code: Sequence[float]) -> Color:
     return float(r), float(g), float(b)
 
 
-def _scaled(color: Color, factor: float) -> Color:
+def _scale(color: Color, factor: float) -> Color:
     r, g, b = (min(factor * c, 1.0) for c in color)
     return r, g, b
 
@@ -127,12 +127,12 @@ def _material(source: ClassicMaterial, patch: Patch, images: Sequence[_ImageSour
     glows = source.ambient > source.diffuse
     whole = diffuse + mirror
     opaque = Material(
-        base_color=_scaled(color, whole),
+        base_color=_scale(color, whole),
         base_color_texture=texture if whole > 0 else None,
         metallic=mirror / whole if whole > 0 else 0.0,
         roughness=0.0 if mirror > 0 else _roughness(source),
         specular=1.0 if source.phong > 0 or mirror > 0 else 0.0,
-        emission=_scaled(color, source.ambient) if glows else (0.0, 0.0, 0.0),
+        emission=_scale(color, source.ambient) if glows else (0.0, 0.0, 0.0),
         emission_texture=texture if glows else None,
         double_sided=True,
     )

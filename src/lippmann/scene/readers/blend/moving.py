@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from lippmann.scene.parsing.files import NamedFiles
-from lippmann.scene.readers.blend.reader import complete, exported, read_world
+from lippmann.scene.readers.blend.reader import complete, export_file, read_world
 from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
 from lippmann.scene.values.description import SceneDescription
 
@@ -26,7 +26,7 @@ class MovingBlend:
 
     def __init__(self, path: Path, *, animation: str | None = None, files: NamedFiles | None = None) -> None:
         self._name = path.stem
-        with exported(path, files, is_animated=True) as made:
+        with export_file(path, files, is_animated=True) as made:
             self._files = made
             self._world = read_world(made)
             self._moving = MovingGltf(made.scene, animation=animation)

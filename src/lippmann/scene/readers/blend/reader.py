@@ -33,12 +33,12 @@ def read_blend(path: Path, *, files: NamedFiles | None = None) -> SceneDescripti
     MemoryLimitError
         It takes more memory than is left.
     """
-    with exported(path, files) as made:
+    with export_file(path, files) as made:
         return complete(read_gltf(made.scene), made, path.stem, read_world(made))
 
 
 @contextmanager
-def exported(path: Path, files: NamedFiles | None, *, is_animated: bool = False) -> Iterator[Exported]:
+def export_file(path: Path, files: NamedFiles | None, *, is_animated: bool = False) -> Iterator[Exported]:
     """The files that Blender wrote, which are gone afterwards; errors within are the Blender file's."""
     with scratch_folder("lippmann-blend-") as folder:
         made = export(path, Path(folder), NamedFiles.of(path, files), is_animated=is_animated)

@@ -174,7 +174,7 @@ class Accessors:
         dtype = _DTYPES[fields.integer("componentType")]
         view = self.document.reference(fields, "bufferView", "bufferViews")
         if view is not None:
-            elements = self._strided(fields, view, count, width, dtype)
+            elements = self._view_strided(fields, view, count, width, dtype)
         elif count <= _MOST_ZEROS:
             elements = np.zeros((count, width), dtype)
         else:
@@ -194,15 +194,15 @@ class Accessors:
         if component not in INDICES.plain:
             raise indices.error("componentType", "UNSIGNED_BYTE, UNSIGNED_SHORT or UNSIGNED_INT belongs here")
         index_view = self.document.required_reference(indices, "bufferView", "bufferViews")
-        places = self._strided(indices, index_view, count, 1, _DTYPES[component])[:, 0].astype(np.int64)
+        places = self._view_strided(indices, index_view, count, 1, _DTYPES[component])[:, 0].astype(np.int64)
         if count and places.max() >= len(elements):
             raise sparse.error("indices", f"{places.max()} points beyond the accessor's {len(elements)} elements")
         value_view = self.document.required_reference(values, "bufferView", "bufferViews")
         result = elements.copy()
-        result[places] = self._strided(values, value_view, count, elements.shape[1], elements.dtype)
+        result[places] = self._view_strided(values, value_view, count, elements.shape[1], elements.dtype)
         return result
 
-    def _strided(
+    def _view_strided(
         self, fields: Fields, view: int, count: int, width: int, dtype: np.dtype[np.generic]
     ) -> NDArray[np.generic]:
         """``count`` elements in a buffer view, without copying; the bounds are checked before anything is allocated."""

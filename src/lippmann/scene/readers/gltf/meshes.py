@@ -41,7 +41,7 @@ class Meshes:
     _geometries: dict[_Key, Geometry | None] = field(default_factory=dict)
     _changed: dict[tuple[int, Callable[[Material], Material]], int] = field(default_factory=dict)
 
-    def posed(self, document: Document, primitives: Primitives) -> Meshes:
+    def pose(self, document: Document, primitives: Primitives) -> Meshes:
         """Meshes of the same file as other nodes show them; geometry without skin or morph weights is shared."""
         unskinned = {key: geometry for key, geometry in self._geometries.items() if key[2:] == ((), None)}
         return Meshes(document, primitives, self.materials, _geometries=unskinned, _changed=self._changed)

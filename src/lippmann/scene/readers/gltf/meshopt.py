@@ -86,7 +86,7 @@ def _attributes(data: bytes, count: int, stride: int) -> Bytes:
             how = control[column // 4] >> 2 * (column & 3) & 3 if newer else _OLD
             codes[column], position = _column(data, position, end, len(block), how)
         for first in range(0, stride, 4):
-            block[:, first : first + 4] = _summed(
+            block[:, first : first + 4] = _accumulate(
                 codes[first : first + 4], previous[first : first + 4], channels[first // 4]
             )
         previous = block[-1]
@@ -111,7 +111,7 @@ def _column(data: bytes, position: int, end: int, count: int, how: int) -> tuple
     return np.frombuffer(deltas, np.uint8, count), position
 
 
-def _summed(codes: Bytes, previous: Bytes, channel: int) -> Bytes:
+def _accumulate(codes: Bytes, previous: Bytes, channel: int) -> Bytes:
     """Four columns ``(count, 4)`` of their codes ``(4, count)``.
 
     These are zigzag-coded differences of bytes or of pairs of them, or words, rotated and combined by exclusive or.
@@ -186,7 +186,7 @@ class _Deltas:
             raise MeshoptError(f"{self._end - self.position} bytes are left over")
 
 
-def _signed(value: int) -> int:
+def _undo_zigzag(value: int) -> int:
     return ~(value >> 1) if value & 1 else value >> 1
 
 
@@ -212,7 +212,7 @@ def _triangles(data: bytes, count: int) -> list[int]:
             elif low < 13:
                 c = vertices[vertex_count - 1 - low & 15]
             else:
-                c = last = last + (_signed(deltas.number()) if low == 15 else 2 * low - 27)
+                c = last = last + (_undo_zigzag(deltas.number()) if low == 15 else 2 * low - 27)
             fresh = (c,) if low == 0 or low >= 13 else ()
             new_edges = ((c, b), (a, c))
         else:
@@ -226,7 +226,7 @@ def _triangles(data: bytes, count: int) -> list[int]:
                 if place == 0:
                     corner, following = following, following + 1
                 elif place == 15 and explicit:
-                    corner = last = last + _signed(deltas.number())
+                    corner = last = last + _undo_zigzag(deltas.number())
                 else:
                     corner = vertices[vertex_count - place & 15]
                 if place == 0 or (place == 15 and explicit):
@@ -255,7 +255,7 @@ def _indices(data: bytes, count: int) -> list[int]:
     indices = []
     for _ in range(count):
         value = deltas.number()
-        last[value & 1] += _signed(value >> 1)
+        last[value & 1] += _undo_zigzag(value >> 1)
         indices.append(last[value & 1] & 0xFFFFFFFF)
     deltas.finish()
     return indices
@@ -290,7 +290,7 @@ def _octahedral(values: NDArray[np.signedinteger]) -> NDArray[np.signedinteger]:
     vectors = np.stack([x, y, z], axis=1)
     vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
     decoded = values.copy()
-    decoded[:, :3] = _rounded(vectors * np.iinfo(values.dtype).max)
+    decoded[:, :3] = _round(vectors * np.iinfo(values.dtype).max)
     return decoded
 
 
@@ -303,7 +303,7 @@ def _quaternions(values: NDArray[np.signedinteger]) -> NDArray[np.signedinteger]
     places = (whole[:, 3:] + np.arange(4)) % 4
     decoded = np.empty_like(values)
     bounded = np.clip(np.column_stack([largest, parts]), -1.0, 1.0)
-    np.put_along_axis(decoded, places, _rounded(bounded * 32767.0).astype(values.dtype), axis=1)
+    np.put_along_axis(decoded, places, _round(bounded * 32767.0).astype(values.dtype), axis=1)
     return decoded
 
 
@@ -322,6 +322,6 @@ def _colors(values: NDArray[np.unsignedinteger]) -> NDArray[np.unsignedinteger]:
     return np.asarray(scaled.astype(np.int64), values.dtype)
 
 
-def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _round(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Halves away from zero."""
     return np.trunc(values + np.copysign(0.5, values))

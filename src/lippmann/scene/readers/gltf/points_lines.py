@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lippmann.scene.parsing.points_lines import MOST, as_mesh, thinned, width_of
+from lippmann.scene.parsing.points_lines import MOST, as_mesh, thin_out, width_of
 from lippmann.scene.readers.gltf.document import Document
 from lippmann.scene.values.description import Matrix, Mesh
 
@@ -76,7 +76,7 @@ def draw_points_and_lines(
                 raise document.error(f"the file shows {count} {kind}", rule=f"up to {MOST} copies are drawn")
             step = -(-count // MOST)
             document.notes.add(f"of {count} {kind} one in {step} is drawn")
-            chosen = {mesh: thinned(thin, step) for mesh, thin in chosen.items()}
+            chosen = {mesh: thin_out(thin, step) for mesh, thin in chosen.items()}
         width = width_of(thin_width.diagonal, min(count, MOST), lines=size == _LINES)
         document.notes.add(width.note)
         for mesh, thin in chosen.items():

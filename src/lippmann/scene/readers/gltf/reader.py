@@ -88,10 +88,10 @@ class Contents:
         meshes = Meshes(document, Primitives(document, accessors), materials)
         return cls(document, accessors, Nodes(document), meshes, SplatClouds(document, accessors))
 
-    def posed(self, nodes: list[Fields]) -> Contents:
+    def pose(self, nodes: list[Fields]) -> Contents:
         """Contents of the same file with other ``nodes``; bytes, materials and meshes without skin are shared."""
         document = self.document.with_nodes(nodes)
-        meshes = self.meshes.posed(document, Primitives(document, self.accessors))
+        meshes = self.meshes.pose(document, Primitives(document, self.accessors))
         splats = SplatClouds(document, self.accessors)
         return Contents(document, self.accessors, Nodes(document), meshes, splats, thin_width=self.thin_width)
 
@@ -106,7 +106,7 @@ class Contents:
         for index, visible in self.nodes.traverse():
             self._add(index, visible=visible)
         meshes, instances = _instantiate(self.meshes.read, self.placements, self.thin_width, self.document)
-        splats = self.splats.joined()
+        splats = self.splats.join()
         if not instances and splats is None:
             raise self.document.error(
                 "the file shows no triangles, lines, points or splats",

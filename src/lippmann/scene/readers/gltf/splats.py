@@ -11,11 +11,11 @@ from lippmann.scene.readers.gltf import accessors as storage
 from lippmann.scene.readers.gltf.accessors import Accessors, Storage
 from lippmann.scene.readers.gltf.document import SPLATS, SPLATS_DRAFT, SPLATS_IN_SPZ, Document
 from lippmann.scene.readers.gltf.json_fields import Fields
-from lippmann.scene.readers.splats.activation import ask_memory, cleaned
+from lippmann.scene.readers.splats.activation import ask_memory, clean
 from lippmann.scene.readers.splats.spz import decode_spz
-from lippmann.scene.splat_clouds import moved
+from lippmann.scene.splat_clouds import move
 from lippmann.scene.values.description import FloatArray, Matrix
-from lippmann.scene.values.splats import COEFFICIENTS, Splats, joined
+from lippmann.scene.values.splats import COEFFICIENTS, Splats, join
 
 _COLOR_SPACES = {"srgb_rec709_display": False, "lin_rec709_display": True}
 _POINTS = 0
@@ -47,7 +47,7 @@ class SplatClouds:
                 splats = self._read(primitive)
                 self.placed.extend((splats, world) for world in worlds)
 
-    def joined(self) -> Splats | None:
+    def join(self) -> Splats | None:
         """All of them in the world; None if there are none.
 
         Raises
@@ -61,14 +61,14 @@ class SplatClouds:
             raise self.document.error("splats in several colour spaces", rule="they are composited in one")
         total = sum(splats.count for splats, _ in self.placed)
         ask_memory(total, max(splats.harmonics.shape[1] for splats, _ in self.placed), where=self.document.file)
-        return joined([moved(splats, world) for splats, world in self.placed])
+        return join([move(splats, world) for splats, world in self.placed])
 
     def _read(self, primitive: Fields) -> Splats:
         if primitive.optional_integer("mode") != _POINTS:
             raise primitive.error("mode", "splats are points, 0")
         draft, extension = primitive.extension(SPLATS_DRAFT), primitive.extension(SPLATS)
         if draft is not None:
-            return self._unpacked(draft, primitive)
+            return self._unpack(draft, primitive)
         assert extension is not None
         kernel, space = extension.text("kernel"), extension.text("colorSpace")
         if kernel not in (None, "ellipse"):
@@ -79,7 +79,7 @@ class SplatClouds:
         for name in SPLATS_IN_SPZ:
             packed = extension.extension(name)
             if packed is not None:
-                return self._unpacked(packed, primitive)
+                return self._unpack(packed, primitive)
         attributes = primitive.child("attributes")
         if attributes is None:
             raise primitive.error("attributes", "it is required")
@@ -92,7 +92,7 @@ class SplatClouds:
             # Drafts of the extension had logarithms, as trainers do.
             with np.errstate(over="ignore"):
                 scales = np.exp(scales)
-        splats, notes = cleaned(
+        splats, notes = clean(
             self.accessors.floats(position, storage.POSITION),
             scales,
             self._values(attributes, "ROTATION", storage.ROTATION, count),
@@ -104,7 +104,7 @@ class SplatClouds:
         self._note(notes, primitive)
         return splats
 
-    def _unpacked(self, packed: Fields, primitive: Fields) -> Splats:
+    def _unpack(self, packed: Fields, primitive: Fields) -> Splats:
         view = self.document.required_reference(packed, "bufferView", "bufferViews")
         data, _ = self.accessors.buffers.view(view)
         decoded, notes, _ = decode_spz(data, where=self.document.file)

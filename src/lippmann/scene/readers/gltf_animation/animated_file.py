@@ -81,7 +81,7 @@ class MovingGltf:
         nodes = list(self._at_rest)
         for target, value in self.animation.at(seconds).items():
             nodes[target[0]] = _replace_value(nodes[target[0]], target, value)
-        self._contents = self._contents.posed(nodes)
+        self._contents = self._contents.pose(nodes)
         return self._contents.description(self._name)
 
 

@@ -44,7 +44,7 @@ def coefficients_of(rest: int, what: str, *, where: str) -> int:
     return known[rest]
 
 
-def activated(
+def activate(
     centers: FloatArray,
     log_scales: FloatArray,
     quaternions: FloatArray,
@@ -73,11 +73,11 @@ def activated(
     """
     with np.errstate(over="ignore", invalid="ignore"):
         scales = np.exp(log_scales.astype(np.float32, copy=False))
-        return cleaned(centers, scales, quaternions, opacities, harmonics, where=where)
+        return clean(centers, scales, quaternions, opacities, harmonics, where=where)
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of damaged numbers, which are left out
-def cleaned(
+def clean(
     centers: FloatArray,
     scales: FloatArray,
     quaternions: FloatArray,
@@ -87,7 +87,7 @@ def cleaned(
     linear: bool = False,
     where: str,
 ) -> tuple[Splats, tuple[str, ...]]:
-    """As :func:`activated`, of standard deviations themselves; ``linear`` is that of the splats."""
+    """As :func:`activate`, of standard deviations themselves; ``linear`` is that of the splats."""
     if not len(centers):
         raise SceneError("holds no Gaussian splats", where=where)
     # In double precision, which holds the square of every single number.

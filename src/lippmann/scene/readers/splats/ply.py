@@ -21,7 +21,7 @@ from lippmann.scene.parsing.vertex_colors import full_brightness
 from lippmann.scene.readers.splats.activation import (
     MOST_SMALL,
     SH_0,
-    activated,
+    activate,
     ask_memory,
     coefficients_of,
     largest_left_out,
@@ -70,7 +70,7 @@ def read_splat_ply(data: bytes, header: Header, name: str, where: str) -> SceneD
     if _is_trained(element):
         _check_whole(element, where)
     rows = _rows_of(data, header, where)
-    splats, notes = _trained(rows["vertex"], element, where) if _is_trained(element) else _packed(rows, where)
+    splats, notes = _read_trained(rows["vertex"], element, where) if _is_trained(element) else _read_packed(rows, where)
     return SceneDescription(name, splats=splats, notes=(*header.notes, *notes), up=header.up)
 
 
@@ -157,7 +157,7 @@ def _floats(rows: Rows, names: Sequence[str]) -> FloatArray:
 
 
 @np.errstate(over="ignore")  # of damaged numbers, which are left out
-def _trained(rows: Rows, element: Element, where: str) -> tuple[Splats, tuple[str, ...]]:
+def _read_trained(rows: Rows, element: Element, where: str) -> tuple[Splats, tuple[str, ...]]:
     names = _names(element)
     rest = sum(name.startswith("f_rest_") for name in names)
     count = coefficients_of(rest, "properties f_rest_...", where=where)
@@ -175,10 +175,10 @@ def _trained(rows: Rows, element: Element, where: str) -> tuple[Splats, tuple[st
     log_scales[:, :known] = _floats(rows, [f"scale_{axis}" for axis in range(known)])
     opacities = sigmoid(_floats(rows, ["opacity"])[:, 0])
     if _FILTER in names:
-        log_scales, opacities = _filtered(log_scales, opacities, _floats(rows, [_FILTER]))
+        log_scales, opacities = _filter(log_scales, opacities, _floats(rows, [_FILTER]))
     moved: list[str] = []
     centers = near_origin(np.stack([rows[axis].astype(np.float64) for axis in "xyz"], axis=1), moved)
-    splats, notes = activated(
+    splats, notes = activate(
         centers.astype(np.float32),
         log_scales,
         _floats(rows, ["rot_1", "rot_2", "rot_3", "rot_0"]),
@@ -192,7 +192,7 @@ def _trained(rows: Rows, element: Element, where: str) -> tuple[Splats, tuple[st
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of damaged numbers, which are left out
-def _filtered(log_scales: FloatArray, opacities: FloatArray, widths: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _filter(log_scales: FloatArray, opacities: FloatArray, widths: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Splats convolved with a Gaussian: variances add up, and opacities fall as volumes grow (Mip-Splatting, 4.1)."""
     variances = np.exp(2.0 * log_scales.astype(np.float64))
     wide = variances + np.square(widths.astype(np.float64))
@@ -210,7 +210,7 @@ def _coefficients_of_colors(rows: Rows, element: Element) -> FloatArray:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of damaged bounds, whose splats are left out
-def _packed(rows: Mapping[str, Rows], where: str) -> tuple[Splats, tuple[str, ...]]:
+def _read_packed(rows: Mapping[str, Rows], where: str) -> tuple[Splats, tuple[str, ...]]:
     vertex, chunk, sh = rows["vertex"], rows.get("chunk"), rows.get("sh")
     names = set() if chunk is None else set(chunk.dtype.names or ())
     if chunk is None or not names >= {*_CORNERS, *_SCALES} or len(chunk) * _CHUNK < len(vertex):
@@ -241,7 +241,7 @@ def _packed(rows: Mapping[str, Rows], where: str) -> tuple[Splats, tuple[str, ..
         bytes_ = sh.view(np.uint8).reshape(len(sh), rest)[: len(vertex)]
         values = (bytes_.astype(np.float32) - np.float32(127.5)) / np.float32(32.0)
         harmonics[:, 1:] = values.reshape(len(vertex), 3, count - 1).transpose(0, 2, 1)
-    return activated(
+    return activate(
         within(_CORNERS, _parts(word["packed_position"], (21, 11, 0), (11, 10, 11))),
         within(_SCALES, _parts(word["packed_scale"], (21, 11, 0), (11, 10, 11))),
         np.roll(w_first, -1, axis=1),

@@ -21,7 +21,7 @@ from lippmann.codecs.pillow_formats import open_picture
 from lippmann.errors import LippmannError, SceneError
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import NamedFiles, read_bytes
-from lippmann.scene.readers.splats.activation import MOST_SMALL, Bytes, activated, ask_memory, largest_left_out, sigmoid
+from lippmann.scene.readers.splats.activation import MOST_SMALL, Bytes, activate, ask_memory, largest_left_out, sigmoid
 from lippmann.scene.readers.splats.sog_folder import META, holds_sog
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import COEFFICIENTS, FloatArray
@@ -195,7 +195,7 @@ def _read(bundle: _Files, name: str) -> SceneDescription:
 
     means, scales, quats, sh0 = (meta.child(key) for key in ("means", "scales", "quats", "sh0"))
     steps = pixels(means, 1, 2)[:, :3].astype(np.float32) * 256.0 + pixels(means, 0, 2)[:, :3]
-    logs = _between(means, 3, steps, 65535.0)
+    logs = _dequantize(means, 3, steps, 65535.0)
     with np.errstate(over="ignore", invalid="ignore"):
         centers = np.sign(logs) * np.expm1(np.abs(logs))
     sizes, colors, turns = pixels(scales, 0, 1), pixels(sh0, 0, 1), pixels(quats, 0, 1)
@@ -203,8 +203,8 @@ def _read(bundle: _Files, name: str) -> SceneDescription:
         log_scales, dc = _entries(scales, sizes[:, :3]), _entries(sh0, colors[:, :3])
         opacities = colors[:, 3].astype(np.float32) / np.float32(255.0)
     else:
-        log_scales = _between(scales, 3, sizes[:, :3])
-        both = _between(sh0, 4, colors)
+        log_scales = _dequantize(scales, 3, sizes[:, :3])
+        both = _dequantize(sh0, 4, colors)
         dc, opacities = both[:, :3], sigmoid(both[:, 3])
     w_first = largest_left_out(
         (turns[:, :3].astype(np.float32) / np.float32(127.5) - 1.0) * MOST_SMALL,
@@ -218,7 +218,7 @@ def _read(bundle: _Files, name: str) -> SceneDescription:
         if number.max() >= len(palette):
             raise bundle.error(f"shN names entry {number.max()} of {len(palette)}")
         harmonics[:, 1:] = palette[number]
-    splats, notes = activated(
+    splats, notes = activate(
         centers, log_scales, np.roll(w_first, -1, axis=1), opacities, harmonics, where=bundle.where
     )
     return SceneDescription(name, splats=splats, notes=notes)
@@ -230,7 +230,7 @@ def _count_of_version_1(meta: _Meta) -> int:
     return _Meta(meta.bundle, {"shape": first}, f"{meta.place}.means").whole("shape", 2**32)
 
 
-def _between(part: _Meta, count: int, codes: Bytes | FloatArray, most: float = 255.0) -> FloatArray:
+def _dequantize(part: _Meta, count: int, codes: Bytes | FloatArray, most: float = 255.0) -> FloatArray:
     """Values between the bounds of a part: of codes ``(n, count)``, 0 is the lower bound and ``most`` the upper."""
     low, high = part.numbers("mins", count), part.numbers("maxs", count)
     return np.asarray(low + codes / np.float32(most) * (high - low), np.float32)
@@ -253,4 +253,4 @@ def _palette(bundle: _Files, shared: _Meta, by_codebook: bool) -> FloatArray:
         raise bundle.error(f"shN: a palette {width} pixels wide", "64 entries a row, of 3, 8 or 15 pixels each")
     codes = picture[..., :3].reshape(height * _PALETTE_COLUMNS, own, 3)
     check_input(4 * codes.size, "the palette of harmonics", where=bundle.where)
-    return _entries(shared, codes) if by_codebook else _between(shared, 1, codes)
+    return _entries(shared, codes) if by_codebook else _dequantize(shared, 1, codes)

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from lippmann.errors import SceneError
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import read_bytes
-from lippmann.scene.readers.splats.activation import MOST_SMALL, Bytes, activated, ask_memory, largest_left_out
-from lippmann.scene.splat_clouds import moved
+from lippmann.scene.readers.splats.activation import MOST_SMALL, Bytes, activate, ask_memory, largest_left_out
+from lippmann.scene.splat_clouds import move
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import COEFFICIENTS, FloatArray, Splats
 
@@ -99,7 +99,7 @@ def decode_spz(data: bytes | memoryview, *, where: str) -> tuple[Splats, tuple[s
     harmonics = np.empty((head.count, coefficients, 3), np.float32)
     harmonics[:, 0] = (colors.astype(np.float32) / 255.0 - 0.5) / _COLOR_SCALE
     harmonics[:, 1:] = (rest.astype(np.float32).reshape(head.count, coefficients - 1, 3) - 128.0) / 128.0
-    splats, notes = activated(
+    splats, notes = activate(
         _halves(places) if head.version == 1 else _fixed_point(places, head.fraction),
         scales.astype(np.float32) / 16.0 - 10.0,
         _smallest_three(turns) if head.version >= _SMALLEST_THREE else _first_three(turns),
@@ -108,14 +108,14 @@ def decode_spz(data: bytes | memoryview, *, where: str) -> tuple[Splats, tuple[s
         where=where,
     )
     axes, remarks = _extensions(records, where)
-    return (splats if axes is None else moved(splats, axes)), (*notes, *remarks), axes is not None
+    return (splats if axes is None else move(splats, axes)), (*notes, *remarks), axes is not None
 
 
 def _read_gzip(data: bytes | memoryview, where: str) -> tuple[_Head, list[Bytes], bytes]:
     stream = zlib.decompressobj(16 + zlib.MAX_WBITS)
-    head = _read_head(_unpacked(stream, data, _HEADER.size, where), where)
+    head = _read_head(_inflate(stream, data, _HEADER.size, where), where)
     _ask_memory(head, where)
-    body = np.frombuffer(_unpacked(stream, stream.unconsumed_tail, head.count * sum(head.sizes), where), np.uint8)
+    body = np.frombuffer(_inflate(stream, stream.unconsumed_tail, head.count * sum(head.sizes), where), np.uint8)
     records = b""
     if head.has_extensions:
         try:
@@ -202,7 +202,7 @@ def _extensions(records: bytes, where: str) -> tuple[NDArray[np.float64] | None,
     return axes, notes
 
 
-def _unpacked(stream: zlib._Decompress, data: bytes | memoryview, size: int, where: str) -> bytes:
+def _inflate(stream: zlib._Decompress, data: bytes | memoryview, size: int, where: str) -> bytes:
     """The next ``size`` bytes of a stream, and no more than those."""
     try:
         unpacked = stream.decompress(data, size) if size else b""

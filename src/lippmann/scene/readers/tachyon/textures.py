@@ -54,7 +54,7 @@ class TextureTable:
         """TEX: the name of a texture, or TEXTURE and its body. Returns the material's index."""
         if words.has("TEXTURE"):
             return self.body(words, holder)
-        return self._named(words)
+        return self._take_named(words)
 
     def define(self, words: Words, holder: Path) -> None:
         """``TEXDEF name <body>``."""
@@ -64,7 +64,7 @@ class TextureTable:
     def alias(self, words: Words) -> None:
         """``TEXALIAS newname oldname``."""
         name = words.name("a name for the texture")
-        self._store(name, self._named(words), words)
+        self._store(name, self._take_named(words), words)
 
     def body(self, words: Words, holder: Path) -> int:
         """A texture body with colour and function."""
@@ -108,7 +108,7 @@ class TextureTable:
             more = f" and {len(places) - _MOST_NAMES} more" if len(places) > _MOST_NAMES else ""
             self._builder.notes.append(f"{listed}{more}: {remark}")
 
-    def _named(self, words: Words) -> int:
+    def _take_named(self, words: Words) -> int:
         name = words.peek()
         if name in self._textures:
             words.take()

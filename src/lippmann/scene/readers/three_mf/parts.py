@@ -217,11 +217,11 @@ class _PartReader:
         self._shape = self.part.shapes[given["id"]] = Shape(given.get("pid"), int(given.get("pindex", 0)))
 
     def _component(self, given: dict[str, str]) -> None:
-        self._shape.components.append(self._placed(given))
+        self._shape.components.append(self._place(given))
 
     def _item(self, given: dict[str, str]) -> None:
         if given.get("printable") != "0":
-            self.part.build.append(self._placed(given))
+            self.part.build.append(self._place(given))
 
     def _multiproperties(self, given: dict[str, str]) -> None:
         """Layers of properties: the last lies on top, and is taken alone, a picture over the first's colour."""
@@ -240,7 +240,7 @@ class _PartReader:
             self._group.below = self._first.values[indices[0]][:3]
         self._group.values.append(self._last.values[index])
 
-    def _placed(self, given: dict[str, str]) -> Placed:
+    def _place(self, given: dict[str, str]) -> Placed:
         matrix = np.eye(4)
         if "transform" in given:  # rows of the matrix that acts on row vectors, without the last column
             matrix[:3] = np.array([float(value) for value in given["transform"].split()]).reshape(4, 3).T

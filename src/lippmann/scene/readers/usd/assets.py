@@ -150,9 +150,9 @@ class Assets:
         outer, *inner = asset["found"].rstrip("]").split("[")
         if not self.named.admits(Path(outer)):
             raise SceneError(f"texture '{asset['name']}' lies outside the scene's folder", where=self.stage.name)
-        return self._packed(Path(outer), inner[:_DEEPEST])
+        return self._read_packed(Path(outer), inner[:_DEEPEST])
 
-    def _packed(self, package: Path, names: list[str]) -> bytes:
+    def _read_packed(self, package: Path, names: list[str]) -> bytes:
         source: Path | io.BytesIO = package
         data = b""
         for name in names:

@@ -90,7 +90,7 @@ class Curves:
         if interpolation == "vertex" or self.basis == "linear":
             needed, at = self.counts, self._at_vertices
         else:
-            needed, at = segments + int(self.wrap != "periodic"), self._between
+            needed, at = segments + int(self.wrap != "periodic"), self._interpolate
         if len(values) != needed.sum():
             return None
         return self._by_length(values, needed, points, pieces, at)
@@ -110,7 +110,7 @@ class Curves:
     def _at_vertices(self, own: Floats, pieces: int) -> Floats:
         """Values ``(k, p, c)`` at points, of those ``(k, n, c)`` at vertices, by the basis."""
         if self.basis == "linear":
-            return self._between(own, pieces)
+            return self._interpolate(own, pieces)
         if self.wrap == "periodic":
             own = np.concatenate([own, own[:, : 1 if self._step == 3 else 3]], axis=1)
         elif self.wrap == "pinned" and self._step == 1:  # beyond its ends a curve goes on as it ends
@@ -122,7 +122,7 @@ class Curves:
         each = np.einsum("pi,ksic->kspc", powers @ _WEIGHTS[self.basis], four)
         return np.concatenate([each[:, :, :-1].reshape(len(own), -1, own.shape[2]), each[:, -1, -1:]], axis=1)
 
-    def _between(self, own: Floats, pieces: int) -> Floats:
+    def _interpolate(self, own: Floats, pieces: int) -> Floats:
         """Values ``(k, p, c)`` at points, of those at the ends of segments."""
         if self.wrap == "periodic":
             own = np.concatenate([own, own[:, :1]], axis=1)

@@ -137,7 +137,7 @@ class SurfaceReader:
         if texture is not None:
             alpha = texture_maps.unit(texture.image)[..., 0]
             own = material.base_color_texture
-            image = texture_maps.with_alpha(None if own is None else _coded(own), alpha, texture.image.name)
+            image = texture_maps.with_alpha(None if own is None else _encode(own), alpha, texture.image.name)
             carrier = texture if own is None else own
             material = replace(material, base_color_texture=replace(carrier, image=image, srgb=True))
         mode: AlphaMode = "mask" if threshold > 0.0 else "blend"
@@ -276,7 +276,7 @@ def _values(texture: Texture, node: Record, srgb: bool) -> NDArray[np.float32]:
     return np.asarray(values * np.array(scale[:count], np.float32) + np.array(bias[:count], np.float32), np.float32)
 
 
-def _coded(texture: Texture) -> Image:
+def _encode(texture: Texture) -> Image:
     """The colours of a texture as sRGB codes."""
     if texture.srgb:
         return texture.image

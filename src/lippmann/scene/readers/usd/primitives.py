@@ -53,7 +53,7 @@ def primitive_polygons(kind: str, numbers: Mapping[str, float | str]) -> Polygon
     if kind == "Sphere":
         angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, _RINGS + 1)
         profile = number("radius") * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        return _turned([profile], [np.stack([np.cos(angles), np.sin(angles)], axis=1)])
+        return _turn([profile], [np.stack([np.cos(angles), np.sin(angles)], axis=1)])
     low = number("radiusBottom") if "radiusBottom" in numbers else number("radius")
     high = number("radiusTop") if "radiusTop" in numbers else 0.0 if kind == "Cone" else low
     half = number("height") / 2.0
@@ -65,16 +65,16 @@ def primitive_polygons(kind: str, numbers: Mapping[str, float | str]) -> Polygon
         arc = np.stack([np.cos(angles), np.sin(angles)], axis=1)
         bottom, top = arc[::-1] * (1.0, -1.0), arc
         parts = [bottom * low - (0.0, half), side, top * high + (0.0, half)]
-        return _along(_turned(parts, [bottom, np.repeat(slope[None], 2, axis=0), top]), axis)
+        return _along(_turn(parts, [bottom, np.repeat(slope[None], 2, axis=0), top]), axis)
     down, up = np.array([[0.0, -1.0]] * 2), np.array([[0.0, 1.0]] * 2)
     parts, normals = [np.array([[0.0, -half], [low, -half]]), side], [down, np.repeat(slope[None], 2, axis=0)]
     if kind != "Cone":
         parts.append(np.array([[high, half], [0.0, half]]))
         normals.append(up)
-    return _along(_turned(parts, normals), axis)
+    return _along(_turn(parts, normals), axis)
 
 
-def _turned(parts: list[NDArray[np.float64]], normals: list[NDArray[np.float64]]) -> Polygons:
+def _turn(parts: list[NDArray[np.float64]], normals: list[NDArray[np.float64]]) -> Polygons:
     """Profiles ``(k, 2)`` of radius and z, from below, turned about z; normals likewise."""
     angles = np.arange(_AROUND) * (2.0 * np.pi / _AROUND)
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)

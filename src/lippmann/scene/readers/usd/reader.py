@@ -112,7 +112,7 @@ def describe(tree: Record, arrays: Sequence[NDArray[np.generic]], path: Path, as
         environment=lights.environment,
         notes=[*notes, *reader.notes, *assets.notes],
         physical_lights=bool(lights.lights or lights.meshes),
-        splats=splats.joined(),
+        splats=splats.join(),
     )
 
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
-from lippmann.scene.readers.splats.activation import ask_memory, cleaned
+from lippmann.scene.readers.splats.activation import ask_memory, clean
 from lippmann.scene.readers.usd.records import Record
-from lippmann.scene.splat_clouds import moved
+from lippmann.scene.splat_clouds import move
 from lippmann.scene.values.description import Matrix
-from lippmann.scene.values.splats import COEFFICIENTS, FloatArray, Splats, joined
+from lippmann.scene.values.splats import COEFFICIENTS, FloatArray, Splats, join
 
 
 @dataclass(eq=False)
@@ -46,7 +46,7 @@ class SplatReader:
         harmonics = self._array(record["harmonics"], np.zeros((count, 1, 3))).reshape(count, -1, 3)
         ask_memory(count * len(worlds), harmonics.shape[1], where=self.where)
         scales = np.abs(self._array(record["scales"], np.ones((count, 3))))
-        splats, notes = cleaned(
+        splats, notes = clean(
             positions,
             scales * np.array([1.0, 1.0, 0.0], np.float32) if record["is_flat"] else scales,
             self._array(record["orientations"], np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))),
@@ -57,9 +57,9 @@ class SplatReader:
         self.notes.update(dict.fromkeys(f"{record['name']}: {note}" for note in notes))
         self.placed.extend((splats, world) for world in worlds)
 
-    def joined(self) -> Splats | None:
+    def join(self) -> Splats | None:
         """All of them in the world; None if there are none."""
-        return joined([moved(splats, world) for splats, world in self.placed]) if self.placed else None
+        return join([move(splats, world) for splats, world in self.placed]) if self.placed else None
 
     def _array(self, number: int | None, default: NDArray[np.float64]) -> FloatArray:
         return np.asarray(default if number is None else self.arrays[number], np.float32)

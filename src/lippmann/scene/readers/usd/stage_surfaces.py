@@ -143,7 +143,7 @@ def as_preview(kind: str, given: Record) -> Record:
             inputs["opacityThreshold"] = given.get("alpha_cutoff", {"value": 0.5})
     for preview, (name, usual) in model.weights.items():
         weight = _number(given, name, usual)
-        inputs[preview] = _scaled(inputs[preview], [weight, weight, weight])
+        inputs[preview] = _scale(inputs[preview], [weight, weight, weight])
     coat, tint = _number(inputs, "clearcoat", 0.0), given.get(model.coat_color)
     if coat > 0.0 and tint is not None:
         inputs["diffuseColor"] = _under_coat(inputs["diffuseColor"], tint, coat)
@@ -180,13 +180,13 @@ _AS_DIRECTIONS: Record = {"scale": {"value": [2.0, 2.0, 2.0, 1.0]}, "bias": {"va
 def _under_coat(base: Record, tint: Record, coat: float) -> Record:
     """A base colour below a coloured coat, which light passes; where both are pictures, the base alone."""
     if isinstance(color := tint.get("value"), list):
-        return _scaled(base, [1.0 + coat * (number - 1.0) for number in color])
+        return _scale(base, [1.0 + coat * (number - 1.0) for number in color])
     if coat == 1.0 and isinstance(color := base.get("value"), list):
-        return _scaled(tint, color)
+        return _scale(tint, color)
     return base
 
 
-def _scaled(source: Record, factors: list[float]) -> Record:
+def _scale(source: Record, factors: list[float]) -> Record:
     """A colour times a factor of each channel."""
     if "texture" in source:
         return {**source, "texture": {**source["texture"], "scale": {"value": [*factors, 1.0]}}}
@@ -240,7 +240,7 @@ def _passed_on(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record
     return given.get("in", given.get("value"))
 
 
-def _separated(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+def _separate(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
     source = given.get("in", {})
     index = {"outr": "r", "outg": "g", "outb": "b", "outa": "a", "outx": "r", "outy": "g", "outz": "b"}.get(channel)
     index = index or "rgba"[int(_number(given, "index", 0.0)) % 4]
@@ -259,8 +259,8 @@ _NODES: dict[str, Callable[[str, str, Record, Usd.Prim], Record | None]] = {
     "ND_convert_": _passed_on,
     "ND_dot_": _passed_on,
     "ND_constant_": _passed_on,
-    "ND_extract_": _separated,
-    "ND_separate": _separated,
+    "ND_extract_": _separate,
+    "ND_separate": _separate,
     "ND_texcoord_": _coordinates,
     "ND_geompropvalue_": _coordinates,
 }

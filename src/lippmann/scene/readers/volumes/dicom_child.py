@@ -19,7 +19,7 @@ from lippmann.scene.readers.volumes.dicom_slices import (
     Frame,
     SeriesError,
     choose_series,
-    interpolated,
+    interpolate,
     make_stack,
 )
 
@@ -255,7 +255,7 @@ def _fill(frames: list[Frame], lost: dict[str, list[str]], memory: int) -> tuple
         lost.setdefault("damaged", []).extend(damaged)
         return _fill([frame for frame in frames if frame.file not in damaged], lost, memory)
     if stack.places is not None:
-        grid = interpolated(grid, stack.places)
+        grid = interpolate(grid, stack.places)
     slope, intercept = (frames[0].slope, frames[0].intercept) if is_one_scale else (1.0, 0.0)
     head = {
         "shape": grid.shape,
@@ -276,7 +276,7 @@ def _pixels(frame: Frame) -> np.ndarray[Any, Any]:
         dataset.file_meta = pydicom.dataset.FileMetaDataset()
         dataset.file_meta.TransferSyntaxUID = syntax = pydicom.uid.ImplicitVRLittleEndian
     try:
-        return _measured(dataset, np.asarray(dataset.pixel_array))
+        return _apply_modality(dataset, np.asarray(dataset.pixel_array))
     except (RuntimeError, NotImplementedError) as error:
         if not syntax.is_compressed:
             raise
@@ -287,7 +287,7 @@ def _pixels(frame: Frame) -> np.ndarray[Any, Any]:
         ) from None
 
 
-def _measured(dataset: pydicom.Dataset, pixels: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+def _apply_modality(dataset: pydicom.Dataset, pixels: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     """Pixels through the modality's table, where there is one; padding as low as the lowest value."""
     padding = dataset.get("PixelPaddingValue")
     if padding is not None:

@@ -203,7 +203,7 @@ def _gaps(places: Numbers, step: float, unit: str) -> str:
     return f"{is_missing} missing: between {', '.join(gaps[:_NAMED])} {unit}{more}"
 
 
-def interpolated(grid: NDArray[np.generic], places: Numbers) -> NDArray[np.generic]:
+def interpolate(grid: NDArray[np.generic], places: Numbers) -> NDArray[np.generic]:
     """Slices between those of a grid ``(n, h, w)``, of the same kind of number; ``places`` as of :class:`Stack`."""
     made = np.empty((len(places), *grid.shape[1:]), grid.dtype)
     for number, place in enumerate(places):

@@ -77,7 +77,7 @@ def read_nifti(path: Path, *, series: str | None = None) -> SceneDescription:
         raise SceneError(f"has a damaged header ({str(error)[:200]})", where=where, rule=_RULE) from None
     if len(data) < voxels * dtype.itemsize:
         raise SceneError(f"holds {len(data)} of {voxels * dtype.itemsize} bytes of voxels", where=where)
-    scale, zero = _scaled(slope, intercept)
+    scale, zero = _read_scale(slope, intercept)
     grid = np.frombuffer(data, dtype).reshape(shape[::-1])
     scaling = np.diag([unit, unit, unit, 1.0])
     notes = [f"volume {number} of {count} (series)"] if count > 1 else []
@@ -130,7 +130,7 @@ def _affine(header: Any) -> NDArray[np.float64]:
     return np.asarray(header.get_base_affine(), np.float64)
 
 
-def _scaled(slope: float | None, intercept: float | None) -> tuple[float, float]:
+def _read_scale(slope: float | None, intercept: float | None) -> tuple[float, float]:
     """Slope and intercept of values, where the header has some that mean something."""
     if slope is None or intercept is None or not np.isfinite([slope, intercept]).all() or slope == 0.0:
         return 1.0, 0.0

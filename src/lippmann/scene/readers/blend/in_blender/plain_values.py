@@ -43,7 +43,7 @@ def plain_values(remark: Any) -> Iterator[None]:
             for node in tree.nodes:
                 if node.type != "TEX_IMAGE" or node.image is None or not node.image.size[0]:
                     continue
-                copy = _as_exported(node, remark)
+                copy = _convert_picture(node, remark)
                 if copy is not None:
                     copies.append(copy)
                     changes.set(node, "image", copy)
@@ -59,7 +59,7 @@ def _trees() -> list[Any]:
     return materials + [group for group in bpy.data.node_groups if group.library is None and group.type == "SHADER"]
 
 
-def _as_exported(node: Any, remark: Any) -> Any:
+def _convert_picture(node: Any, remark: Any) -> Any:
     """A copy of the node's picture in the numbers that glTF has where the node is used; None where they are so."""
     image = node.image
     space = image.colorspace_settings.name

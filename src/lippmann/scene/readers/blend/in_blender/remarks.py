@@ -114,7 +114,7 @@ def remark_materials(depsgraph: Any, remark: Any) -> None:
             remark(f"material '{name}': its volume is left out")
         if output.inputs["Displacement"].is_linked:
             remark(f"material '{name}': its displacement is left out")
-        reached = _reached(output.inputs["Surface"])
+        reached = _reach(output.inputs["Surface"])
         is_unlit = any(node.bl_idname == "ShaderNodeLightPath" for node in reached)
         for node in reached:
             if node.bl_idname == "ShaderNodeTexImage" and node.extension == "CLIP":
@@ -132,7 +132,7 @@ def _is_known(node: Any, *, is_unlit: bool) -> bool:
     return node.bl_idname in _KNOWN_NODES and (is_unlit or node.bl_idname not in _UNLIT_NODES)
 
 
-def _reached(socket: Any) -> list[Any]:
+def _reach(socket: Any) -> list[Any]:
     """Nodes that a socket depends on."""
     reached: dict[str, Any] = {}
     waiting = [link.from_node for link in socket.links]
