@@ -84,6 +84,20 @@ def test_the_first_frame_of_a_flight_is_the_scene_seen_by_that_camera(room, disp
     assert flown.world_from_display == pytest.approx(still.world_from_display, rel=1e-6)
 
 
+def test_all_of_a_flight_is_comfortable_with_one_distance_between_the_eyes(room):
+    """It was that of the first frame: what the camera left behind was too deep to look at."""
+    (room[1]).write_text("0 0 1 0 1 0 0 0 -5\n0 0 1 0 1 0 0 0 -9\n0 0 1 0 1 0 0 0 -6\n")
+    monitor, motion = load_display("odyssey-3d"), open_motion(room[0], camera_path=room[1])
+    where = find_stand(motion, monitor, PlacementOptions())
+    placements = [where(frame) for frame in range(3)]
+    far, near = placements[0].depth_budget
+    assert {each.eye_share for each in placements} == {where.eye_share}
+    assert all(far <= each.depth_range[0] <= each.depth_range[1] <= near for each in placements)
+    # No closer than the deepest frame asks for.
+    assert placements[1].depth_range[0] == pytest.approx(far, rel=0.1)
+    assert find_stand(motion, monitor, PlacementOptions(depth_scale=1.0)).eye_share == 1.0
+
+
 def test_a_camera_of_the_file_is_followed(moving_ball, display):
     motion = open_motion(moving_ball)
     where = find_stand(motion, display, PlacementOptions(camera="eye"))

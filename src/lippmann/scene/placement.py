@@ -202,7 +202,7 @@ def place(
     where = inverse(display_from_world)
     share, seen = 1.0, None
     if mode == "camera" and display.stereo is not None:
-        share, seen = _share_of_eyes(where, bounds, display, bounds_in, probe, is_unbounded=is_unbounded)
+        share, seen = find_eye_share(where, bounds, display, bounds_in, probe, is_unbounded=is_unbounded)
         share = share if options.depth_scale is None else 1.0
     placement = stand(
         where, bounds, display, mode=mode, bounds_in=bounds_in, warnings=warnings, eye_share=share, seen=seen
@@ -249,14 +249,14 @@ def _corners_in(frame_from_world: Matrix, bounds: Bounds, bounds_in: Callable[[M
     return box_corners(bounds_in(frame_from_world))
 
 
-def _share_of_eyes(
+def find_eye_share(
     world_from_display: Matrix,
     bounds: Bounds,
     display: Display,
-    bounds_in: Callable[[Matrix], Bounds] | None,
-    probe: DepthProbe | None,
+    bounds_in: Callable[[Matrix], Bounds] | None = None,
+    probe: DepthProbe | None = None,
     *,
-    is_unbounded: bool,
+    is_unbounded: bool = False,
 ) -> tuple[float, tuple[float, float]]:
     """Share of the eye distance at which what a camera sees is comfortable, and the back and front of that in mm.
 

@@ -22,7 +22,7 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Build
 from lippmann.runtime.machine import return_freed_memory
-from lippmann.scene.placement import Placement, options_of_sequence, place, stand
+from lippmann.scene.placement import Placement, find_eye_share, options_of_sequence, place, stand
 from lippmann.scene.values.description import Camera, Matrix
 from lippmann.sequences.cuts import Moment
 from lippmann.sequences.flicker import with_flicker
@@ -30,7 +30,7 @@ from lippmann.sequences.forms import INTEGRAL, Form, QuiltForm, Shown
 from lippmann.sequences.kept_scene import KeptScene
 from lippmann.sequences.key_frames import KeyFrames, estimate_of_next
 from lippmann.sequences.key_light import KeyLight, LightOfSurfaces
-from lippmann.sequences.motion import Motion, open_motion
+from lippmann.sequences.motion import MOMENTS, Motion, open_motion
 from lippmann.sequences.still_pixels import StillPixels
 
 if TYPE_CHECKING:
@@ -106,13 +106,16 @@ class Stand:
     may_cut: PlacementOptions | None = None
     eye_share: float = 1.0
 
+    def where(self, frame: int) -> tuple[Matrix, float]:
+        """``world_from_display`` in a frame, and the exposure of the camera that the display follows, in stops."""
+        if self.first_pose is None:
+            return self.motion.display_turn(frame) @ self.first, 0.0
+        camera = cast(Camera, self.motion.camera(frame, self.camera))
+        return _pose(camera) @ np.linalg.inv(self.first_pose) @ self.first, camera.exposure
+
     def __call__(self, frame: int) -> Placement:
         scene = self.motion.scene(frame)
-        where = self.motion.display_turn(frame) @ self.first
-        exposure = 0.0
-        if self.first_pose is not None:
-            camera = cast(Camera, self.motion.camera(frame, self.camera))
-            where, exposure = _pose(camera) @ np.linalg.inv(self.first_pose) @ self.first, camera.exposure
+        where, exposure = self.where(frame)
         bounds, box = scene.bounds, scene.bounds_in
         found = stand(where, bounds, self.display, mode=self.mode, bounds_in=box, eye_share=self.eye_share)
         found = replace(found, exposure=exposure, may_cut=self.may_cut)
@@ -145,8 +148,15 @@ def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> S
             f"placement '{options.place}' beside a flight", parameter="place", rule="the display follows the camera"
         )
     following = replace(options, place="camera", camera=camera.name)
-    placement = place(motion.bounds(), display, cameras=(camera,), options=following)
-    return _stand_as(placement, motion, display, camera=options.camera, first_pose=_pose(camera))
+    bounds = motion.bounds()
+    placement = place(bounds, display, cameras=(camera,), options=following)
+    stand_of_first = _stand_as(placement, motion, display, camera=options.camera, first_pose=_pose(camera))
+    if display.stereo is None or options.depth_scale is not None:
+        return stand_of_first
+    # One distance between the eyes for all frames, so that nothing changes its depth as they come and go.
+    moments = {round(moment) for moment in np.linspace(0, motion.count - 1, MOMENTS)}
+    shares = (find_eye_share(stand_of_first.where(frame)[0], bounds, display)[0] for frame in sorted(moments))
+    return replace(stand_of_first, eye_share=min(shares))
 
 
 def _stand_as(placement: Placement, motion: Motion, display: Display, **values: Any) -> Stand:

@@ -35,7 +35,7 @@ AS_IT_IS = SceneOptions()
 _OF_MOVING = ("variants", "reader_options", "environment", "background", "single_scattering")
 
 #: Moments, spread evenly over an animation, whose boxes together stand for all that it ever fills.
-_MOMENTS = 65
+MOMENTS = 65
 
 #: A frame that rounding puts this far (frames) beyond an animation's end still belongs to it.
 _ROUNDING = 1e-3
@@ -138,7 +138,7 @@ class AnimatedFile(Motion):
         return None if name is None else find_camera(self.scene(frame).cameras, name)
 
     def bounds(self) -> Bounds:
-        boxes = [self._at(seconds).bounds for seconds in np.linspace(0.0, self._moving.duration, _MOMENTS)]
+        boxes = [self._at(seconds).bounds for seconds in np.linspace(0.0, self._moving.duration, MOMENTS)]
         return np.stack([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
 
     def _at(self, seconds: float) -> Scene:
