@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -109,6 +111,19 @@ def test_neither_the_box_nor_its_shadow_leaves_a_ghost(frames, display):
 def test_a_frame_is_the_same_alone_and_after_others(frames, display):
     alone = dict(render_sequence(Sliding(), display, [5], **PATHS))[5]
     np.testing.assert_array_equal(alone.pixels, frames[5].pixels)
+
+
+def test_surfaces_that_no_light_reaches_stay_as_they_are(display):
+    # The light stands behind the wall.
+    class Behind(Sliding):
+        def scene(self, frame):
+            scene = super().scene(frame)
+            lights = [Light("point", (6000.0, 6000.0, 6000.0), translation((0, 0, -60)))]
+            return lippmann.load_scene(replace(scene.description, lights=lights))
+
+    after = dict(render_sequence(Behind(), display, [0, 3], **PATHS))[3]
+    assert not after.pixels[:, 60:].any()
+    assert (after.maps[SAMPLES_LAYER][:, 60:] == 0).all()
 
 
 def test_key_frames_have_one_seed(frames):

@@ -220,6 +220,7 @@ def trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
         frame.coverage = Coverage(spread(frame.coverage.share, covered), frame.coverage.samples)
     frame.maps[SAMPLES_LAYER] = np.where(is_known, np.uint32(0), np.uint32(traced.samples))
     frame.shares = shares
+    job.denoiser.restrict_to(~np.repeat(is_known, columns_of(job), axis=1))
     traced = denoise_whole(job, traced)
     traced.frame.pixels[is_known] = shown[is_known]
     return traced

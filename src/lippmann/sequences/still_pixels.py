@@ -181,12 +181,13 @@ def _find_still(key: _Picture, own: _Picture, job: Job) -> Mask:
 
     is_same = key.features == own.features
     change, light = np.abs(own.probes - key.probes).sum(axis=2), (own.probes + key.probes).sum(axis=2)
-    is_lit = light > 0  # paths that find no light in either frame tell nothing
+    is_probed, is_lit = ~np.isnan(light), light > 0
     # Beside another surface light is taken to change, too.
     change = np.where(is_same, np.divide(change, light, out=np.zeros_like(light), where=is_lit), is_lit)
     bands = Bands(job.session.engine.threads)
-    change, lit = (mean_around(part.astype(np.float32), _REACH, bands) for part in (change, is_lit))
-    is_agreed = (lit > 0) & (change <= _LARGEST_CHANGE * lit)
+    change, lit, probed = (mean_around(part.astype(np.float32), _REACH, bands) for part in (change, is_lit, is_probed))
+    # Where no probe finds light in either frame, such as on the outer side of a wall, there is none to change.
+    is_agreed = (probed > 0) & (change <= _LARGEST_CHANGE * lit)
     is_still = is_same & (is_agreed | (_coverage_of(job) == 0))
     return np.asarray(is_still.reshape(len(is_still), -1, columns_of(job)).all(axis=2))
 

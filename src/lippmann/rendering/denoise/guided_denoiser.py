@@ -86,6 +86,7 @@ class GuidedDenoiser:
         self._lenses: NDArray[np.int32] | None = None
         self._progress = progress
         self._guides: Guides | None = None
+        self._is_open: NDArray[np.bool_] | None = None
         #: The surfaces in every tile of the source, by the guides.
         self._surfaces: list[SurfacePart | None] = []
         self.seconds = 0.0
@@ -111,6 +112,10 @@ class GuidedDenoiser:
         self.seconds += time.perf_counter() - started
         return clean
 
+    def restrict_to(self, is_open: NDArray[np.bool_]) -> None:
+        """Denoise the pixels where ``is_open (H, W)``, with those around them; the values of others mean nothing."""
+        self._is_open, self._surfaces = is_open, []
+
     def _share(self, clean: Floats) -> Floats:
         """A denoised picture with the light shared between its micro-images."""
         source = self._source
@@ -122,7 +127,15 @@ class GuidedDenoiser:
             else:
                 self._lenses = lens_numbers(source.display, window, subpixels=source.channels == 3)
         display, columns = source.display, 3 if isinstance(source, SubpixelRays) else 1
-        return share_light(clean, display, self.guides(), stop=SHARING.stop, lenses=self._lenses, columns=columns)
+        return share_light(
+            clean,
+            display,
+            self.guides(),
+            stop=SHARING.stop,
+            lenses=self._lenses,
+            columns=columns,
+            is_open=self._is_open,
+        )
 
     def coverage(self) -> tuple[Coverage, Coverage] | None:
         """Coverage of every pixel by the guides' rays, one for each half of them; None where it is not known."""
@@ -144,7 +157,9 @@ class GuidedDenoiser:
     def _denoise_tiles(self, pixels: Floats, guides: Guides, turned: bool) -> Floats:
         source = self._source
         if not self._surfaces:
-            self._surfaces = [SurfacePart.of(guides.normal[tile]) for tile in source.tiles()]
+            is_open = self._is_open
+            parts = [(guides.normal[tile], None if is_open is None else is_open[tile]) for tile in source.tiles()]
+            self._surfaces = [SurfacePart.of(*part) for part in parts]
         result = np.empty_like(pixels)
         for tile, surfaces in zip(source.tiles(), self._surfaces, strict=True):
             result[tile] = denoise_surfaces(
@@ -195,11 +210,15 @@ class SurfacePart:
     near: NDArray[np.bool_]
 
     @staticmethod
-    def of(normal: NDArray[np.generic]) -> SurfacePart | None:
-        """The part with all surfaces of a picture, by its normals ``(H, W, 3)``, 0 off surfaces; None without any."""
+    def of(normal: NDArray[np.generic], is_open: NDArray[np.bool_] | None = None) -> SurfacePart | None:
+        """The part with all surfaces of a picture, by its normals ``(H, W, 3)``, 0 off surfaces; None without any.
+
+        With ``is_open (H, W)``, the part with the pixels where it is true and that show surfaces or are close to one.
+        """
         is_surface = (normal[..., 0] != 0) | (normal[..., 1] != 0) | (normal[..., 2] != 0)
-        place = _rectangle(is_surface)
-        return None if place is None else SurfacePart(place, _widen(is_surface[place])[..., None])
+        near = _widen(is_surface)
+        place = _rectangle(is_surface if is_open is None else near & is_open)
+        return None if place is None else SurfacePart(place, near[place][..., None])
 
 
 def denoise_surfaces(

@@ -14,6 +14,7 @@ normals differ, so that weights vanish.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -44,6 +45,7 @@ def share_light(
     stop: float,
     lenses: NDArray[np.int32] | None = None,
     columns: int = 1,
+    is_open: NDArray[np.bool_] | None = None,
 ) -> Floats:
     """The denoised picture, filtered across its micro-images.
 
@@ -63,6 +65,9 @@ def share_light(
     columns:
         Columns of ``pixels`` for each pixel of the panel: 3 for sub-pixels in full colour, else 1.
 
+    is_open:
+        ``(H, W)`` of ``pixels``: those that are filtered; the others stay as they are. None for all.
+
     Returns
     -------
     float32 of the same shape.
@@ -77,9 +82,15 @@ def share_light(
     if lenses is None:
         lenses = lens_numbers(display)
     groups = [slice(0, 3)] if len(lenses) == 1 else [slice(c, c + 1) for c in range(3)]
+    numbers = None if is_open is None else upload(np.flatnonzero(is_open).astype(np.uint32))
     for lens, group in zip(lenses, groups, strict=True):
         picture = _Picture(light[..., group], guides.normal, guides.height, lens, centers, display.gap, reach, stop)
-        shared[..., group] = light_of_pixels(picture.mean_light, light[..., group].shape)
+        if numbers is None:
+            shared[..., group] = light_of_pixels(picture.mean_light, light[..., group].shape)
+        else:
+            shared[..., group] = light[..., group]
+            shape = len(numbers), 1, group.stop - group.start
+            shared[is_open, group] = light_of_pixels(partial(picture.mean_light_of, numbers), shape)[:, 0]
     return np.asarray(shared * albedo, dtype=np.float32)
 
 
@@ -114,6 +125,10 @@ class _Picture:
         self._lenses = opaque(mi.Int32, *centers.shape[:2])
         self._reach = opaque(mi.Int32, *reach)
         self._gap, self._stop = opaque(mi.Float, gap, stop)
+
+    def mean_light_of(self, numbers: UInt32, place: UInt32) -> Array:
+        """Filtered light of the pixels that stand at places of a table of their ``numbers``."""
+        return self.mean_light(dr.gather(mi.UInt32, numbers, place))
 
     @syntax
     def mean_light(self, pixel: UInt32) -> Array:
