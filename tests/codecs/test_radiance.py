@@ -71,6 +71,7 @@ def test_xyz():
 def test_primaries():
     own = "PRIMARIES=0.640 0.330 0.290 0.600 0.150 0.060 0.333 0.333"
     assert read(file_of(PIXELS, [own])).tolist() == PIXELS.tolist()
+    assert read(file_of(PIXELS, ["PRIMARIES=0 0 0 0 0 0 0 0"])).tolist() == PIXELS.tolist()
     wide = "PRIMARIES=0.708 0.292 0.170 0.797 0.131 0.046 0.3127 0.3290"
     red = read(file_of(np.full((2, 4, 3), [1.0, 0.5, 0.5], np.float32), [wide]))[0, 0]
     assert red == pytest.approx([1.6605 - 0.3302, -0.1246 + 0.5623, -0.0182 + 0.5091], abs=2e-3)  # ITU-R BT.2087-0
@@ -85,7 +86,7 @@ def test_primaries():
         (file_of(PIXELS, ["COLORCORR=1 2"]), r"COLORCORR is '1 2', not 3 number\(s\)"),
         (file_of(PIXELS, ["EXPOSURE=0"]), "its exposure must be above 0"),
         (file_of(PIXELS, ["PIXASPECT=2"]), "its pixels are not square"),
-        (file_of(PIXELS, ["PRIMARIES=0 0 0 0 0 0 0 0"]), "y other than 0"),
+        (file_of(PIXELS, ["PRIMARIES=0 0 0 0 0 0 0 1"]), "y other than 0"),
         (file_of(PIXELS, size="-Y 20000 +X 40000"), "hold no 40000x20000 pixels"),
         (file_of(PIXELS)[:-8], "cannot be decoded"),
     ],

@@ -80,7 +80,8 @@ def read_header(data: bytes, where: str) -> RadianceHeader:
         elif name == "PIXASPECT" and abs(float(_numbers(name, value, 1, where)[0]) - 1.0) > _SQUARE:
             raise _undecodable(f"its pixels are not square: PIXASPECT is {value.strip()}", where)
         elif name == "PRIMARIES":
-            primaries = tuple(_numbers(name, value, 8, where).tolist())
+            given = _numbers(name, value, 8, where)
+            primaries = tuple(given.tolist()) if given.any() else None  # zeros stand for none, as in USD's own sky
     if not (np.isfinite(exposure).all() and (exposure > 0.0).all()):
         raise _undecodable("its exposure must be above 0", where)
     first, second = int(size[3]), int(size[6])
