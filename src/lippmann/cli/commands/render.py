@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from lippmann.display import Display
     from lippmann.image import IntegralImage
     from lippmann.image.encoding import FormatName
+    from lippmann.image.stored_values import Stored
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.tiles.tiled_render import Runner
 
@@ -83,7 +84,6 @@ def render(
     from lippmann.image.write import check_output
     from lippmann.rendering.picture import render_picture
     from lippmann.rendering.request.render_request import RenderRequest
-    from lippmann.runtime.atomic_write import check_folder_writable
 
     console = Console(quiet, as_json)
     target = display_of(display, printed)
@@ -105,7 +105,6 @@ def render(
         rendered, traced = corrected_renderer(correct, headroom), finer_display(target)
         if moving or maps is not None:
             _refuse_correction("frames" if moving else "--maps", "leave one of them out")
-    on_cluster = bool(on)
     if moving:
         from lippmann.cli.commands.cluster import runner_of
         from lippmann.cli.commands.sequence import Files, render_frames
@@ -120,32 +119,58 @@ def render(
         return
     name, stored = check_output(output, bits)
     _check_layers(how.layers, name, output)
-    if on_cluster or is_tiled(name, traced, request, resume=resume):
-        if correct == "lens":
-            fix = "render a quilt with 'lippmann quilt', then 'lippmann weave --correct lens'"
-            _refuse_correction("tiles, as a cluster, --resume, Zarr and pictures beyond the memory have them", fix)
-        if maps is not None:
-            fix = "leave it out: a file that ends in .exr holds each pixel's error and samples itself"
-            rule = "with --resume, to Zarr and beyond the memory pictures are rendered in tiles"
-            raise UsageError("needs the whole picture at once", where="--maps", rule=rule, fix=fix)
+    if on or is_tiled(name, traced, request, resume=resume):
+        _check_tiled(correct, maps)
         from lippmann.cli.commands.cluster import runner_of
 
         with runner_of(on, console, machine.threads) as runner:
             _render_tiled(
                 source, target, request, output, console, bits=bits, resume=resume, finish=finish, runner=runner
             )
-        if opens:
-            _open(output, quiet=quiet, as_json=as_json)
-        return
-    if finish is not None:
-        finish.check_stored(stored, output)
+    else:
+        if finish is not None:
+            finish.check_stored(stored, output)
+        _render_whole(
+            source, target, request, rendered, output, console, bits=bits, stored=stored, maps=maps, finish=finish
+        )
+    if opens:
+        _open(output, quiet=quiet, as_json=as_json)
+
+
+def _check_tiled(correct: str, maps: Path | None) -> None:
+    """Refuse for a picture in tiles what needs it as a whole."""
+    if correct == "lens":
+        fix = "render a quilt with 'lippmann quilt', then 'lippmann weave --correct lens'"
+        _refuse_correction("tiles, as a cluster, --resume, Zarr and pictures beyond the memory have them", fix)
+    if maps is not None:
+        fix = "leave it out: a file that ends in .exr holds each pixel's error and samples itself"
+        rule = "with --resume, to Zarr and beyond the memory pictures are rendered in tiles"
+        raise UsageError("needs the whole picture at once", where="--maps", rule=rule, fix=fix)
+
+
+def _render_whole(
+    source: SceneSource,
+    display: Display,
+    request: RenderRequest,
+    rendered: Callable[..., IntegralImage],
+    output: Path,
+    console: Console,
+    *,
+    bits: int | None,
+    stored: Stored,
+    maps: Path | None,
+    finish: Finish | None,
+) -> None:
+    """Render a picture in memory, write it with its ``maps``, and say what came of it."""
+    from lippmann.runtime.atomic_write import check_folder_writable
+
     if maps is not None:
         check_folder_writable(maps)
     with console.progress() as progress:
         started = time.perf_counter()
-        loaded = source.load()
+        scene = source.load()
         load_seconds = time.perf_counter() - started
-        image = rendered(loaded, target, request, progress)
+        image = rendered(scene, display, request, progress)
         progress(Progress("write", 0, 1))
         writing = time.perf_counter()
         image = _with_seconds(image, load=load_seconds)
@@ -159,13 +184,11 @@ def render(
         image.save(output, bits=bits, icc=b"" if finish is None else finish.icc)
     written = _with_seconds(image, write=time.perf_counter() - writing)
     remarks(console, image.provenance)
-    for line in (remark, _overtime(written, how.max_time)):
+    for line in (remark, _overtime(written, request.max_time)):
         if line:
             console.remark(line)
     height, width = image.pixels.shape[:2]
     console.result(report(output, (width, height), written.provenance), _sentence(output, written))
-    if opens:
-        _open(output, quiet=quiet, as_json=as_json)
 
 
 def _open(output: Path, *, quiet: bool, as_json: bool) -> None:

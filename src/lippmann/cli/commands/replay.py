@@ -20,6 +20,7 @@ from lippmann.options.texts import triple
 from lippmann.progress import Progress, ProgressCallback
 
 if TYPE_CHECKING:
+    from lippmann.color.transfer import Transfer
     from lippmann.display import Display
     from lippmann.image import IntegralImage, LargePicture
     from lippmann.image.stored_values import FloatArray
@@ -97,12 +98,8 @@ def replay(
     film: Annotated[SequenceOptions, only("codec")],
 ) -> None:
     """Simulate what an eye in front of the display sees."""
-    from lippmann.codecs.stereo_pairs import PAIRS
-    from lippmann.image.write import write_plain_picture
-    from lippmann.quilts.quilt import Quilt
-    from lippmann.viewing.quilt_views import replay_quilt
-    from lippmann.viewing.replay import default_eye, path_of_eye
-    from lippmann.viewing.stereo import head_path, stereo_pair, write_pair
+    from lippmann.viewing.replay import default_eye
+    from lippmann.viewing.stereo import head_path
     from lippmann.viewing.video_file import write_animation
 
     console = Console(quiet, as_json)
@@ -125,42 +122,75 @@ def replay(
         raise UsageError("applies to a sweep only", where=flag, fix="add --sweep")
     places = None if path is None else head_path(path)
     seen, target = _open_seen(picture, display, layout, aspect)
-    transfer = seen.provenance.transfer
     position = default_eye(target) if eye is None else triple(eye, "--eye")
-    pixels, framed = _size_of(size, target, console)
-
-    if optics and isinstance(seen, Quilt):
-        rule = "a quilt is seen without lenses"
-        raise UsageError("this is a quilt", where="--optics", rule=rule, fix="weave it for its display first")
-
-    def replay_from(place: tuple[float, float, float]) -> FloatArray:
-        if isinstance(seen, Quilt):
-            return framed(replay_quilt(seen, target, place, size=pixels, linear=filter == "linear"))
-        return framed(seen.replay(place, size=pixels, filter=filter, optics=optics))
-
-    def picture_from(place: tuple[float, float, float]) -> FloatArray:
-        return replay_from(place) if stereo is None else stereo_pair(replay_from, place, *stereo)
-
+    see = _view_of(seen, target, size, filter, console, optics=optics, stereo=stereo)
     result: dict[str, Any] = {"output": str(output), "eye": list(position), "filter": filter, "optics": optics}
     if stereo is not None:
         result |= {"stereo": stereo[0], "eyes": stereo[1]}
     by = "" if stereo is None else f" by two eyes {stereo[1]:g} mm apart"
+    transfer = seen.provenance.transfer
     if not moves:
-        if stereo is not None and output.suffix.lower() in PAIRS:
-            write_pair(picture_from(position), output, stereo[0], transfer)
-        else:
-            write_plain_picture(picture_from(position), output, bits=bits, transfer=transfer)
+        _write_seen(see(position), output, stereo, bits, transfer)
         console.result(result, f"{output}: seen{by} from {_position(position)}")
         return
     if places is None:
-        reach = _field_width(target, position[2]) if width is None else width
-        start, stop = ((position[0] + side * reach / 2, *position[1:]) for side in (-1, 1))
-        places = path_of_eye(start, stop, 48 if frames is None else frames)
+        places = _sweep_before(target, position, width, frames)
     with console.progress() as progress:
-        write_animation(_draw(picture_from, places, progress), output, transfer=transfer, codec=film.codec)
+        write_animation(_draw(see, places, progress), output, transfer=transfer, codec=film.codec)
     start, stop = places[0], places[-1]
     result |= {"frames": len(places), "start": list(start), "stop": list(stop)}
     console.result(result, f"{output}: {len(places)} frames, seen{by} from {_position(start)} to {_position(stop)}")
+
+
+def _view_of(
+    seen: IntegralImage | LargePicture | Quilt,
+    display: Display,
+    size: str | None,
+    filter: Literal["nearest", "linear"],
+    console: Console,
+    *,
+    optics: bool,
+    stereo: tuple[Stereo, float] | None,
+) -> Callable[[Place], FloatArray]:
+    """The function that gives what one eye, or the two of ``stereo``, see from a place."""
+    from lippmann.quilts.quilt import Quilt
+    from lippmann.viewing.quilt_views import replay_quilt
+    from lippmann.viewing.stereo import stereo_pair
+
+    pixels, framed = _size_of(size, display, console)
+    if optics and isinstance(seen, Quilt):
+        rule = "a quilt is seen without lenses"
+        raise UsageError("this is a quilt", where="--optics", rule=rule, fix="weave it for its display first")
+
+    def replay_from(place: Place) -> FloatArray:
+        if isinstance(seen, Quilt):
+            return framed(replay_quilt(seen, display, place, size=pixels, linear=filter == "linear"))
+        return framed(seen.replay(place, size=pixels, filter=filter, optics=optics))
+
+    return replay_from if stereo is None else lambda place: stereo_pair(replay_from, place, *stereo)
+
+
+def _write_seen(
+    picture: FloatArray, output: Path, stereo: tuple[Stereo, float] | None, bits: int | None, transfer: Transfer
+) -> None:
+    """Write what one eye or two see, two as a file of a pair where ``output`` is one."""
+    from lippmann.codecs.stereo_pairs import PAIRS
+    from lippmann.image.write import write_plain_picture
+    from lippmann.viewing.stereo import write_pair
+
+    if stereo is not None and output.suffix.lower() in PAIRS:
+        write_pair(picture, output, stereo[0], transfer)
+    else:
+        write_plain_picture(picture, output, bits=bits, transfer=transfer)
+
+
+def _sweep_before(display: Display, middle: Place, width: float | None, frames: int | None) -> list[Place]:
+    """Places of an eye that sweeps ``width`` mm from left to right about ``middle``; by default the field of view."""
+    from lippmann.viewing.replay import path_of_eye
+
+    reach = _field_width(display, middle[2]) if width is None else width
+    start, stop = ((middle[0] + side * reach / 2, *middle[1:]) for side in (-1, 1))
+    return path_of_eye(start, stop, 48 if frames is None else frames)
 
 
 def _draw(
