@@ -1,3 +1,4 @@
+import dataclasses
 import os
 import threading
 import weakref
@@ -132,6 +133,13 @@ def test_a_codec_that_cannot_be(tmp_path, monkeypatch):
         match=r"a\.mp4: the codec av1 is not installed; PyAV as it is installed has no libnone; take h264 or hevc",
     ):
         write_animation(frames(), tmp_path / "a.mp4", codec="av1")
+    # Where each pixel counts, and where a side is long, others are no help.
+    exact = dataclasses.replace(mp4_film._ENCODERS["h264-rgb"], name="libnone")
+    monkeypatch.setitem(mp4_film._ENCODERS, "h264-rgb", exact)
+    with pytest.raises(OutputError, match=r"no libnone; take vp9-rgb$"):
+        mp4_film.check_film(tmp_path / "a.mp4", (64, 64), "h264-rgb", exact=True)
+    with pytest.raises(OutputError, match=r"no libnone; take hevc or vp9 or vp9-rgb$"):
+        mp4_film.check_film(tmp_path / "a.mp4", (8192, 64), "h264-rgb")
     for name in mp4_film._ENCODERS:
         monkeypatch.setitem(mp4_film._ENCODERS, name, encoder)
     with pytest.raises(OutputError, match=r"no libnone; write an animation \(\.png\)"):

@@ -122,7 +122,8 @@ def check_film(place: Path, size: tuple[int, int], codec: Codec, *, exact: bool 
         )
     if not _is_built_in(encoder):
         rule = f"PyAV as it is installed has no {encoder.name}"
-        others = [name for name, other in _ENCODERS.items() if _is_built_in(other)]
+        usable = {name: each for name, each in _ENCODERS.items() if max(size) <= each.widest and each.is_exact >= exact}
+        others = [name for name, each in usable.items() if _is_built_in(each)]
         fix = f"take {' or '.join(others)}" if others else "write an animation (.png)"
         raise OutputError(f"the codec {codec} is not installed", where=str(place), rule=rule, fix=fix)
     if max(size) > encoder.widest:
