@@ -53,6 +53,28 @@ def test_intervals_hold_the_truth_however_noisy_the_judges_are(noise, ratio):
     assert (inside >= 37).all()
 
 
+def kept_samples(seed, spread=0.5):
+    """Errors of a picture whose halves are their very samples, some pixels of which are noisier; and the true ones.
+
+    Nothing is left of either half by which the other one could be judged.
+    """
+    random = np.random.default_rng(seed)
+    first, second = 0.01 * np.exp(spread * random.standard_normal((64, 64))) * random.standard_normal((2, 64, 64))
+    apart = (np.square(first - second) / 4).astype(np.float32)
+    return PixelErrors(apart, None, PixelErrors(apart), apart), np.square((first + second) / 2)
+
+
+def test_where_samples_are_kept_their_difference_is_no_measure_of_what_they_have_in_common():
+    estimator = PictureEstimator(SHOWN)
+    inside = np.zeros(2)
+    for seed in range(30):
+        errors, true = kept_samples(seed)
+        found, truth = estimator.estimate(errors, 64), truth_of(true)
+        inside += np.less_equal([found.psnr_low, found.worst_low], truth)
+        inside -= np.greater(truth, [found.psnr_high, found.worst_high])
+    assert (inside >= 28).all()
+
+
 def test_a_negative_measurement_is_no_perfect_picture():
     """Strong noise can push what is measured below zero; what the halves differ by is wrong all the same."""
     errors, _ = made(1, noise=0.2)

@@ -99,7 +99,7 @@ def estimate_denoised(errors: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     _, samples = parts_with_pixels(samples)
     pixels = float(errors.pixels.sum())
     by_chance, error = float(errors.apart.sum()) / pixels, float(errors.values.sum()) / pixels
-    deviation = math.sqrt(float(errors.squares.sum())) / pixels
+    deviation = math.sqrt(float((errors.squares + errors.products).sum())) / pixels
     of_samples = max(float(samples.values.sum()), 1e-30)
     outliers = min(1.0, float(samples.outliers.sum()) / of_samples)
     # Denoised halves may agree by clipping, not by low noise: at least a 10 000th of the samples' error remains.
@@ -142,9 +142,11 @@ def _parts(
     power = TUNING.neighbour_power
     around = np.maximum(apart, least) ** (1 - power) * np.maximum(near, least) ** power
     around *= mean / float((around * count).sum() / count.sum())
-    # The second moment of a single part is a noisy estimate: it is shrunk towards that of all parts together.
-    overall = float(errors.squares.sum()) / float((np.square(around) * count).sum())
-    noise = (errors.squares + TUNING.prior_pixels * overall * np.square(around)) / (count + TUNING.prior_pixels) / count
+    # The moments of a single part are noisy estimates: they are shrunk towards those of all parts together.
+    moments = np.stack([errors.squares, errors.products])
+    overall = moments.sum(axis=1, keepdims=True) / float((np.square(around) * count).sum())
+    prior = TUNING.prior_pixels
+    noise, products = (moments + prior * overall * np.square(around)) / (count + prior) / count
     measured = errors.values / count
     # A part that is worse than noise explains gets a prior variance of its own: a denoiser may be far off in a few
     # pixels beside an emitter, where the samples themselves are good.
@@ -154,8 +156,8 @@ def _parts(
     trust = between / (between + noise)
     expected = np.maximum(around + trust * (measured - around), 0.2 * around)
     # A part of few pixels, in a corner of the panel, has a larger variance.
-    fewer = TUNING.prior_pixels * np.maximum(1 / count - 1 / quantiles(count, 0.5), 0)
-    variance = np.log1p(trust * noise / np.square(expected)) + np.log1p(fewer)
+    fewer = prior * np.maximum(1 / count - 1 / quantiles(count, 0.5), 0)
+    variance = np.log1p((trust * noise + products) / np.square(expected)) + np.log1p(fewer)
     return PartErrors(index, expected, expected, variance, errors.shares_less(expected))
 
 

@@ -79,7 +79,11 @@ class ErrorSums:
     """Sums over the pixels of each part, ``(parts,)`` each.
 
     ``pixels``: their number; ``values``, ``outliers``, ``apart``, ``blur``: sums of the fields of
-    :class:`PixelErrors`; ``squares``: sum of the squares of ``values``, less ``apart``, which has no uncertainty.
+    :class:`PixelErrors`; ``squares``: sum of the squares of ``values``, less ``apart``.
+
+    ``products``: sum of the variances of the products of the halves' errors. ``values`` measure these products, except
+    where the halves are the samples themselves. The product has the variance 4 s^2, where s is the mean of ``apart``,
+    whose second moment is 3 s^2: four thirds of its square. It is small where the halves are smooth.
     """
 
     pixels: Real
@@ -88,6 +92,7 @@ class ErrorSums:
     outliers: Real
     apart: Real
     blur: Real
+    products: Real
 
     @classmethod
     def none(cls, parts: int, pixels: NDArray[np.generic] | int = 0) -> ErrorSums:
@@ -97,17 +102,19 @@ class ErrorSums:
     def add(self, owner: NDArray[np.integer], errors: PixelErrors) -> None:
         """Add the errors of some pixels to the parts that ``owner`` names; ``pixels`` stays as it is."""
         owner = owner.ravel()
-        uncertain = values = errors.values.astype(np.float64).ravel()
+        values = errors.values.astype(np.float64).ravel()
+        squares = np.square(values)
         self.values[:] += self._sum(owner, values)
         if errors.outliers is not None:
             self.outliers[:] += self._sum(owner, errors.outliers.astype(np.float64).ravel())
         if errors.apart is not None:
             apart = errors.apart.astype(np.float64).ravel()
             self.apart[:] += self._sum(owner, apart)
-            uncertain = uncertain - apart
+            squares = np.square(values - apart)
+            self.products[:] += self._sum(owner, 4 / 3 * np.square(apart))
         if errors.blur is not None:
             self.blur[:] += self._sum(owner, errors.blur.astype(np.float64).ravel())
-        self.squares[:] += self._sum(owner, np.square(uncertain))
+        self.squares[:] += self._sum(owner, squares)
 
     def add_sums(self, parts: NDArray[np.generic], sums: ErrorSums) -> None:
         """Add the sums of other pixels, with their number; ``parts`` are the indices of their parts, each once."""
