@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import lippmann
+from lippmann.calibration.patterns import draw
 from lippmann.errors import LippmannError, UsageError
 from lippmann.exchange.layouts import export_image, import_image
+from lippmann.optics.crosstalk import crosstalk, independent_directions
+from lippmann.optics.directions import true_directions
+from lippmann.optics.eye_light import eye_light
+from lippmann.optics.lens import Lens
+from lippmann.optics.light_table import light_table
+from lippmann.optics.proof import prove
 from lippmann.options.option import checked
 from lippmann.quilts.files import read_quilt, write_quilt
+from lippmann.quilts.quilt import Quilt, QuiltLayout
 from lippmann.quilts.weave import weave
+from lippmann.sequences.frames import FrameRange, render_sequence
 from lippmann.sequences.motion import open_motion
+from lippmann.viewer.export import export_page
 
 
 @checked
@@ -35,6 +47,9 @@ def call(
 
 SMALL = lippmann.load_display("seed-lenticular").resized(16, 8)
 IMAGE = lippmann.IntegralImage(np.zeros((8, 16, 3), np.float32), SMALL)
+PRINT = lippmann.load_display("print-60lpi")
+LENS = Lens.of(PRINT)
+QUILT = Quilt(IMAGE.pixels, QuiltLayout(2, 1, 1.0))
 
 
 def test_values_become_what_annotations_say():
@@ -102,6 +117,22 @@ def test_what_is_given_by_place_is_checked_and_python_counts():
         (lambda: write_quilt(IMAGE, "a.png"), "quilt"),
         (lambda: weave(IMAGE, SMALL), "quilt"),
         (lambda: open_motion("teapot", fps="a"), "fps"),
+        (lambda: lippmann.IntegralImage(IMAGE.pixels, 5), "display"),
+        (lambda: lippmann.IntegralImage(IMAGE.pixels, SMALL, maps=5), "maps"),
+        (lambda: lippmann.IntegralImage(IMAGE.pixels, SMALL, provenance=5), "provenance"),
+        (lambda: lippmann.RenderRequest(fixed_noise="a"), "fixed_noise"),
+        (lambda: lippmann.load_scene("a.glb", variants=5), "variants"),
+        (lambda: Quilt(5, QuiltLayout(3, 1, 1.5)), "values"),
+        (lambda: Quilt(IMAGE.pixels, 5), "layout"),
+        (lambda: FrameRange("a"), "first"),
+        (lambda: FrameRange(0, 10, 2.5), "step"),
+        (lambda: render_sequence("teapot", SMALL), "motion"),
+        (lambda: export_page([IMAGE], "a.html"), "pictures"),
+        (lambda: export_page(IMAGE, "a.html"), "pictures"),
+        (lambda: draw("stripes", SMALL), "pattern"),
+        (lambda: light_table(LENS, "a"), "slopes"),
+        (lambda: light_table(LENS, [[0.0]]), "slopes"),
+        (lambda: light_table(LENS, math.nan), "slopes"),
     ],
 )
 def test_calls_of_the_library_check_theirs(wrong, name):
@@ -111,9 +142,31 @@ def test_calls_of_the_library_check_theirs(wrong, name):
 
 
 @pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda: weave(QUILT, "portrait"), "display: 'portrait'; must be a Display; lippmann.load_display gives one"),
+        (lambda: prove("portrait"), "display: 'portrait'; it must be a Display; lippmann.load_display gives one"),
+        (lambda: Lens.of(5), "display: 5; it must be a Display; lippmann.load_display gives one"),
+        (lambda: crosstalk(5, 0.0), "display: 5; it must be a Display; lippmann.load_display gives one"),
+        (lambda: independent_directions(5), "display: 5; it must be a Display; lippmann.load_display gives one"),
+        (lambda: eye_light(5, (0.0, 0.1), (0.0, 0.0)), "display: 5; it must be a Display; lippmann.load_display gives"),
+        (lambda: light_table(5, 0.0), "lens: 5; it must be a Lens; Lens.of(display) gives one"),
+        (lambda: true_directions(5), "lens: 5; it must be a Lens; Lens.of(display) gives one"),
+        (lambda: replace(SMALL, panel=5), "panel: 5; it must be a Panel"),
+        (lambda: replace(SMALL, lens_array=5), "lens_array: 5; it must be a LensArray"),
+    ],
+)
+def test_what_is_of_another_kind_is_told_where_one_comes_from(wrong, said):
+    with pytest.raises(LippmannError) as caught:
+        wrong()
+    assert str(caught.value).startswith(said)
+
+
+@pytest.mark.parametrize(
     "wrong",
     [
         lambda: IMAGE.with_pixels("a"),
+        lambda: IMAGE.with_pixels(1j * IMAGE.pixels),
         lambda: lippmann.IntegralImage.from_views("a", SMALL),
         lambda: lippmann.IntegralImage.from_micro_images("a", SMALL),
     ],

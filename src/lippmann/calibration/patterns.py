@@ -48,6 +48,7 @@ from numpy.typing import NDArray
 from lippmann.display.formats.monitor import Monitor
 from lippmann.display.panel import PixelWindow
 from lippmann.errors import LippmannError, UsageError
+from lippmann.options.option import checked
 
 FloatArray = NDArray[np.float32]
 Real = NDArray[np.float64]
@@ -137,6 +138,7 @@ def check_step(step: float | None) -> None:
         raise UsageError(f"{step:g} is out of range", parameter="step", rule="it must be a positive number")
 
 
+@checked
 def draw(pattern: Pattern, monitor: Monitor, window: PixelWindow | None = None) -> FloatArray:
     """Draw a test pattern.
 

@@ -30,7 +30,7 @@ from lippmann.display.panel import Panel
 from lippmann.display.pixel_aperture import PixelAperture
 from lippmann.display.sheet import Sheet
 from lippmann.display.stereo import COMFORTABLE, StereoPair, depth_of_disparity
-from lippmann.display.validation import Table, check_keys, check_text, number, positive
+from lippmann.display.validation import Table, check_keys, check_kind, check_text, number, positive
 from lippmann.errors import DisplayError
 from lippmann.json_values import JsonObject
 from lippmann.runtime.engine_lock import cached_property
@@ -130,6 +130,8 @@ class Display:
     def __post_init__(self) -> None:
         check_text(self.name, "name", empty=False)
         check_text(self.title, "title")
+        check_kind(self.panel, Panel, "panel")
+        check_kind(self.lens_array, LensArray, "lens_array")
         object.__setattr__(self, "gap", positive(self.gap, "gap"))
         rule = "it must be a length above zero, or infinite"
         viewing_distance = number(self.viewing_distance, "viewing_distance", rule=rule)

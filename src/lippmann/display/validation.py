@@ -10,6 +10,7 @@ from numbers import Integral, Real
 from typing import Any, TypeAlias, TypeVar
 
 from lippmann.errors import DisplayError
+from lippmann.printable import shorten
 
 T = TypeVar("T")
 
@@ -70,6 +71,12 @@ def whole_count(value: object, key: str) -> int:
         rule = f"it must be a whole number from 1 to {MAXIMUM_COUNT}"
         raise DisplayError(f"{_last(key)} is {value!r}", where=key, rule=rule)
     return int(value)
+
+
+def check_kind(value: object, kind: type, key: str, fix: str = "") -> None:
+    """Refuse a value that is no ``kind``."""
+    if not isinstance(value, kind):
+        raise DisplayError(shorten(value), where=key, rule=f"it must be a {kind.__name__}", fix=fix)
 
 
 def check_text(value: object, key: str, *, empty: bool = True) -> None:

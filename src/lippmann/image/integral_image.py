@@ -23,6 +23,7 @@ from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, Values
 from lippmann.image.views import Resampling, exact_view_shape, resampled_views, view_grid
 from lippmann.options.option import checked
+from lippmann.printable import shorten
 from lippmann.scene.matrices import check_placement
 
 if TYPE_CHECKING:
@@ -150,6 +151,8 @@ class IntegralImage(Picture):
     ------
     PictureError
         If a shape, type or value is another.
+    UsageError
+        If ``display``, ``provenance`` or ``maps`` is of another kind.
 
     Examples
     --------
@@ -168,6 +171,9 @@ class IntegralImage(Picture):
     stored: Stored = "float32"
 
     def __post_init__(self) -> None:
+        for name, kind in (("display", Display), ("provenance", Provenance), ("maps", Mapping)):
+            if not isinstance(value := getattr(self, name), kind):
+                raise UsageError(shorten(value), parameter=name, rule=f"must be a {kind.__name__}")
         object.__setattr__(self, "pixels", _checked_pixels(self.pixels, self.display))
         object.__setattr__(self, "world_from_display", check_placement(self.world_from_display))
         size = self.pixels.shape[:2]
@@ -345,7 +351,10 @@ class IntegralImage(Picture):
 
 def _numbers(name: str, values: object) -> FloatArray:
     try:
-        return np.asarray(values, dtype=np.float32)
+        array = np.asarray(values)
+        if np.iscomplexobj(array):
+            raise TypeError("they are complex")
+        return array.astype(np.float32, copy=False)
     except (TypeError, ValueError) as error:
         raise PictureError(f"the {name} are no array of numbers ({error})") from None
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from lippmann.display.display import Display
-from lippmann.optics.lens import Lens, Real
+from lippmann.optics.lens import Lens, Real, check_display
 from lippmann.optics.light_table import light_table
 from lippmann.optics.pixel_profile import ink_kernel, kernel, pixel_trapezoid, width_at_half_height
 
@@ -36,6 +36,7 @@ def crosstalk(display: Display, slope: float, strips: float | None = None) -> fl
     >>> print(f"{crosstalk(display, 0.0):.3f}")
     0.000
     """
+    check_display(display)
     step = display.micro_image_pitch / _PLACES
     spread, blur = _spread(display, slope, step), _blur(display)
     shape = pixel_trapezoid(display)
@@ -68,6 +69,7 @@ def independent_directions(display: Display) -> float:
     >>> print(f"{independent_directions(display):.1f}")
     12.0
     """
+    check_display(display)
     shape, blur, step = pixel_trapezoid(display), _blur(display), display.micro_image_pitch / _PLACES
     width = shape.half_height
     if display.lens is not None or blur:

@@ -14,7 +14,7 @@ import numpy as np
 from lippmann.display.distortion import Distortion
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_profile import LensProfile
-from lippmann.optics.lens import Lens, Real
+from lippmann.optics.lens import Lens, Real, check_lens
 from lippmann.optics.trace import Vectors, crest, trace, trace_back
 
 #: Places of half a lens at which directions are known; between them they are interpolated.
@@ -71,6 +71,7 @@ def true_directions(lens: Lens) -> TrueDirections:
     >>> print(f"{outermost:.2f}")
     0.54
     """
+    check_lens(lens)
     half = np.linspace(0.0, 0.5, _PLACES) * lens.pitch
     x, y = lens.samples(_POINTS if lens.is_cylinder else _ROUND_POINTS)
     apart = _APART * lens.pitch

@@ -12,9 +12,20 @@ from lippmann.display.array_ops import NUMPY
 from lippmann.display.display import Display
 from lippmann.display.lens_array import Lattice, LensArray
 from lippmann.display.lens_profile import LensProfile
+from lippmann.display.validation import check_kind
 from lippmann.errors import DisplayError
 
 Real = NDArray[np.float64]
+
+
+def check_display(display: object) -> None:
+    """Refuse what is no :class:`~lippmann.Display`, such as the name of one."""
+    check_kind(display, Display, "display", "lippmann.load_display gives one")
+
+
+def check_lens(lens: object) -> None:
+    """Refuse what is no :class:`Lens`, such as a display."""
+    check_kind(lens, Lens, "lens", "Lens.of(display) gives one")
 
 
 @dataclass(frozen=True)
@@ -50,6 +61,7 @@ class Lens:
         DisplayError
             If the display gives none: names it.
         """
+        check_display(display)
         if display.lens is None:
             rule = "its gap stands for a pinhole; a lens has a thickness, an index and a crest radius"
             fix = "add the table [lens] to its file, or thickness= to a print"

@@ -5,12 +5,15 @@ The share of a flat, perfectly clear sheet is 1 in all: what a row lacks is refl
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lippmann.optics.lens import Lens, Real
+from lippmann.errors import UsageError
+from lippmann.optics.lens import Lens, Real, check_lens
+from lippmann.printable import shorten
 
 #: Rays through a cylinder, and rows and columns of rays through a micro-lens.
 _LINE_RAYS, _SQUARE_RAYS = 512, 96
@@ -96,6 +99,13 @@ def light_table(
     neighbours:
         Lenses to both sides of the own one whose places the table has.
 
+    Raises
+    ------
+    DisplayError
+        ``lens`` is no :class:`~lippmann.optics.lens.Lens`.
+    UsageError
+        ``slopes`` are not finite numbers, one or a row.
+
     Examples
     --------
     >>> from lippmann.optics.lens import Lens
@@ -122,7 +132,14 @@ def light_table(
 def _frame(
     lens: Lens, slopes: ArrayLike, along: float, places_per_lens: int, neighbours: int
 ) -> tuple[NDArray[np.float64], Real]:
-    across = np.atleast_1d(np.asarray(slopes, dtype=np.float64))
+    check_lens(lens)
+    try:
+        across = np.atleast_1d(np.asarray(slopes, dtype=np.float64))
+    except (TypeError, ValueError):
+        across = np.array([math.nan])
+    if across.ndim != 1 or not np.isfinite(across).all():
+        rule = "must be a finite number, or a row of them: tangents of angles"
+        raise UsageError(shorten(slopes), parameter="slopes", rule=rule)
     directions = np.ascontiguousarray(np.stack([across, np.full_like(across, along)], axis=1))
     lenses = 2 * neighbours + 1
     edges = (np.arange(lenses * places_per_lens + 1) / places_per_lens - 0.5 * lenses) * lens.pitch

@@ -171,6 +171,11 @@ class Proof:
 def prove(display: Display) -> Proof:
     """The proof of a display, with its own lens or, where it gives none, with an ideal pinhole.
 
+    Raises
+    ------
+    DisplayError
+        ``display`` is no :class:`~lippmann.Display`.
+
     Examples
     --------
     >>> from lippmann.optics.proof import prove

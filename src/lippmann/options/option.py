@@ -111,7 +111,10 @@ class Option:
         choices = [word for each in kinds if get_origin(each) is Literal for word in get_args(each)]
         if (value is None and type(None) in kinds) or (isinstance(value, str) and value in choices):
             return
-        if bool in kinds:
+        if any(get_origin(each) is Mapping for each in kinds):
+            if not isinstance(value, Mapping):
+                raise UsageError(f"{value!r}", parameter=name, rule=self.rule or "must be a dict of texts by name")
+        elif bool in kinds:
             if value not in (True, False):
                 raise UsageError(f"{value!r}", parameter=name, rule=self.rule or "must be True, False or None")
         elif int in kinds or float in kinds:
@@ -272,12 +275,15 @@ def takes(*kinds: type[Options], without: tuple[str, ...] = (), **defaults: Any)
 
 
 def checked(function: F) -> F:
-    """Refuse arguments of ``function`` that are none of the kinds that their annotations name.
+    """Refuse arguments of ``function``, or of a dataclass, that are none of the kinds that their annotations name.
 
     Values become that kind: NumPy's numbers Python's, and texts paths where no text is named before them. Annotations
     are read as written, in modules that import ``annotations`` from ``__future__``. A parameter whose annotation names
     any other type than :data:`_KINDS` is left to the function, and so are options, which have checks of their own.
     """
+    if isinstance(function, type):
+        function.__init__ = checked(function.__init__)  # type: ignore[misc]
+        return function
     parameters = inspect.signature(function).parameters
     written = {name: "bool" if each.annotation is bool else each.annotation for name, each in parameters.items()}
     kinds = {name: text.split(" | ") for name, text in written.items() if isinstance(text, str)}
@@ -298,11 +304,12 @@ def _checked(name: str, value: Any, kinds: list[str] | None) -> Any:
     for kind in kinds:
         try:
             return _KINDS[kind][1](value)
-        except (LookupError, TypeError, ValueError):
+        except (AttributeError, LookupError, TypeError, ValueError):
             continue
     words = [_KINDS[kind][0] for kind in kinds]
     rule = " or ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
-    raise UsageError(shorten(value), parameter=name, rule=f"must be {rule}")
+    fix = next((f"{_MAKERS[kind]} gives one" for kind in kinds if kind in _MAKERS and "str" not in kinds), "")
+    raise UsageError(shorten(value), parameter=name, rule=f"must be {rule}", fix=fix)
 
 
 def _instance(name: str) -> Callable[[Any], Any]:
@@ -339,6 +346,16 @@ def _pair(value: Any) -> tuple[int, int]:
     return index(first), index(second)
 
 
+def _colours(value: Any) -> Any:
+    if len(value.shape) != 3 or value.shape[2] != 3:
+        raise ValueError
+    return value
+
+
+def _titled(value: Any) -> list[tuple[str, Any]]:
+    return [(_instance("str")(title), _instance("Picture")(picture)) for title, picture in value]
+
+
 #: What is said of a kind, by the name that annotations have for it, and what reads a value or raises.
 _KINDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
     "None": ("None", _instance("NoneType")),
@@ -350,10 +367,23 @@ _KINDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
     "Path": ("a path", Path),
     "tuple[int, int]": ("two whole numbers", _pair),
     "Sequence[float]": ("numbers, at least one", _numbers),
+    "Values": ("an array (height, width, 3)", _colours),
+    "Sequence[tuple[str, Picture]]": ('titles and pictures, such as [("teapot", image)]', _titled),
     **dict.fromkeys(("ProgressCallback", "Runner"), ("a function", _function)),
     **{
         name: (f"a {name}", _instance(name))
-        for name in ("Display", "LargePicture", "Picture", "Quilt", "TransferFunction")
+        for name in (
+            "Display", "LargePicture", "Monitor", "Motion", "Pattern", "Picture",
+            "Provenance", "Quilt", "QuiltLayout", "TransferFunction",
+        )
     },
     **{name: (f"an {name}", _instance(name)) for name in ("Environment", "IntegralImage")},
+}  # fmt: skip
+
+#: Where a value comes from that only the library makes, for the fix.
+_MAKERS = {
+    "Display": "lippmann.load_display",
+    "IntegralImage": "lippmann.render",
+    "Motion": "lippmann.sequences.motion.open_motion",
+    "Picture": "lippmann.read_picture",
 }

@@ -130,6 +130,7 @@ DEVICE_QUILTS: tuple[DeviceQuilt, ...] = (
 )
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Quilt:
     """Views of one size in a grid.

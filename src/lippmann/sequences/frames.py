@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from lippmann.tiles.tiled_render import Rendered, Runner
 
 
+@checked
 @dataclass(frozen=True)
 class FrameRange:
     """Frames ``first``, ``first + step``, ... before ``stop``; ``stop`` None is the motion's end.
@@ -165,6 +166,7 @@ def _stand_as(placement: Placement, motion: Motion, display: Display, **values: 
     return Stand(motion, display, placement.mode, where, may_cut=may_cut, eye_share=placement.eye_share, **values)
 
 
+@checked
 def render_sequence(
     motion: Motion,
     display: Display | str | Path = "seed-lenticular",

@@ -190,9 +190,9 @@ def test_broken_files(write, text, said):
     assert str(caught.value).startswith(str(path))
 
 
-@pytest.mark.parametrize(("nothing", "kind"), [(None, "NoneType"), (5, "int"), ({}, "dict")])
-def test_values_that_are_no_display(nothing, kind):
-    with pytest.raises(DisplayError, match=f"^display: a {kind} is no display; it must be a name"):
+@pytest.mark.parametrize("nothing", [None, 5, {}])
+def test_values_that_are_no_display(nothing):
+    with pytest.raises(DisplayError, match=f"^display: {nothing} is no display; it must be a name"):
         load_display(nothing)
 
 

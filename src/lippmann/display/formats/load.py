@@ -54,6 +54,7 @@ from lippmann.display.formats.stereo_toml import stereo_display
 from lippmann.display.panel import stripe
 from lippmann.display.validation import MILLIMETRES, Arguments, millimetres, positive
 from lippmann.errors import DisplayError
+from lippmann.printable import shorten
 from lippmann.runtime.plugins import Door, Extension, Target, function_of
 from lippmann.runtime.regular_file import read_small_text
 
@@ -237,7 +238,7 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
         name = os.fspath(name_or_path)
     except TypeError:
         rule = "it must be a name such as 'seed-lenticular', a file or a Display"
-        what = f"a {type(name_or_path).__name__} is no display"
+        what = f"{shorten(name_or_path)} is no display"
         raise DisplayError(what, parameter="display", rule=rule) from None
     # Owners of a Looking Glass know their device as "portrait".
     short = _FAMILY + name.removeprefix("lkg-")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import Coding, Transfer, pbr_neutral
 from lippmann.options.choices import ASKED, Caustics, Denoiser, Integrator, Method, PixelFilter, ToneMap
 from lippmann.options.integrators import INTEGRATORS
-from lippmann.options.option import Options, options_of
+from lippmann.options.option import Option, Options, options_of
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.quality import MachineOptions, QualityOptions
 from lippmann.rendering.request.tuning import TUNING
@@ -174,6 +174,7 @@ class RenderRequest(MachineOptions, QualityOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        Option("", "").check("fixed_noise", self.fixed_noise, bool)
         object.__setattr__(self, "placement", placement_of(self.placement))
 
     @classmethod
