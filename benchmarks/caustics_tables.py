@@ -12,7 +12,7 @@ def describe(result: dict[str, Any]) -> str:
 
 64 lenses of 8 pixels, 160 rows, path light; PSNR of all pixels / of the worst micro-image against two references of
 {result["reference_spp"] // 2} samples with photons; time of the processors over their number, photons included.
-What is seen of small emitters in mirrors comes by [chains](caustics.md#seen-light) with either.
+Mirrored small emitters come by [chains](caustics.md#seen-light) with either.
 
 {table}
 """

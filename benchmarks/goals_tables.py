@@ -75,11 +75,10 @@ def _most_possible(display: str, scenes: dict[str, Any]) -> str:
         judging.append(f"{mean(least):.1f} (to {quality} dB)")
         told.append(f"{mean(stock):.1f} and {mean(full):.1f} times as fast as stock views and full (to {quality} dB)")
     return textwrap.fill(
-        "What a picture takes at least that judges itself by two denoised halves, one sample of each pixel (photons "
-        f"included), guides and two runs of the network, would be {' and '.join(judging)} times as fast as stock "
-        "views. A picture that were told its error by references, as they are, and chose the cheapest way, effort and "
-        f"number of samples on the curves of `equal_error.py`, would be {', '.join(told)}: no judgement can make more "
-        "of it.",
+        "A picture that judges itself by two denoised halves takes at least one sample of each pixel (photons "
+        f"included), guides and two runs of the network: {' and '.join(judging)} times as fast as stock views. A "
+        "picture that were told its error by references, as they are, and chose the cheapest way, effort and number of "
+        f"samples on the curves of `equal_error.py`, would be {', '.join(told)}: no judgement can make more of it.",
         120,
     )
 
