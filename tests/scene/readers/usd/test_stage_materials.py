@@ -378,12 +378,42 @@ def test_opacities_of_faces(read):
     assert scene.materials[0].alpha_mode == "blend"
 
 
-def test_other_primvars_are_named(read):
-    nodes = reader("c", "float3", "heat", "(0.5, 0.25, 1)") + reader("e", "float3", "displayColor", "(1, 1, 1)")
-    inputs = "color3f inputs:diffuseColor.connect = </mat/c.outputs:result>\n"
-    inputs += "color3f inputs:emissiveColor.connect = </mat/e.outputs:result>"
-    scene = read(painted(nodes, inputs))
-    assert scene.materials[0].base_color == (0.5, 0.25, 1)
+HEAT = "color3f inputs:diffuseColor.connect = </mat/c.outputs:result>"
+
+
+@pytest.mark.parametrize(
+    ("kind", "values"),
+    [
+        ("color3f[]", "[(1, 0, 0), (0, 1, 0), (0, 0, 1)]"),
+        ("color4f[]", "[(1, 0, 0, 1), (0, 1, 0, 1), (0, 0, 1, 1)]"),
+        ("half3[]", "[(1, 0, 0), (0, 1, 0), (0, 0, 1)]"),
+    ],
+)
+def test_colours_of_any_name_that_a_material_reads(read, kind, values):
+    nodes = reader("c", "float3", "heat", "(0.5, 0.25, 1)")
+    display = "color3f[] primvars:displayColor = [(1, 1, 0)]\n"
+    scene = read(painted(nodes, HEAT, f'{display}{kind} primvars:heat = {values} (interpolation = "vertex")'))
+    assert scene.meshes[0].colors[scene.meshes[0].faces[0]].tolist() == np.eye(3).tolist()
+    # A mesh without, or with something else of that name: the fallback.
+    for other in ("", 'float[] primvars:heat = [1, 2, 3] (interpolation = "vertex")'):
+        (mesh,) = read(painted(nodes, HEAT, other)).meshes
+        assert (mesh.colors == (0.5, 0.25, 1)).all()
+
+
+def test_copies_that_inherit_colours_of_their_own(read):
+    body = painted(reader("c", "float3", "heat", "(1, 1, 1)"), HEAT).replace(
+        'def Mesh "', 'class "shape"\n{\ndef Mesh "'
+    )
+    copies = "".join(
+        f'def "{name}" (instanceable = true\n inherits = </shape>)\n{{\ncolor3f primvars:heat = {color}\n}}\n'
+        for name, color in (("red", "(1, 0, 0)"), ("green", "(0, 1, 0)"))
+    )
+    scene = read(f"{body}\n}}\n{copies}")
+    assert [mesh.colors[0].tolist() for mesh in scene.meshes] == [[1, 0, 0], [0, 1, 0]]
+
+
+def test_other_inputs_by_primvars_are_named(read):
+    nodes = reader("e", "float3", "displayColor", "(1, 1, 1)")
+    scene = read(painted(nodes, "color3f inputs:emissiveColor.connect = </mat/e.outputs:result>"))
     assert scene.meshes[0].colors is None
-    assert "diffuseColor by the primvar 'heat' is not read: its fallback is taken" in scene.notes
     assert "emissiveColor by the primvar 'displayColor' is not read: its fallback is taken" in scene.notes

@@ -34,13 +34,16 @@ class Surface:
     uv_names:
         Names of its texture coordinates in the order of their sets.
     color, opacity:
-        Values of meshes that lack the display colour or opacity that it reads; None where it reads none.
+        Values of meshes that lack the colour or display opacity that it reads; None where it reads none.
+    color_name:
+        The primvar that is its colour.
     """
 
     material: Material
     uv_names: tuple[str, ...]
     color: Color | None = None
     opacity: float | None = None
+    color_name: str = "displayColor"
 
 
 @dataclass(eq=False)
@@ -97,14 +100,15 @@ class SurfaceReader:
             tuple(self._uv_names),
             None if by_color is None else _color_of(by_color.get("fallback"), (1.0, 1.0, 1.0)),
             None if by_opacity is None else min(max(_scalar_of(by_opacity.get("fallback"), 1.0), 0.0), 1.0),
+            "displayColor" if by_color is None else str(by_color["primvar"] or "displayColor"),
         )
 
     def _reads(self, inputs: Record, name: str) -> Record | None:
-        """The source of an input, if that is the display colour or opacity of the mesh."""
+        """The source of an input, if that is a colour or the display opacity of the mesh."""
         source = inputs.get(name)
         if source is None or "primvar" not in source:
             return None
-        if source["primvar"] not in {"diffuseColor": ("displayColor", ""), "opacity": ("displayOpacity", "")}[name]:
+        if name == "opacity" and source["primvar"] not in ("displayOpacity", ""):
             self._note_unread(name, source)
             return None
         return cast(Record, source)

@@ -180,9 +180,9 @@ class MeshReader:
     def _colors(
         self, record: Record, material: int, values: Callable[[Record, str], NDArray[np.generic]]
     ) -> FloatArray | None:
-        """Display colours ``(n, 3 or 4)``, as far as the material reads them; ``values`` reads a primvar."""
+        """Colours ``(n, 3 or 4)``, as far as the material reads them; ``values`` reads a primvar."""
         surface = self._surface(material)
-        color = record["color"] if surface.color is not None else None
+        color = record["colors"].get(surface.color_name) if surface.color is not None else None
         opacity = record["opacity"] if surface.opacity is not None else None
         if material < 0 and color is None:
             return None
@@ -190,7 +190,8 @@ class MeshReader:
             return None
         rgb = np.array([surface.color or (1.0, 1.0, 1.0)])
         if color is not None:
-            rgb = np.clip(values(color, "display colours"), 0.0, None)
+            what = "display colours" if surface.color_name == "displayColor" else f"colours '{surface.color_name}'"
+            rgb = np.clip(values(color, what)[:, :3], 0.0, None)
         if surface.opacity is None or (material < 0 and opacity is None):
             return np.asarray(rgb, np.float32)
         alpha = np.array([[surface.opacity]])
@@ -342,7 +343,7 @@ class MeshReader:
         """Whether corners of faces that meet in a point may have values of their own, normals of edges apart."""
         surface = self._surface(material)
         used = [record["normals"], *(record["uvs"].get(name) for name in surface.uv_names)]
-        used += [record["color"]] if surface.color is not None else []
+        used += [record["colors"].get(surface.color_name)] if surface.color is not None else []
         used += [record["opacity"]] if surface.opacity is not None else []
         return any(each is not None and each["interpolation"] in ("uniform", "faceVarying") for each in used)
 

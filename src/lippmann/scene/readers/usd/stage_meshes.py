@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,7 @@ THIN = ("Points", "BasisCurves")
 
 _UV_TYPES = ("texCoord2f[]", "texCoord2d[]", "texCoord2h[]", "float2[]", "double2[]", "half2[]")
 _MOST_UV_SETS = 8
+_COLOR_TYPE = re.compile(r"(?:color|float|double|half)([34])[fdh]?(?:\[\])?")
 
 
 def mesh_record(
@@ -46,9 +48,10 @@ def mesh_record(
         if normals is not None:
             normals["turns"] = arrays.add(skinned_turns(skin, prim, points, time))
         points = skinned_points(skin, prim, points, time)
+    subsets = _subsets(prim, time, arrays, materials)  # whose materials read colours, too
     crease_lengths = np.asarray(mesh.GetCreaseLengthsAttr().Get(time) or [], np.int64)
     return {
-        **_visible(prim, time, arrays),
+        **_visible(prim, time, arrays, materials),
         "points": arrays.add(_floats(points, 3)),
         "counts": integers(mesh.GetFaceVertexCountsAttr()),
         "indices": integers(mesh.GetFaceVertexIndicesAttr()),
@@ -62,19 +65,19 @@ def mesh_record(
         "boundary": str(mesh.GetInterpolateBoundaryAttr().Get(time) or "edgeAndCorner"),
         "normals": normals,
         "uvs": _uv_sets(prim, time, arrays),
-        "subsets": _subsets(prim, time, arrays, materials),
+        "subsets": subsets,
     }
 
 
-def primitive_record(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Record:
+def primitive_record(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays, materials: MaterialTable) -> Record:
     """A shape that is given by numbers."""
     kind = str(prim.GetTypeName())
     values = {name: prim.GetAttribute(name).Get(time) for name in PRIMITIVES[kind]}
     numbers = {name: str(value) if name == "axis" else float(value) for name, value in values.items()}
-    return {**_visible(prim, time, arrays), "primitive": kind, "numbers": numbers}
+    return {**_visible(prim, time, arrays, materials), "primitive": kind, "numbers": numbers}
 
 
-def thin_record(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Record:
+def thin_record(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays, materials: MaterialTable) -> Record:
     """Points, or curves, with the widths that are given."""
     thin = UsdGeom.PointBased(prim)
     widths = _primvar(UsdGeom.PrimvarsAPI(prim).GetPrimvar("widths"), 1, time, arrays)
@@ -82,7 +85,7 @@ def thin_record(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Record:
     if widths is None and (values := attribute.GetWidthsAttr().Get(time)):
         widths = {"values": arrays.add(_floats(values, 1)), "interpolation": str(attribute.GetWidthsInterpolation())}
     record = {
-        **_visible(prim, time, arrays),
+        **_visible(prim, time, arrays, materials),
         "thin": arrays.add(_floats(thin.GetPointsAttr().Get(time), 3)),
         "widths": widths,
     }
@@ -95,12 +98,18 @@ def thin_record(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Record:
     return record
 
 
-def _visible(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Record:
+def _visible(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays, materials: MaterialTable) -> Record:
     gprim = UsdGeom.Gprim(prim)
     primvars = UsdGeom.PrimvarsAPI(prim)
+    colors = {}
+    for name in materials.color_names:
+        primvar = primvars.FindPrimvarWithInheritance(name)
+        kind = _COLOR_TYPE.fullmatch(str(primvar.GetTypeName())) if primvar else None
+        if kind and (color := _primvar(primvar, int(kind[1]), time, arrays)) is not None:
+            colors[name] = color
     return {
         "left_handed": str(gprim.GetOrientationAttr().Get(time)) == "leftHanded",
-        "color": _primvar(primvars.FindPrimvarWithInheritance("displayColor"), 3, time, arrays),
+        "colors": colors,
         "opacity": _primvar(primvars.FindPrimvarWithInheritance("displayOpacity"), 1, time, arrays),
     }
 

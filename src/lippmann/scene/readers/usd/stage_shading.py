@@ -21,10 +21,13 @@ class MaterialTable:
     ----------
     records:
         One for each material; meshes refer to them by their place.
+    color_names:
+        The primvars of meshes that any of them takes its colour from, and the display colour.
     """
 
     def __init__(self, time: Usd.TimeCode, notes: dict[str, None]) -> None:
         self.records: list[Record] = []
+        self.color_names: dict[str, None] = {"displayColor": None}
         self._time, self._notes = time, notes
         self._known: dict[str, int] = {}
 
@@ -53,8 +56,10 @@ class MaterialTable:
             self._notes[f"material {name}: {what}: display colours are taken"] = None
             return None
         inputs = {each.GetBaseName(): self._source(each, _DEEPEST) for each in surface.GetInputs()}
-        given = {key: value for key, value in inputs.items() if value is not None}
-        return {"name": name, "inputs": as_preview(kind, given)}
+        given = as_preview(kind, {key: value for key, value in inputs.items() if value is not None})
+        if primvar := given.get("diffuseColor", {}).get("primvar"):
+            self.color_names[str(primvar)] = None
+        return {"name": name, "inputs": given}
 
     def _source(self, shader_input: UsdShade.Input, depth: int) -> Record | None:
         """The source of an input: a ``value``, a ``texture`` or a ``primvar``; None where nothing does."""

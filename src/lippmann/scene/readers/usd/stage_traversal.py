@@ -148,17 +148,18 @@ class Traversal:
             place = self._world(skin.skeleton)
         material = self._materials.bound(prim)
         own = prim.GetPrimInPrototype() if prim.IsInstanceProxy() and skin is None else prim
-        color = inherited_color(prim)
-        key = (own.GetPath(), material, str(color))
+        inherited = {name: inherited_color(prim, name) for name in self._materials.color_names}
+        colors = {name: color for name, color in inherited.items() if color is not None}
+        key = (own.GetPath(), material, str(colors))
         worlds = base @ place
         self._count(len(worlds))
         if key not in self._meshes:
             if kind in THIN:
-                record = thin_record(prim, self._time, self._arrays)
+                record = thin_record(prim, self._time, self._arrays, self._materials)
             elif prim.IsA(UsdGeom.Mesh):
                 record = mesh_record(UsdGeom.Mesh(prim), self._time, self._arrays, self._materials, skin)
             else:
-                record = primitive_record(prim, self._time, self._arrays)
+                record = primitive_record(prim, self._time, self._arrays, self._materials)
             self._meshes[key] = {**record, "name": str(prim.GetPath()), "material": material}
         self._worlds.setdefault(key, []).append(worlds)
 
@@ -200,12 +201,12 @@ class Traversal:
             raise StageError(f"places more than {_MOST_COPIES} copies of meshes", rule="so many may be placed")
 
 
-def inherited_color(prim: Usd.Prim) -> Any:
-    """The ``displayColor`` that a prim inherits, which copies of a prototype may have their own of; or None."""
+def inherited_color(prim: Usd.Prim, name: str) -> Any:
+    """The primvar that a prim inherits, such as the display colour of a prototype's copy; None for its own or none."""
     primvars = UsdGeom.PrimvarsAPI(prim)
-    if primvars.HasPrimvar("displayColor"):
+    if primvars.HasPrimvar(name):
         return None
-    inherited = primvars.FindPrimvarWithInheritance("displayColor")
+    inherited = primvars.FindPrimvarWithInheritance(name)
     return inherited.Get() if inherited else None
 
 
