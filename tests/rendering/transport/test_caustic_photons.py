@@ -397,3 +397,14 @@ def test_radius_holds_the_neighbours_asked_for_and_loads_no_search_tree(monkeypa
     for name in [name for name in sys.modules if name.startswith("scipy.spatial")]:
         monkeypatch.setitem(sys.modules, name, None)  # takes longer to load than the photons to shoot
     assert _radius(photons, 16.2) == pytest.approx(np.median(distances), rel=0.05)
+
+
+@pytest.mark.parametrize(("count", "radius"), [(0, 1), (1, 1), (2, 5), (3, 5)])
+def test_the_radius_of_few_photons(count, radius):
+    """The pilot's photons may be seen where those of the first pass all miss."""
+    from lippmann.rendering.transport.caustic_photons import _radius
+    from lippmann.rendering.transport.photon_map import Photons
+
+    photons = Photons.dark(count)
+    photons.position[:] = np.array([[0, 0, 0], [3, 4, 0], [0, 0, 5]], np.float32)[:count]
+    assert _radius(photons, 16) == pytest.approx(radius)

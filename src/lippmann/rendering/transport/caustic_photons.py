@@ -132,10 +132,10 @@ def radius_of_pass(number: int) -> float:
 
 
 def _radius(photons: Photons, neighbours: float) -> float:
-    """Median distance of photons to their neighbour number ``neighbours``."""
+    """Median distance of photons to their neighbour number ``neighbours``; 1 where there are no two."""
     number = int(min(max(2, round(neighbours)), max(2, len(photons) // 2)))
-    if len(photons) < 3:
-        return float(np.ptp(photons.position, axis=0).max()) or 1.0
+    if len(photons) < 2:
+        return 1.0
     # Axis by axis: a product of matrices would round by how many threads share it.
     axes = np.ascontiguousarray(photons.position.T)
     distances = []
