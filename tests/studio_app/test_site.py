@@ -36,6 +36,7 @@ from lippmann.studio_app import site as studio_site
 from lippmann.studio_app.live_socket import LiveSocket
 from lippmann.studio_app.page_values import state_of_values, values_of_state
 from lippmann.studio_app.pages import static_files
+from lippmann.studio_app.render_jobs import command_of
 from lippmann.studio_app.session import StudioSession
 from lippmann.studio_app.state import FILES, StudioState
 from lippmann.studio_app.state_toml import state_of_text
@@ -431,6 +432,28 @@ def test_the_command_line_may_read_what_the_studio_may(tmp_path):
         session = StudioSession(state, uploads=None, outputs=tmp_path, make_renderer=StandIn, allow_outside=allowed)
         assert ("--allow-outside" in session.command(state)) == allowed
         session.close()
+
+
+def test_of_an_eye_tracked_monitor_commands_make_stereo_pairs(tmp_path, monkeypatch):
+    """They were those of native pixels, which such monitors do not take."""
+    state = StudioState(display="odyssey-3d", subpixels=True)
+    session = StudioSession(state, uploads=None, outputs=tmp_path, make_renderer=StandIn)
+    begun = []
+    monkeypatch.setattr(session.jobs, "start", lambda *given: begun.append(given))
+    words = session.command(state)
+    assert words[:6] == ["lippmann", "quilt", "render", "teapot", "--display", "odyssey-3d"]
+    assert "--subpixels" not in words
+    for kind in ("picture", "quilt", "turntable"):
+        session.render(kind, state)
+    assert [(kind, ending) for kind, _, _, ending in begun] == [
+        ("quilt", "_half_2x1.png"),
+        ("quilt", "_half_2x1.png"),
+        ("turntable", "_half_2x1.mp4"),
+    ]
+    film = command_of("turntable", words, tmp_path / "turn_half_2x1.mp4")
+    assert film[:3] == ("lippmann", "quilt", "render")
+    assert film.count("render") == 1
+    session.close()
 
 
 def test_what_is_dropped_twice_is_kept_once(tmp_path):

@@ -35,6 +35,8 @@ Shows = Literal["picture", "image", "film"]
 Phase = Literal["running", "done", "failed", "cancelled"]
 
 KINDS: tuple[Kind, ...] = ("picture", "quilt", "turntable", "print")
+#: The command that makes quilts and stereo pairs.
+QUILT_RENDER = ("lippmann", "quilt", "render")
 
 #: Frames of a turntable; a loop of two seconds.
 TURNTABLE_FRAMES = 48
@@ -44,7 +46,7 @@ PRINT_MARGIN = "10mm"
 #: Seconds that a cancelled render is given to end by itself.
 PATIENCE = 5.0
 
-_ENDINGS: dict[Kind, str] = {"picture": ".png", "quilt": ".png", "turntable": ".mp4", "print": ".tif"}
+ENDINGS: dict[Kind, str] = {"picture": ".png", "quilt": ".png", "turntable": ".mp4", "print": ".tif"}
 
 _SHOWS: dict[Kind, Shows] = {"picture": "picture", "quilt": "image", "turntable": "film", "print": "picture"}
 
@@ -137,13 +139,14 @@ def command_of(kind: Kind, words: list[str], output: Path) -> tuple[str, ...]:
     kind:
         What to make.
     words:
-        ``lippmann render`` of the state, with all its options.
+        ``lippmann render`` of the state, with all its options; of an eye-tracked monitor ``lippmann quilt render``.
     output:
         A new file.
     """
-    head, options = words[:2], _without(words[2:], ("-o", "--output"), has_value=True)
+    count = words.index("render") + 1
+    head, options = words[:count], _without(words[count:], ("-o", "--output"), has_value=True)
     if kind == "quilt":
-        return ("lippmann", "quilt", "render", *_of_quilts(options), "-o", str(output))
+        return (*QUILT_RENDER, *of_quilts(options), "-o", str(output))
     if kind == "turntable":
         frames = frames_of(output)
         film = ("--turntable", str(TURNTABLE_FRAMES), "--video", str(output), "--resume")
@@ -153,7 +156,7 @@ def command_of(kind: Kind, words: list[str], output: Path) -> tuple[str, ...]:
     return (*head, *options, "--resume", "-o", str(output))
 
 
-def _of_quilts(words: list[str]) -> list[str]:
+def of_quilts(words: list[str]) -> list[str]:
     """Options of a picture without those that a quilt has not."""
     for each, its in options_of(QualityOptions):
         if each.name in LEFT_OUT["quilt"]:
@@ -213,7 +216,7 @@ class JobRunner:
         """
         with self._lock:
             self._check_idle()
-            claim = claim_output(self._folder, stem, ending or _ENDINGS[kind])
+            claim = claim_output(self._folder, stem, ending or ENDINGS[kind])
             self._release_claim()
             self._claim = claim
             self._jobs.append(

@@ -19,7 +19,7 @@ from lippmann.scene.volumes.presets import PRESETS
 from lippmann.studio_app.command_line import render_command
 from lippmann.studio_app.dropped_scene import ENVIRONMENTS
 from lippmann.studio_app.page_values import title_of
-from lippmann.studio_app.render_jobs import Job, JobRunner, Kind
+from lippmann.studio_app.render_jobs import ENDINGS, QUILT_RENDER, Job, JobRunner, Kind, of_quilts
 from lippmann.studio_app.render_thread import Renderer, RenderThread, ViewRequest, Watcher
 from lippmann.studio_app.state import FILES, PLACED_BY, StudioState
 from lippmann.studio_app.state_toml import state_of_text
@@ -197,10 +197,13 @@ class StudioSession:
         self.check_has_file(state, "a render from the page")
         words = self._render_command(state)
         ending: str | None = None
-        if kind == "quilt":
+        is_pair = self.display(state).stereo is not None
+        if is_pair and kind == "picture":
+            kind = "quilt"
+        if kind == "quilt" or (is_pair and kind == "turntable"):
             from lippmann.quilts.quilt import quilt_of_display
 
-            ending = f"{quilt_of_display(self.display(state), None, None).ending}.png"
+            ending = f"{quilt_of_display(self.display(state), None, None).ending}{ENDINGS[kind]}"
         elif kind == "print" and not _is_print(self.display(state)):
             raise UsageError(f"{self.display(state).name} is no print", fix="choose a print, or render a picture")
         display = state.display if state.display in self._presets else self.display(state).name
@@ -228,7 +231,8 @@ class StudioSession:
         self.thread.close()
 
     def _render_command(self, state: StudioState) -> list[str]:
-        return render_command(state, allow_outside=self._allow_outside)
+        words = render_command(state, allow_outside=self._allow_outside)
+        return words if self.display(state).stereo is None else [*QUILT_RENDER, *of_quilts(words[2:])]
 
     def _held_scene(self, state: StudioState) -> Scene | None:
         return self._held if state.scene == self._held_name else None
