@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from lippmann.display import NUMPY
+from lippmann.display import NUMPY, load_display
 from lippmann.errors import PictureError, UsageError
 from lippmann.exchange.cameras import Cameras
 from lippmann.image.views import view_grid
@@ -46,6 +47,18 @@ def test_disparity_is_how_far_a_point_moves_from_view_to_view(random_displays, d
                 expected[1], first[1] = 0.0, moved[1]  # one row of cameras; rows of a sheet are pixels of another size
             np.testing.assert_allclose(first - moved, expected, atol=2e-5)
     assert (disparity > 0) == (z > 0) or disparity == 0
+
+
+def test_the_grid_s_centre_follows_lenses_that_stand_beside_their_pixels():
+    display = replace(load_display("mla-square").resized(30, 30), viewing_distance=400.0)
+    pixel, pitch = display.panel.pixel_pitch, display.lens_array.pitch / (1 + display.gap / 400.0)
+    lenses = replace(display.lens_array, pitch=pitch, offset=(0.3 * pixel, -0.2 * pixel))
+    display = replace(display, lens_array=lenses)
+    places = view_grid(display)
+    eyes = [eye_of_offset(display, right, down)[:2] for right in places.right for down in places.down]
+    center = Cameras.of_display(display).center
+    assert center == pytest.approx(np.mean(eyes, axis=0))
+    assert min(map(abs, center)) > 1
 
 
 @settings(deadline=None, max_examples=40)

@@ -38,6 +38,8 @@ def test_textures_vertices_and_emission_count():
     paint = np.full((4, 4), 0.25, np.float32)
     assert mean_reflectance(squares((grey(0.8), 1, paint))) == pytest.approx(0.2)
     assert mean_reflectance(squares((grey(0.0, emission=(2.0,) * 3), 1, None))) == pytest.approx(2.0)
+    glow = grey(0.0, emission=(2.0,) * 3, emission_texture=plain)
+    assert mean_reflectance(squares((glow, 1, None))) == pytest.approx(0.4)
 
 
 def test_no_surface_is_no_reflectance():

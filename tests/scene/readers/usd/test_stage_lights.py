@@ -40,14 +40,22 @@ def test_a_sphere_light(read):
     assert light.world_from_light[:3, 3].tolist() == [1, 2, 3]
 
 
+def test_a_scaled_sphere_is_larger_and_as_bright(read):
+    body = 'def SphereLight "bulb" {\nfloat inputs:intensity = 10\nfloat inputs:radius = 0.5\n'
+    body += 'float3 xformOp:scale = (4, 4, 4)\nuniform token[] xformOpOrder = ["xformOp:scale"]\n}'
+    (light,) = read(triangle() + body).lights
+    assert light.radius == pytest.approx(2)
+    assert light.color == pytest.approx((10 * math.pi * 4,) * 3)
+
+
 def test_a_shaped_light_is_a_spot(read):
     body = (
         'def SphereLight "spot" (prepend apiSchemas = ["ShapingAPI"]) {\nfloat inputs:shaping:cone:angle = 30\n'
-        "float inputs:shaping:cone:softness = 0.5\nbool treatAsPoint = true\n}"
+        "float inputs:shaping:cone:softness = 0.25\nbool treatAsPoint = true\n}"
     )
     (light,) = read(triangle() + body).lights
     assert (light.kind, light.radius) == ("spot", 0)
-    assert (math.degrees(light.outer_angle), math.degrees(light.inner_angle)) == pytest.approx((30, 15))
+    assert (math.degrees(light.outer_angle), math.degrees(light.inner_angle)) == pytest.approx((30, 22.5))
 
 
 SURFACES = {

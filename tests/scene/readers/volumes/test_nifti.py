@@ -49,7 +49,9 @@ def test_a_volume_that_does_not_say_how_the_patient_lies_says_what_is_assumed(tm
 def test_scale_of_values_and_units_of_length(tmp_path):
     import nibabel
 
-    image = nibabel.Nifti1Image(GRID, np.eye(4))
+    affine = np.eye(4)
+    affine[:3, 3] = 5, 6, 7
+    image = nibabel.Nifti1Image(GRID, affine)
     image.header.set_slope_inter(2.0, -1000.0)
     image.header.set_xyzt_units("micron")
     nibabel.save(image, tmp_path / "a.nii")
@@ -59,6 +61,7 @@ def test_scale_of_values_and_units_of_length(tmp_path):
     volume = volume_of(tmp_path / "a.nii")
     assert (volume.slope, volume.intercept) == (2.0, -1000.0)
     assert volume.spacing == pytest.approx([1e-3] * 3)
+    assert volume.world_from_voxel[:3, 3] == pytest.approx([-5e-3, 7e-3, 6e-3])
     data[112:116] = np.float32([-2.0]).tobytes()
     (tmp_path / "a.nii").write_bytes(data)
     volume = volume_of(tmp_path / "a.nii")
