@@ -32,6 +32,13 @@ def test_noise_alone_flickers_by_all_of_its_error():
 def test_pixels_that_were_not_traced_may_not_flicker_at_all():
     stated = with_flicker(ESTIMATE, 0.1)
     assert (stated["flicker_low"], stated["flicker_high"]) == (38.0, 56.0)
+    assert stated["flicker"] == with_flicker(ESTIMATE)["flicker"]
+
+
+def test_pixels_that_keep_their_code_do_not_flicker():
+    stated, whole = with_flicker(ESTIMATE, 0.1, stays=True), with_flicker(ESTIMATE)
+    assert stated["flicker"] == pytest.approx(whole["flicker"] + 10.0)
+    assert (stated["flicker_low"], stated["flicker_high"]) == (38.0, 56.0)
 
 
 @pytest.mark.parametrize("estimate", [None, {"psnr": 40.0}])

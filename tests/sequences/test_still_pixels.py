@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 import lippmann
 from lippmann.color.transfer import encode_srgb
 from lippmann.display import load_display
+from lippmann.display.panel import PixelWindow
 from lippmann.rendering.methods import SAMPLES_LAYER
 from lippmann.scene.matrices import scaling, translation
 from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
@@ -108,9 +110,39 @@ def test_neither_the_box_nor_its_shadow_leaves_a_ghost(frames, display):
         assert error(frames[number], reference) < 2 * error(own, reference)
 
 
+def test_their_flicker_is_that_of_the_others(frames):
+    first, after = (frames[number].provenance for number in (0, 3))
+    shift = after.estimate["flicker_high"] - after.estimate["flicker"]
+    # The samples of frames after a key frame are fewer, by which both figures of theirs lie lower.
+    assert after.estimate["flicker"] > first.estimate["flicker"] - 10 * np.log10(after.pixel_shares["traced"]) - 1.3
+    assert shift == pytest.approx(first.estimate["flicker_high"] - first.estimate["flicker"], abs=1.3)
+
+
 def test_a_frame_is_the_same_alone_and_after_others(frames, display):
     alone = dict(render_sequence(Sliding(), display, [5], **PATHS))[5]
     np.testing.assert_array_equal(alone.pixels, frames[5].pixels)
+
+
+def test_two_probes_that_change_leave_no_patch_but_an_even_change_is_found():
+    from lippmann.rendering.film.wavefront import Coverage
+    from lippmann.sequences.still_pixels import _find_still, _Picture
+
+    whole = Coverage(np.ones((64, 64, 1), np.float32), 6)
+    job = SimpleNamespace(
+        denoiser=SimpleNamespace(coverage=lambda: (whole, whole)),
+        session=SimpleNamespace(engine=SimpleNamespace(threads=1)),
+        source=SimpleNamespace(width=64),
+        sample_source=SimpleNamespace(width=64),
+    )
+    row, column = np.indices((64, 64))
+    probes = np.where(((row + 2 * column) % 4 == 0)[..., None], np.ones(3), np.nan)
+    key = _Picture(PixelWindow(0, 0, 64, 64), probes, np.zeros((64, 64)), probes)
+    few = probes.copy()
+    few[32, 32] = few[28, 30] = 0
+    assert _find_still(key, replace(key, probes=few), job).all()
+    is_still = _find_still(key, replace(key, probes=np.where(column[..., None] < 20, 0.9, 1) * probes), job)
+    assert not is_still[:, :18].any()
+    assert is_still[:, 29:].all()
 
 
 def test_surfaces_that_no_light_reaches_stay_as_they_are(display):

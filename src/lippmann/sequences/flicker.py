@@ -9,7 +9,7 @@ from typing import cast
 Figures = Mapping[str, object]
 
 
-def with_flicker(estimate: Figures | None, traced: float = 1.0) -> Figures | None:
+def with_flicker(estimate: Figures | None, traced: float = 1.0, *, stays: bool = False) -> Figures | None:
     """A frame's estimate, as its file holds it, with its flicker.
 
     Flicker is half the mean squared change of the error from one frame to the next, in dB, as
@@ -18,7 +18,8 @@ def with_flicker(estimate: Figures | None, traced: float = 1.0) -> Figures | Non
     Errors by chance are independent, as each frame has a seed of its own. What a denoiser gets wrong in both halves of
     a picture alike may stay from frame to frame, which does not flicker, or be new in each: half of it counts, and all
     and none of it are the ends of the interval. Pixels that take a key frame's light may not flicker at all, so that
-    the upper end counts those alone that were traced.
+    the upper end counts those alone that were traced. Behind a display at rest they keep their code, so that the
+    flicker itself counts the traced ones alone, too, with the mean error of all.
 
     Parameters
     ----------
@@ -26,6 +27,8 @@ def with_flicker(estimate: Figures | None, traced: float = 1.0) -> Figures | Non
         What :meth:`~lippmann.rendering.estimate.psnr.Estimate.to_dict` gives; None where nothing is known.
     traced:
         Share of the pixels that were traced.
+    stays:
+        Whether the others show what they showed in the frame before.
 
     Returns
     -------
@@ -36,8 +39,9 @@ def with_flicker(estimate: Figures | None, traced: float = 1.0) -> Figures | Non
     by_chance, psnr, low, high = (
         cast("float", estimate[name]) for name in ("by_chance", "psnr", "psnr_low", "psnr_high")
     )
-    middle = mean_psnr((by_chance, psnr))
-    most = max(by_chance, high) - 10 * math.log10(max(traced, 0.01))
+    fewer = -10 * math.log10(max(traced, 0.01))
+    middle = mean_psnr((by_chance, psnr)) + (fewer if stays else 0.0)
+    most = max(by_chance, high) + fewer
     return {**estimate, "flicker": round(middle, 2), "flicker_low": low, "flicker_high": round(most, 2)}
 
 

@@ -343,7 +343,8 @@ def render_frames(
     def render_key(key: Moment, own: RenderRequest, noise_of: int) -> Provenance:
         return trace(key, of_frame(own, noise_of), silent).provenance
 
-    keys = KeyFrames(display, moment, render_key, _shared_light(motion, where))
+    shared = _shared_light(motion, where)
+    keys = KeyFrames(display, moment, render_key, shared)
 
     def render(position: int, frame: int) -> Shown:
         now = moment(frame)
@@ -355,7 +356,8 @@ def render_frames(
         estimate = made.estimate if key is None or key.made.estimate is None else estimate_of_next(key.made.estimate)
         # Noise that stands still has no flicker that the frames' own errors would tell.
         if not request.fixed_noise:
-            estimate = with_flicker(estimate, made.pixel_shares.get("traced", 1.0))
+            stays = shared is not None and shared.keeps_noise
+            estimate = with_flicker(estimate, made.pixel_shares.get("traced", 1.0), stays=stays)
         return replace(image, provenance=replace(made, options={**made.options, "frame": frame}, estimate=estimate))
 
     for position, frame in enumerate(frames):

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _PIXELS_OF_PROBE = 4
 #: Pixels to either side whose probes are averaged.
 _REACH = 8
-#: Largest mean change of probes, as a share of the light of both.
+#: Largest mean change of probes, less its standard error, as a share of the light of both.
 _LARGEST_CHANGE = 0.02
 
 
@@ -185,7 +185,10 @@ def _find_still(key: _Picture, own: _Picture, job: Job) -> Mask:
     # Beside another surface light is taken to change, too.
     change = np.where(is_same, np.divide(change, light, out=np.zeros_like(light), where=is_lit), is_lit)
     bands = Bands(job.session.engine.threads)
-    change, lit, probed = (mean_around(part.astype(np.float32), _REACH, bands) for part in (change, is_lit, is_probed))
+    parts = change, np.square(change), is_lit, is_probed
+    change, squares, lit, probed = (mean_around(part.astype(np.float32), _REACH, bands) for part in parts)
+    # Less its standard error: a few long paths that meet what moves would leave patches of grain on clean surfaces.
+    change -= np.sqrt(squares) / (2 * _REACH + 1)
     # Where no probe finds light in either frame, such as on the outer side of a wall, there is none to change.
     is_agreed = (probed > 0) & (change <= _LARGEST_CHANGE * lit)
     is_still = is_same & (is_agreed | (_coverage_of(job) == 0))
