@@ -184,6 +184,12 @@ def test_values_are_typed_and_automatic_ones_are_given_back(page):
     quality.select_option("46")
     tab.wait_for(f"{COMMAND}.includes('--quality 46') && !{COMMAND}.includes('--effort')")
     quality.select_option("")
+    # An eye-tracked monitor takes no native pixels.
+    window = tab.page.get_by_role("button", name="On the display")
+    assert window.is_visible()
+    tab.page.get_by_label("Display", exact=True).select_option("odyssey-3d")
+    tab.wait_until(lambda: tab.evaluate(COMMAND).startswith("lippmann quilt render teapot --display odyssey-3d"))
+    tab.wait_until(window.is_hidden)
     tab.wait_for(f"!{COMMAND}.includes('--quality')")
     tab.page.get_by_label("Display", exact=True).select_option("mla-square")
     tab.wait_for(f"{STUDIO}.stage.optics.lenses.layout === 'square'")

@@ -83,6 +83,7 @@ class Studio {
     if (facts.optics !== null) this.stage.setOptics(facts.optics);
     this.panel.showFacts(facts);
     this.page.showCommand(facts.command, facts.title);
+    this.page.showNative(!facts.depth.strains);
     this.jobs.showSettings(facts.command);
   }
 

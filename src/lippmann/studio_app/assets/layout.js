@@ -15,6 +15,9 @@ export function buildPage(root, actions) {
   const title = h("span", { class: "title" }, "");
   const undo = button("↶", actions.undo, { class: "icon", "aria-label": "Undo", title: "Undo (Ctrl + Z)" });
   const redo = button("↷", actions.redo, { class: "icon", "aria-label": "Redo", title: "Redo (Ctrl + Y)" });
+  const onDisplay = button("On the display…", () => actions.openPanel(), {
+    title: "A window to put full screen on the display itself",
+  });
   const jobPlace = h("div", { class: "job-place" });
   const header = h(
     "header",
@@ -25,7 +28,7 @@ export function buildPage(root, actions) {
     button("Save state", actions.save),
     h("span", { class: "pair" }, undo, redo),
     h("span", { class: "space" }),
-    button("On the display…", () => actions.openPanel(), { title: "A window to put full screen on the display itself" }),
+    onDisplay,
     jobPlace,
   );
   const canvas = h("canvas", { tabindex: 0, role: "img", "aria-label": "What the display shows to the eye" });
@@ -122,6 +125,10 @@ export function buildPage(root, actions) {
       command.textContent = text;
       title.textContent = name;
       document.title = `${name} - Lippmann Studio`;
+    },
+    /** Offers the window of native pixels, but for displays that take none. */
+    showNative(isTaken) {
+      onDisplay.hidden = !isTaken;
     },
     showConnection(state) {
       document.body.dataset.connection = state;
