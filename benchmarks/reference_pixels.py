@@ -14,7 +14,7 @@ from lippmann.rendering.transport.ray_source import DisplayRays
 try:
     from lippmann.rendering.film.memory_model import cut_wavefronts
 except ImportError:  # of the earlier checkouts that defaults.py judges
-    from lippmann.rendering.film.memory_model import make_plan as cut_wavefronts
+    from lippmann.rendering.film.wavefront_plan import make_plan as cut_wavefronts
 
 
 class PixelRays:
