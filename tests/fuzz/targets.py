@@ -582,6 +582,7 @@ _READERS: dict[str, Target] = {
     "heif": Target(_with("pillow_heif", _scene("s.heic"))),
     "depth-map": Target(_depth_map),
     "molecule-pdb": Target(_with("gemmi", _scene("s.pdb"))),
+    "molecule-xyz": Target(_with("gemmi", _scene("s.xyz"))),
     "molecule-cif": Target(_with("gemmi", _scene("s.cif"))),
     "usd": Target(_with("pxr", _scene("s.usda"))),
     "usd-package": Target(_with("pxr", _scene("s.usdz"))),

@@ -63,6 +63,7 @@ PLANE RING TRI STRI BOX SCAPE VERTEXARRAY POLYCYLINDER EXTBOX SCALARVOL
     "vtk-vti": "VTKFile ImageData WholeExtent Spacing Origin Direction Piece DataArray Int64 Float32 ascii",
     "transfer-function": "points per mm percent shading nan inf #ff8000 [ ] true",
     "molecule-pdb": "ATOM HETATM ANISOU CONECT MODEL ENDMDL TER CRYST1 SCALE1 ORIGX1 END REMARK LINK NAN -999.999",
+    "molecule-xyz": 'Properties= "species:S:1:pos:R:3 :I:99 C 1 -1 nan 1e400',
     "molecule-cif": "data_ loop_ save_ _atom_site_fract_x _atom_site.Cartn_x _atom_site.type_symbol ? . ' \" ;",
     "usd": """
 def over class Mesh Xform PointInstancer Material Shader SkelRoot Skeleton SkelAnimation Sphere Cube Capsule DomeLight

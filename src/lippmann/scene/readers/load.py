@@ -103,7 +103,6 @@ _ELSEWHERE = {
     **dict.fromkeys((".las", ".laz", ".e57", ".pcd", ".pts", ".ptx", ".xyzrgb"), _CLOUD_COMPARE),
     ".txt": "save clouds of points as .ply, in CloudCompare for instance, COLMAP's by its model_converter",
     **dict.fromkeys((".mrc", ".map", ".ccp4"), "save it as .npy: numpy.save('a.npy', mrcfile.read('a.mrc'))"),
-    ".xyz": "save molecules as .pdb, by: obabel in.xyz -O out.pdb; clouds of points as .ply, in CloudCompare",
     **{kind: _OPEN_BABEL.format(kind) for kind in (".sdf", ".mol", ".mol2", ".cube", ".gro")},
     **dict.fromkeys((".bcif", ".mmtf"), "take the entry's .cif file from the data bank"),
     **dict.fromkeys((".bmp", ".avif"), "save photographs with depth as .png or .jpg"),

@@ -189,7 +189,7 @@ _OWN = {
     "vdb": Reader((".vdb",), f"{_HERE}.volumes.vdb:read_vdb", options=("series",), up="y"),
     "mitsuba-volume": Reader((".vol",), f"{_HERE}.volumes.mitsuba_grid:read_mitsuba_grid"),
     "molecules": Reader(
-        (".pdb", ".ent", ".cif", ".json", ".pdb.gz", ".ent.gz", ".cif.gz"),
+        (".pdb", ".ent", ".cif", ".xyz", ".json", ".pdb.gz", ".ent.gz", ".cif.gz"),
         f"{_HERE}.molecules.reader:read_molecule",
         {b'{"data_': ".json"},
     ),

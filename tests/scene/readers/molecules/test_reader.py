@@ -289,3 +289,40 @@ def test_damaged_molecules_end_in_a_scene_or_one_line(read):
             outcomes.add(f"refused in {len(str(error).splitlines())} line")
     assert outcomes <= {"read", "refused in 1 line"}
     assert "read" in outcomes
+
+
+FRAME = "3\nwater\nO 0 0 0\nH1 0.957 0 0\n1 -0.24 0.927 0 0.5 extra\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        FRAME,
+        "\ufeff 3 \r\n\r\n o 0 0 0\r\nh 0.957 0 0\r\nh -2.4e-1 0.927 0\r\n",
+        '3\nProperties="id:I:1:pos:R:3:species:S:1"\n9 0 0 0 O\n8 0.957 0 0 H\n7 -0.24 0.927 0 H\n',
+    ],
+)
+def test_xyz(read, text):
+    scene = read(text, "m.xyz")
+    assert places(scene, "balls of element 8").tolist() == [[0, 0, 0]]
+    assert places(scene, "balls of element 1").tolist() == [[0.957, 0, 0], [-0.24, 0.927, 0]]
+    assert scene.notes == ["3 atoms, 2 bonds by their distance"]
+
+
+def test_of_a_trajectory_the_first_moment_is_shown(read):
+    assert "several molecules or moments: the first is shown" in read(FRAME + FRAME, "m.xyz").notes
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("0 0 1\n0 1 0\n", "its first line is no number of atoms: save clouds of points as .ply"),
+        (FRAME[:-30], "it holds fewer than 3 atoms: is it cut short?"),
+        ("2\n\nO 0 0 0\nH 0 0\n", "it holds fewer than 2 atoms"),
+        ("1\n\nO 0 0 up\n", "could not convert string to float"),
+    ],
+)
+def test_what_is_no_xyz_file_of_molecules(read, text, line):
+    with pytest.raises(SceneError, match=r"^m\.xyz: is no molecule that is understood") as caught:
+        read(text, "m.xyz")
+    assert line in str(caught.value)

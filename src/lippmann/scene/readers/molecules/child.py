@@ -37,6 +37,8 @@ _IONS = {
     "BAR": "Ba",
     "CAD": "Cd",
 }
+#: Columns of extended XYZ, as ``species:S:1:pos:R:3``.
+_PROPERTIES = re.compile(r"\bProperties=\"?([^\s\"]+)", re.IGNORECASE)
 #: Columns 73 to 80 of a file's lines before 1996: the entry's code and the number of the line.
 _ENTRY = re.compile(rb"[0-9][0-9A-Z]{3}[ 0-9]{3}[0-9]")
 
@@ -59,6 +61,8 @@ def _atoms(path: str, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.f
     """Atomic numbers ``(n,)`` and positions ``(n, 3)``, angstroms, of the first model and first of alternatives."""
     if path.lower().endswith(_PDB):
         return _of_structure(gemmi.read_pdb(path, max_line_length=_columns(path)), notes)
+    if path.lower().endswith(".xyz"):
+        return _of_xyz(path, notes)
     if not path.lower().endswith((".cif", ".cif.gz")):
         return _of_structure(gemmi.read_structure(path), notes)
     document = gemmi.cif.read(path)
@@ -75,6 +79,36 @@ def _atoms(path: str, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.f
     if block.find_values(_PLACE_TAGS[2]):
         return _of_cartesian(block, notes)
     return _of_structure(gemmi.make_structure_from_chemcomp_block(block), notes)
+
+
+def _of_xyz(path: str, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Atoms of an XYZ file: their number, a line of text, then a symbol or number of an element and its place a line.
+
+    Extended files may say in the second line which columns hold these.
+    """
+    with open(path, encoding="utf-8-sig", errors="replace") as file:
+        first, comment = file.readline(), file.readline()
+        if not first.strip().isdecimal():
+            fix = "save clouds of points as .ply, in CloudCompare for instance"
+            raise ValueError(f"its first line is no number of atoms: {fix}")
+        count = int(first)
+        rows = [line.split() for line in itertools.islice(file, min(count, MOST_ATOMS + 1))]
+        if any(line.strip().isdecimal() for line in file):
+            notes.append("several molecules or moments: the first is shown")
+    at = {"species": 0, "pos": 1}
+    if columns := _PROPERTIES.search(comment):
+        fields = columns[1].split(":")
+        widths = [int(width) for width in fields[2::3]]
+        at |= dict(zip(fields[::3], itertools.accumulate(widths, initial=0), strict=False))
+    if len(rows) < min(count, MOST_ATOMS + 1) or any(len(row) < at["pos"] + 3 for row in rows):
+        raise ValueError(f"it holds fewer than {count} atoms: is it cut short?")
+    names = [row[at["species"]] for row in rows]
+    elements = [
+        gemmi.Element(int(name) if name.isdecimal() else "".join(itertools.takewhile(str.isalpha, name)))
+        for name in names
+    ]
+    places = [gemmi.Position(*(float(word) for word in row[at["pos"] : at["pos"] + 3])) for row in rows]
+    return _arrays(elements, places)
 
 
 def _columns(path: str) -> int:
