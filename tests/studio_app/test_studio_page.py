@@ -190,6 +190,10 @@ def test_values_are_typed_and_automatic_ones_are_given_back(page):
     tab.page.get_by_label("Display", exact=True).select_option("odyssey-3d")
     tab.wait_until(lambda: tab.evaluate(COMMAND).startswith("lippmann quilt render teapot --display odyssey-3d"))
     tab.wait_until(window.is_hidden)
+    # The two views meet before its middle: the left eye sees one of them.
+    tab.wait_until(lambda: tab.evaluate(f"{STUDIO}.stage.eye.x") == -31.5)
+    tab.page.keyboard.press("Home")
+    assert tab.evaluate(f"{STUDIO}.stage.eye.x") == -31.5
     tab.wait_for(f"!{COMMAND}.includes('--quality')")
     tab.page.get_by_label("Display", exact=True).select_option("mla-square")
     tab.wait_for(f"{STUDIO}.stage.optics.lenses.layout === 'square'")

@@ -32,11 +32,11 @@ export class Stage {
     new ResizeObserver(() => this.#layOut()).observe(root);
   }
 
-  /** Takes over the geometry of a display; the eye goes to the middle if the distance is another. */
+  /** Takes over the geometry of a display; the eye goes to its place before it if that is another. */
   setOptics(optics) {
-    const isFirst = this.optics === null || this.optics.eye[2] !== optics.eye[2];
+    const isFirst = this.optics === null || String(this.optics.eye) !== String(optics.eye);
     this.optics = optics;
-    if (isFirst) this.eye = { x: 0, y: 0, z: optics.eye[2] };
+    if (isFirst) this.eye = placeOf(optics);
     this.corner = { x: 0, y: 0 };
     this.#layOut();
     this.onmode();
@@ -80,7 +80,7 @@ export class Stage {
   center() {
     if (this.optics === null) return;
     this.setSwaying(false);
-    this.#setEye({ x: 0, y: 0, z: this.optics.eye[2] });
+    this.#setEye(placeOf(this.optics));
   }
 
   setSwaying(isOn) {
@@ -225,4 +225,9 @@ export class Stage {
       createImageBitmap(this.#picture).then((bitmap) => this.#context.drawImage(bitmap, 0, 0, width, height));
     } else this.#context.drawImage(this.#picture, 0, 0, width, height);
   }
+}
+
+/** Where the eye is at first: the middle of the viewing zone; of an eye-tracked monitor, whose two views meet there, the left eye. */
+function placeOf({ eye: [x, y, z] }) {
+  return { x, y, z };
 }
