@@ -31,8 +31,8 @@ from lippmann.sequences.key_light import KeyLight
 FRAMES_OF_KEY = 4
 #: Every so many frames one has half-buffers where light is passed on.
 FRAMES_OF_LIGHT = 16
-#: Samples of a frame after a key frame, as a share of the key frame's.
-_SHARE = 0.75
+#: Samples of a frame after a key frame, as a share of the key frame's. ``docs/research/films.md`` has all and half.
+_SAMPLES_KEPT = 0.75
 
 
 class Key(NamedTuple):
@@ -79,7 +79,7 @@ class KeyFrames:
             assert self._last is not None
             of_key = f"the estimate of the error follows from frame {key.moment.number}'s"
             told = f"{of_key}, with three quarters of its samples"
-            samples = math.ceil(_SHARE * key.made.spp)
+            samples = math.ceil(_SAMPLES_KEPT * key.made.spp)
             own = replace(request, spp=samples, judged_by=told, keep_light=self._light.of_next)
             if self._shared is None or not self._shared.holds(self._last[0], moment):
                 return own
@@ -142,7 +142,7 @@ def estimate_of_next(key: Figures) -> Figures:
     average (``docs/background/measurements.md``: 2.4 dB for four times as many), and at most in proportion to it: that
     are the lower ends. The upper ends are the key frame's, as the frame is denoised as a whole.
     """
-    most = -10 * math.log10(_SHARE)
+    most = -10 * math.log10(_SAMPLES_KEPT)
     less = {"psnr": most / 2, "worst": most / 2, "by_chance": most / 2, "psnr_low": most, "worst_low": most}
     return {name: round(cast("float", value) - less[name], 2) if name in less else value for name, value in key.items()}
 

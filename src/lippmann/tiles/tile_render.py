@@ -99,7 +99,7 @@ def prepare(job: TileJob, progress: ProgressCallback = silent) -> Prepared:
 
 
 def render_tile(prepared: Prepared, index: int) -> TileResult:
-    """One tile, ready to be kept: the same whenever, wherever and beside whatever it is rendered."""
+    """One tile, ready to be kept: the same whenever, wherever and beside which others it is rendered."""
     return pack(prepared, trace_tile(prepared, index))
 
 

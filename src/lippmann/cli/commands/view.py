@@ -201,7 +201,7 @@ def serve(
 
 
 def open_file(path: Path) -> None:
-    """Show a film in whatever the desktop shows such files with."""
+    """Show a film in the program that the desktop opens such files with."""
     import webbrowser
 
     if has_screen():

@@ -188,6 +188,7 @@ def test_missing_and_doubled_slices_are_told(tmp_path):
     scene = load_scene(tmp_path / "ct")
     assert "1 slice is missing: between 6 and 12 mm; 6 are interpolated from 5" in scene.notes
     assert scene.description.volume.grid[:, 1, 0].tolist() == [0, 30, 60, 90, 120, 150]
+    assert scene.description.volume.spacing[2] == pytest.approx(3)
     save_slice(tmp_path / "ct" / "again", np.full((4, 5), 500), ImagePositionPatient=[-7, -9, 6], InstanceNumber=99)
     scene = load_scene(tmp_path / "ct")
     assert "1 slices lie where others lie, and are left out" in scene.notes

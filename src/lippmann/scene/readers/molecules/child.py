@@ -147,7 +147,7 @@ def _of_structure(structure: gemmi.Structure, notes: list[str]) -> tuple[NDArray
 def _first_residues(chain: gemmi.Chain) -> Iterator[gemmi.Residue]:
     """Residues but for the alternatives to one at the same place of the sequence, whose atoms say that they are such.
 
-    Gemmi's own ``first_conformer()`` leaves out whatever shares a number: ligands, and waters of simulations.
+    Gemmi's own ``first_conformer()`` leaves out all residues that share a number: ligands, and waters of simulations.
     """
     first = None
     for residue in chain:
