@@ -161,8 +161,7 @@ def _chain(
         states, throughput, depth, continues, *rest = _leave(integrator, vertex, at_first, state)
         light, shadow, crossings, o, d, last, all_specular = rest
         active = continues & (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
-        # Coherent: neighbours mirror much the same.
-        pi = scene.ray_intersect_preliminary(mi.Ray3f(o, d), coherent=True, active=active)
+        pi = scene.ray_intersect_preliminary(mi.Ray3f(o, d), coherent=False, active=active)
         rays += dr.select(active, mi.UInt32(1), mi.UInt32(0))
         # A chain that leaves the scene counts as sky, but not before its first event.
         active &= _may_show_light(pi) | (integrator.has_surroundings & ~pi.is_valid() & (depth > 0))
