@@ -171,9 +171,10 @@ class PhysicalSurfaces:
             si = pi.compute_surface_interaction(toward, mi.RayFlags.All)
             hit = si.is_valid()
             bsdf = si.bsdf(toward)
-            emission = si.emitter(self._scene).eval(si)
+            shows_backdrop = (steps == 0) & ~hit & mi.Bool(self._background is not None)
+            emission = si.emitter(self._scene).eval(si, active & ~shows_backdrop)
             if dr.hint(self._background is not None, mode="scalar"):
-                emission = dr.select((steps == 0) & ~hit, mi.Color3f(self._background), emission)
+                emission = dr.select(shows_backdrop, mi.Color3f(self._background), emission)
             # In a branch, so that the processor skips it for a vector of lanes that have met rough surfaces alone.
             lobe, weight, wo = mi.UInt32(0), mi.Color3f(0), mi.Vector3f(0)
             if hit & (_has_specular_lobe(bsdf.flags()) | ~_has_reflectance(bsdf)):
