@@ -155,6 +155,35 @@ def test_mesh_without_coordinates_takes_the_first_texel_and_says_so(build, look,
     assert "'wood'" in built.notes[0]
 
 
+def test_channels_of_a_picture_are_looked_up_together(engine, texels):
+    import mitsuba as mi
+
+    from lippmann.device.pbr.textures import Place, TextureStore
+
+    class Counted:
+        def __init__(self, texture):
+            self.texture, self.lookups = texture, 0
+
+        def eval_3(self, si, active):
+            self.lookups += 1
+            return self.texture.eval_3(si, active)
+
+    turned = Texture(Image("t", texels), srgb=False, uv_transform=((0, 1, 0), (1, 0, 0), (0, 0, 1)))
+    store = TextureStore()
+    signals = [store.channel([turned], channel, np.array([factor]), {}) for channel, factor in ((1, 1.0), (2, 0.5))]
+    counted = Counted(signals[0].lookup.texture)
+    for signal in signals:
+        assert signal.lookup.texture is counted.texture
+        signal.lookup.texture = counted
+    si = mi.SurfaceInteraction3f()
+    si.uv = mi.Point2f(0.5 / 3, 0.5 / 4)  # of the transposed picture
+    place = Place(si, mi.Bool(True))
+    values = [signal.eval(place)[0] for signal in signals]
+    row = texels[[0, -1], 0].astype(float) / 255  # the first row of v may be either
+    assert min(np.abs(values - expected[1:] * (1.0, 0.5)).max() for expected in row) < 1e-6
+    assert counted.lookups == 1
+
+
 def test_picture_is_uploaded_once(engine, texels):
     from lippmann.device.pbr.materials import Variant, make_finishes
     from lippmann.device.pbr.textures import TextureStore

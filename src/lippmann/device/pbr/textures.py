@@ -52,10 +52,10 @@ class Place:
         """Number in the family (UInt32)."""
         import mitsuba as mi
 
-        if MEMBER_ATTRIBUTE not in self._cache:
-            number = self.si.shape.eval_attribute_1(MEMBER_ATTRIBUTE, self.si, self.active)
-            self._cache[MEMBER_ATTRIBUTE] = mi.UInt32(number + 0.5)
-        return self._cache[MEMBER_ATTRIBUTE]
+        return self.once(
+            MEMBER_ATTRIBUTE,
+            lambda: mi.UInt32(self.si.shape.eval_attribute_1(MEMBER_ATTRIBUTE, self.si, self.active) + 0.5),
+        )
 
     @property
     def color(self) -> Color3f:
@@ -84,10 +84,14 @@ class Place:
 
         if attribute is None:
             return self.si.uv
-        if attribute not in self._cache:
-            carried = self.si.shape.eval_attribute_3(attribute, self.si, self.active)
-            self._cache[attribute] = mi.Point2f(carried.x, carried.y)
-        return self._cache[attribute]
+        carried = self.once(attribute, lambda: self.si.shape.eval_attribute_3(attribute, self.si, self.active))
+        return mi.Point2f(carried.x, carried.y)
+
+    def once(self, key: str, look_up: Callable[[], Array]) -> Array:
+        """What ``look_up`` returns, which is called for the first of all that ask for ``key``."""
+        if key not in self._cache:
+            self._cache[key] = look_up()
+        return self._cache[key]
 
 
 # The classes below are dataclasses so that Dr.Jit finds the arrays in them when it records or freezes a function.
@@ -166,15 +170,25 @@ def _fold(x: Float, wrap: Wrap, texels: Float) -> Float:
 
 @dataclass(eq=False)
 class Bitmap:
-    """One picture for all: Mitsuba's own texture, which repeats where the wrap modes of the axes differ."""
+    """One picture for all: Mitsuba's own texture, which repeats where the wrap modes of the axes differ.
+
+    ``channel`` is the one of a texture of three channels that is shown, such as the roughness beside the metalness;
+    None for all of the texture.
+    """
 
     texture: MitsubaTexture
     channels: int
     sampler: Sampler
     size: tuple[int, int]
+    channel: int | None = None
 
     def eval(self, place: Place) -> FloatOrColor:
-        """``Color3f`` or ``Float``, by the number of channels."""
+        """``Color3f`` or ``Float``, by the number of channels shown."""
+        if self.channel is None:
+            return self._look_up(place)
+        return place.once(f"{id(self.texture)} {id(self.sampler)}", lambda: self._look_up(place))[self.channel]
+
+    def _look_up(self, place: Place) -> FloatOrColor:
         import mitsuba as mi
 
         si, sampler = place.si, self.sampler
@@ -287,6 +301,7 @@ class TextureStore:
 
     def __init__(self) -> None:
         self._bitmaps: dict[tuple[object, ...], MitsubaTexture] = {}
+        self._samplers: dict[tuple[object, ...], Sampler] = {}
         self._tables: dict[str, MitsubaTexture] = {}
         self._constants: dict[tuple[object, ...], NDArray[np.float64] | None] = {}
         self._images: dict[int, Image] = {}  # keeps them alive, so that their ids stay theirs
@@ -359,17 +374,21 @@ class TextureStore:
         )
         if all(texture is first for texture in given) or len({texture_key(texture) for texture in given}) == 1:
             sampler.transform = None if sampler.transform is None else tuple(numbers([x]) for x in matrices[0])
-            return self._bitmap(first, channels, sampler)
+            # One for all lookups of a texture, which are then one.
+            key = (texture_key(first), sampler.attribute)
+            return self._bitmap(first, channels, self._samplers.setdefault(key, sampler))
         return self._pooled_bitmap(given, channels, sampler)
 
     def _bitmap(self, texture: Texture, channels: tuple[int, ...], sampler: Sampler) -> Bitmap:
         wrap = texture.wrap_u if texture.wrap_u == texture.wrap_v else "repeat"
-        coded = _is_coded(texture, channels)
+        coded, pixels = _is_coded(texture, channels), texture.image.pixels
+        (height, width, depth), channel = pixels.shape, None
+        if len(channels) == 1 and channels[0] < 3 <= depth and pixels.dtype == np.uint8:
+            channel, channels = channels[0], (0, 1, 2)
         key = (self._identity(texture.image), channels, coded, texture.filter, wrap)
         if key not in self._bitmaps:
             self._bitmaps[key] = _upload(_channels_of(texture.image, channels), coded, texture.filter, wrap)
-        height, width = texture.image.pixels.shape[:2]
-        return Bitmap(self._bitmaps[key], len(channels), sampler, (width, height))
+        return Bitmap(self._bitmaps[key], len(channels), sampler, (width, height), channel)
 
     def _pooled_bitmap(self, textures: Sequence[Texture], channels: tuple[int, ...], sampler: Sampler) -> PooledBitmap:
         import mitsuba as mi
