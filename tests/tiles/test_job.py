@@ -27,11 +27,11 @@ def job(scene="small-balls", display=DISPLAY, settings=SETTINGS, stored="float32
 
 
 def rendered(made, order=None):
-    from lippmann.tiles.tile_render import prepare, render_tile
+    from lippmann.tiles.tile_render import pack, prepare, trace_tile
 
     prepared = prepare(made)
     indices = range(len(made.grid)) if order is None else order
-    return {index: render_tile(prepared, index) for index in indices}
+    return {index: pack(prepared, trace_tile(prepared, index)) for index in indices}
 
 
 @pytest.mark.slow

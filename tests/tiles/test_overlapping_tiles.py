@@ -126,13 +126,13 @@ def test_neither_threads_nor_order_matter(engine):
     sys.path.insert(0, sys.argv[3])
     from dataclasses import replace
     import test_overlapping_tiles as t
-    from lippmann.tiles.tile_render import prepare, render_tile
+    from lippmann.tiles.tile_render import pack, prepare, trace_tile
     from lippmann.journal import encode
     threads, backwards = int(sys.argv[1]), sys.argv[2] == "backwards"
     for way in t.WAYS:
         prepared = prepare(t.job(replace(way.values[0], threads=threads)))
         order = range(3, -1, -1) if backwards else range(4)
-        tiles = {index: encode(render_tile(prepared, index)) for index in order}
+        tiles = {index: encode(pack(prepared, trace_tile(prepared, index))) for index in order}
         print(way.id, hashlib.sha256(b"".join(tiles[index] for index in range(4))).hexdigest())
     """
     folder = str(__file__).rpartition("/")[0]

@@ -135,12 +135,12 @@ def test_an_interrupted_run_gives_the_same_file(render, unbroken, tmp_path, stop
 
 
 def test_the_order_of_tiles_and_threads_of_a_runner_do_not_matter(render, unbroken, tmp_path):
-    from lippmann.tiles.tile_render import render_tile
+    from lippmann.tiles.tile_render import pack, trace_tile
 
     def backwards(prepared, missing, put):
         with ThreadPoolExecutor(3) as pool:
             for index in reversed(missing):
-                pool.submit(put, render_tile(prepared, index)).result()
+                pool.submit(put, pack(prepared, trace_tile(prepared, index))).result()
 
     render(tmp_path / "a.tif", runner=backwards)
     assert (tmp_path / "a.tif").read_bytes() == unbroken

@@ -98,14 +98,9 @@ def prepare(job: TileJob, progress: ProgressCallback = silent) -> Prepared:
     return Prepared(job, quiet, placement, why_no_estimate(request), integrator, source)
 
 
-def render_tile(prepared: Prepared, index: int) -> TileResult:
-    """One tile, ready to be kept: the same whenever, wherever and beside which others it is rendered."""
-    return pack(prepared, trace_tile(prepared, index))
-
-
 @exclusive()
 def trace_tile(prepared: Prepared, index: int) -> TracedTile:
-    """The part of :func:`render_tile` that the engine does."""
+    """The part of rendering a tile that the engine does: the same beside whichever others, whenever and wherever."""
     job, request, engine = prepared.job, prepared.job.request, prepared.session.engine
     # Another thread may have rendered on another device since the last tile.
     engines.start(engine.device, engine.threads)
@@ -164,7 +159,7 @@ def _trace_window(prepared: Prepared, index: int) -> TracedTile:
 
 
 def pack(prepared: Prepared, traced: TracedTile) -> TileResult:
-    """The part of :func:`render_tile` that needs no engine: values as the file holds them, errors as sums."""
+    """The part of rendering a tile that needs no engine: values as the file holds them, errors as sums."""
     job = prepared.job
     sums, maps = {}, {}
     if traced.errors is not None:
