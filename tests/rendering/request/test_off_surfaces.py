@@ -60,7 +60,11 @@ def test_surfaces_beside_splats_have_noise():
         (ALONE, {"exposure": 1.0}, "exposure: 1; must be 0"),
         (ALONE, {"clamp_indirect": 1.0}, "alone: clamp_indirect: it has no indirect light"),
         (UNLIT, {"clamp_indirect": 1.0}, "unlit: clamp_indirect: it has no indirect light"),
-        (UNLIT, {"caustics": "photons"}, "unlit: caustics: photons of no emitter land on it"),
+        (UNLIT, {"caustics": "photons"}, "unlit: caustics: no light makes any on it"),
+        (UNLIT, {"caustics": "none"}, "unlit: caustics: no light makes any on it"),
+        (ALONE, {"caustics": "paths"}, "alone: caustics: no light makes any on it"),
+        (ALONE, {"depth": 3}, "alone: depth: 3: no path goes on from it"),
+        (UNLIT, {"depth": 3}, "unlit: depth: 3: no path goes on from it"),
     ],
 )
 def test_what_splats_do_not_have_is_refused(description, options, said):
@@ -70,3 +74,10 @@ def test_what_splats_do_not_have_is_refused(description, options, said):
 
 def test_surfaces_beside_splats_have_indirect_light():
     assert resolved(BOTH, clamp_indirect=1.0).clamp_indirect == 1.0
+
+
+def test_a_plan_of_such_a_scene_may_be_planned_again():
+    planned = resolved(UNLIT)
+    assert resolve(planned, load_scene(UNLIT)).depth == planned.depth
+    planned = resolved(ALONE)
+    assert resolve(planned, load_scene(ALONE)).caustics == "paths"

@@ -490,3 +490,8 @@ def test_light_that_changes_nothing_in_a_photograph_is_said(tmp_path):
         "a photograph keeps its own colours, whatever light is given: single_scattering, light_strength"
     )
     assert "whatever light" not in "".join(load_scene(tmp_path / "a.png").notes)
+    assert (
+        load_scene(tmp_path / "a.png", background=(1.0, 1.0, 1.0))
+        .notes[-1]
+        .startswith("background: seen beyond the photograph's edge alone")
+    )

@@ -364,9 +364,5 @@ def _caustics(facts: _Facts) -> Choice[Caustics]:
 
 
 def _no_light(integrator: Integrator, parameter: str) -> UsageError:
-    return UsageError(
-        f"the values of {integrator} are no amounts of light",
-        parameter=parameter,
-        rule=f"it is for {' and '.join(POOLED_LIGHT)}",
-        fix="leave it out",
-    )
+    what, rule = f"the values of {integrator} are no amounts of light", f"it is for {' and '.join(POOLED_LIGHT)}"
+    return UsageError(what, parameter=parameter, rule=rule, fix="leave it out")

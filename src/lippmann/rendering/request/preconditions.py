@@ -38,10 +38,8 @@ def check(request: RenderRequest, form: Form, display: Display | None) -> None:
         A quilt is asked for, and the display's lenses are not cylindrical.
     """
     if form == "quilt" and display is not None and display.lens_array.layout != "lenticular":
-        raise PictureError(
-            f"the display {display.name} has {display.lens_array.layout} lenses",
-            rule="a quilt's views lie side by side, for cylindrical lenses",
-        )
+        what = f"the display {display.name} has {display.lens_array.layout} lenses"
+        raise PictureError(what, rule="a quilt's views lie side by side, for cylindrical lenses")
     _refuse(
         [
             *_of_form(request, form),
@@ -60,17 +58,19 @@ def check_scene(request: RenderRequest, scene: Scene) -> None:
     Raises
     ------
     UsageError
-        The request asks for caustics or for less indirect light where nothing is lit; or, of Gaussian splats or a
+        The request asks for caustics, depth or less indirect light where nothing is lit; or, of Gaussian splats or a
         volume, whose light lies on no surface, for a surface property, for pooling or denoising, or for an exposure.
     """
     is_own, own = scene.keeps_its_colors, "all in this scene has a colour of its own, whatever light is given"
     refusals = _of_surfaces(request, scene) if scene.lies_off_surfaces else []
-    photons, clamps = request.caustics == "photons", request.clamp_indirect is not None
+    # Frames of a sequence are planned again: then depth and caustics are those of the first plan.
+    caustics, deep = (getattr(request, each) if request.plan is None else None for each in ("caustics", "depth"))
     _refuse(
         [
             *refusals,
-            (is_own and photons, "photons of no emitter land on it", "caustics", own, _LEAVE),
-            (is_own and clamps, "it has no indirect light", "clamp_indirect", own, _LEAVE),
+            (is_own and caustics not in (None, "auto"), "no light makes any on it", "caustics", own, _LEAVE),
+            (is_own and deep is not None, f"{deep}: no path goes on from it", "depth", own, _LEAVE),
+            (is_own and request.clamp_indirect is not None, "it has no indirect light", "clamp_indirect", own, _LEAVE),
         ],
         where=scene.name,
     )
@@ -82,8 +82,7 @@ def _of_surfaces(request: RenderRequest, scene: Scene) -> list[_Refusal]:
     exposed = scene.is_off_surfaces_alone and request.exposure not in ("auto", 0.0)
     no_light = f"must be 0: the colours of {what} are made for displays, and are no amounts of light"
     shares = f"{request.method} shares the light of surfaces"
-    is_property = request.integrator not in ("auto", *POOLED_LIGHT)
-    denoises = request.denoise not in ("auto", "none")
+    is_property, denoises = request.integrator not in ("auto", *POOLED_LIGHT), request.denoise not in ("auto", "none")
     return [
         (request.method not in ("auto", "full"), shares, "method", rule, _FULL),
         (is_property, f"{request.integrator} is told of surfaces", "integrator", rule, _LEAVE),

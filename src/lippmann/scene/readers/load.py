@@ -212,12 +212,15 @@ def _select(scene: Scene, asked: SceneOptions) -> Scene:
 
 
 def _note_unused_light(scene: SceneDescription, asked: SceneOptions, light: LightOptions) -> SceneDescription:
-    """A scene that nothing lights, with a note that names the options of light that were given; it has no use for them.
+    """A scene that nothing lights, with notes on the options of light that were given and for which it has no use.
 
     An environment is seen beside it, but for photographs, which fill the panel.
     """
     ignored = ("environment", "single_scattering") if scene.fills_panel else ("single_scattering",)
     unused = [*(name for name in ignored if getattr(asked, name)), *changed_options(light)]
+    if asked.background is not None and scene.fills_panel:
+        remark = "background: seen beyond the photograph's edge alone, which a scale below 1 or a shift shows"
+        scene = replace(scene, notes=(*scene.notes, remark))
     if not unused:
         return scene
     what = "a photograph" if scene.fills_panel else "the scene"
