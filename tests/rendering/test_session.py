@@ -78,3 +78,16 @@ def test_rays_begin_at_the_eyes_that_a_placement_says(teapot):
     session, monitor = open_session(teapot, DIRECT), load_display("odyssey-3d")
     placement = replace(session.place(monitor), eye_share=0.5)
     assert session.rays(monitor, placement).display.gap == pytest.approx(2 * monitor.gap)
+
+
+def test_all_samples_of_a_pixel_are_seen_by_one_eye(teapot):
+    """They were spread over places between both eyes, which blurred in depth what the monitor shows sharp."""
+    import mitsuba as mi
+
+    session, monitor = open_session(teapot, DIRECT), load_display("odyssey-3d")
+    jitter = mi.Point2f(mi.Float([0.0, 0.5, 0.99]), 0.5)
+    source = session.rays(monitor, replace(session.place(monitor), eye_share=1.0))
+    (x, _, z), (dx, _, dz) = source.light_rays(mi.UInt32(100), mi.UInt32(100), mi.UInt32(0), jitter)
+    at_eye = np.asarray(x + (monitor.viewing_distance - z) / dz * dx)
+    assert np.ptp(at_eye) < 1.01 * monitor.lens_array.pitch
+    assert abs(at_eye) == pytest.approx(monitor.stereo.eyes / 2, abs=monitor.lens_array.pitch)

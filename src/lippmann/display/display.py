@@ -329,8 +329,11 @@ class Display:
         middle.
 
         ``s`` goes along the lens, not across it: where it is the place across a pixel, which decides the direction,
-        places in the lens and directions are independent of each other, axis by axis.
+        places in the lens and directions are independent of each other, axis by axis. Of an eye-tracked monitor,
+        each eye of which sees a picture from one point, ``s`` is the place across the two pixels of its lens.
         """
+        if self.stereo is not None:
+            return (s - 0.5) * self.lens_array.pitch, 0.0
         if self.lens is None:
             return 0.0, 0.0
         array, diameter = self.lens_array, self.lens.diameter

@@ -115,7 +115,7 @@ class DisplayRays(OnePicture):
 
     def light_rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> tuple[Triple, Triple]:
         """Origins and unit directions of :meth:`rays` in the display's frame, mm."""
-        u = mi.Float64(column) + mi.Float64(jitter.x)
+        u = mi.Float64(column) + (0.5 if self.display.stereo else mi.Float64(jitter.x))
         v = mi.Float64(row) + mi.Float64(jitter.y)
         if self.channels == 3:
             u = mi.Float64(column) + 0.5 + (mi.Float64(jitter.x) - 0.5) / 3
