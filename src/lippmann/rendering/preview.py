@@ -28,11 +28,7 @@ class Preview:
 
 @exclusive()
 def render_preview(
-    scene: Scene,
-    camera: str | None,
-    size: tuple[int, int],
-    request: RenderRequest,
-    progress: ProgressCallback = silent,
+    scene: Scene, camera: str | None, size: tuple[int, int], request: RenderRequest, progress: ProgressCallback = silent
 ) -> Preview:
     """Render what ``camera`` sees in ``size`` (width, height) pixels.
 

@@ -228,12 +228,7 @@ class LiveRenderer:
         return SceneKernels(session)
 
     def _stand(
-        self,
-        kernels: SceneKernels,
-        display: Display,
-        view: LiveView,
-        request: RenderRequest,
-        seconds: dict[str, float],
+        self, kernels: SceneKernels, display: Display, view: LiveView, request: RenderRequest, seconds: dict[str, float]
     ) -> PlacedView:
         from lippmann.rendering.live.live_tracer import PlacedDisplay
 
