@@ -130,9 +130,6 @@ def test_what_is_given_by_place_is_checked_and_python_counts():
         (lambda: export_page([IMAGE], "a.html"), "pictures"),
         (lambda: export_page(IMAGE, "a.html"), "pictures"),
         (lambda: draw("stripes", SMALL), "pattern"),
-        (lambda: light_table(LENS, "a"), "slopes"),
-        (lambda: light_table(LENS, [[0.0]]), "slopes"),
-        (lambda: light_table(LENS, math.nan), "slopes"),
     ],
 )
 def test_calls_of_the_library_check_theirs(wrong, name):
@@ -151,6 +148,9 @@ def test_calls_of_the_library_check_theirs(wrong, name):
         (lambda: independent_directions(5), "display: 5; it must be a Display; lippmann.load_display gives one"),
         (lambda: eye_light(5, (0.0, 0.1), (0.0, 0.0)), "display: 5; it must be a Display; lippmann.load_display gives"),
         (lambda: light_table(5, 0.0), "lens: 5; it must be a Lens; Lens.of(display) gives one"),
+        (lambda: light_table(LENS, "a"), "slopes: 'a'; must be a finite number, or a row of them"),
+        (lambda: light_table(LENS, [[0.0]]), "slopes: [[0.0]]; must be a finite number"),
+        (lambda: light_table(LENS, math.nan), "slopes: nan; must be a finite number"),
         (lambda: true_directions(5), "lens: 5; it must be a Lens; Lens.of(display) gives one"),
         (lambda: replace(SMALL, panel=5), "panel: 5; it must be a Panel"),
         (lambda: replace(SMALL, lens_array=5), "lens_array: 5; it must be a LensArray"),

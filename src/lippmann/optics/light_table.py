@@ -139,7 +139,7 @@ def _frame(
         across = np.array([math.nan])
     if across.ndim != 1 or not np.isfinite(across).all():
         rule = "must be a finite number, or a row of them: tangents of angles"
-        raise UsageError(shorten(slopes), parameter="slopes", rule=rule)
+        raise UsageError(shorten(slopes), where="slopes", rule=rule)
     directions = np.ascontiguousarray(np.stack([across, np.full_like(across, along)], axis=1))
     lenses = 2 * neighbours + 1
     edges = (np.arange(lenses * places_per_lens + 1) / places_per_lens - 0.5 * lenses) * lens.pitch

@@ -63,13 +63,13 @@ def check_scene(request: RenderRequest, scene: Scene) -> None:
     """
     is_own, own = scene.keeps_its_colors, "all in this scene has a colour of its own, whatever light is given"
     refusals = _of_surfaces(request, scene) if scene.lies_off_surfaces else []
-    # Frames of a sequence are planned again: then depth and caustics are those of the first plan.
-    caustics, deep = (getattr(request, each) if request.plan is None else None for each in ("caustics", "depth"))
+    goes_on = request.depth is not None and request.plan is None  # frames of a sequence are planned again
+    caustics = request.caustics != "auto" and request.plan is None
     _refuse(
         [
             *refusals,
-            (is_own and caustics not in (None, "auto"), "no light makes any on it", "caustics", own, _LEAVE),
-            (is_own and deep is not None, f"{deep}: no path goes on from it", "depth", own, _LEAVE),
+            (is_own and caustics, "no light makes any on it", "caustics", own, _LEAVE),
+            (is_own and goes_on, f"{request.depth}: no path goes on from it", "depth", own, _LEAVE),
             (is_own and request.clamp_indirect is not None, "it has no indirect light", "clamp_indirect", own, _LEAVE),
         ],
         where=scene.name,
