@@ -64,7 +64,6 @@ def share_light(
         whole panel.
     columns:
         Columns of ``pixels`` for each pixel of the panel: 3 for sub-pixels in full colour, else 1.
-
     is_open:
         ``(H, W)`` of ``pixels``: those that are filtered; the others stay as they are. None for all.
 
