@@ -216,7 +216,7 @@ def _cycles_rows(result: dict[str, Any]) -> list[str]:
 
 def _cycles_remark(result: dict[str, Any]) -> str:
     timed = "all views" if result["views_timed"] == 48 else f"{result['views_timed']} views, whose mean stands for all"
-    return f"Processor time is that of all threads. Cycles was timed over {timed}, and other work ran beside."
+    return f"Processor time is that of all threads. Cycles was timed over {timed}, beside other work."
 
 
 def _seconds(value: float | None) -> str:
