@@ -14,7 +14,7 @@ from PIL import Image
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = ROOT / "examples"
-PLUGINS = ("off_reader", "more_plugins")
+PLUGINS = ("smf_reader", "more_plugins")
 
 
 def test_the_guide_shows_the_plugins_as_they_are():
@@ -22,7 +22,7 @@ def test_the_guide_shows_the_plugins_as_they_are():
     for folder in PLUGINS:
         for file in (EXAMPLES / folder).glob("*.[pt][yo]*"):
             assert f'"\n{file.read_text(encoding="utf-8")}```' in page, file
-    assert len((EXAMPLES / "off_reader" / "lippmann_off.py").read_text(encoding="utf-8").splitlines()) <= 40
+    assert len((EXAMPLES / "smf_reader" / "lippmann_smf.py").read_text(encoding="utf-8").splitlines()) <= 40
 
 
 @pytest.mark.slow
@@ -33,7 +33,7 @@ def test_installed_plugins_render_their_own_files(engine, tmp_path):
         words = ["install", "-q", "--no-deps", "--no-build-isolation", "--disable-pip-version-check", "--no-compile"]
         words += ["--target", str(target), "--upgrade", str(tmp_path / folder)]
         subprocess.run([sys.executable, "-m", "pip", *words], check=True)
-    gem = str(tmp_path / "off_reader" / "gem.off")
+    gem = str(tmp_path / "smf_reader" / "gem.smf")
     quick = ["--spp", "2", "--method", "full", "--threads", "2"]
     commands = [
         ["render", gem, "--display", "acme-9", "--reader-option", "roughness=0.2", *quick, "-o", "gem.png"],
@@ -63,7 +63,7 @@ def test_installed_plugins_render_their_own_files(engine, tmp_path):
         assert (strip.size[1], film.n_frames) == (768, 3)
     assert 'reader_options = {"roughness" = "0.2"}' in done.stdout
     assert '"options": {"roughness": 0.5}' in " ".join(done.stdout.split())
-    for name in ("off", "acme", "strip", "gif", "sky-seen"):
+    for name in ("smf", "acme", "strip", "gif", "sky-seen"):
         assert f'"name": "{name}"' in done.stdout
 
 

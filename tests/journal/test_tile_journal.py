@@ -231,7 +231,7 @@ def test_a_name_too_long_for_the_journal_is_refused_at_once(tmp_path):
         TileStore.open(tmp_path / ("a" * (longest - 3) + ".tif"), JOB, TileGrid(100, 70, 32), resume=False)
 
 
-@pytest.mark.parametrize("struck", ["locked", "_is_begun", "replacing"])
+@pytest.mark.parametrize("struck", ["take_lock", "_is_begun", "replacing"])
 def test_a_journal_that_is_interrupted_while_it_is_made_leaves_nothing(output, monkeypatch, struck):
     """Each of the steps is done, and Ctrl-C strikes before the next one."""
     real, calls = getattr(tile_journal, struck), []
@@ -246,7 +246,7 @@ def test_a_journal_that_is_interrupted_while_it_is_made_leaves_nothing(output, m
     with pytest.raises(KeyboardInterrupt):
         opened(output)
     monkeypatch.undo()
-    if struck == "locked":
+    if struck == "take_lock":
         calls[0].close()  # as the end of the process does
     undo_all()
     assert list(output.parent.iterdir()) == []

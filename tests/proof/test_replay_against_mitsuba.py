@@ -78,7 +78,7 @@ def rendered(scene, sheet, subpixels=False, placement=FITTED):
     return Pictures(
         position,
         normal,
-        render(scene, display, integrator="path", depth=1, tone_map="none", **common),
+        render(scene, display, integrator="path", tone_map="none", **common),
         sheet,
         subpixels,
     )
