@@ -1,4 +1,4 @@
-"""Interlaced prints: photographs weave_rows for a lens sheet, written strip by strip with resolution and ICC profile.
+"""Interlaced prints: photographs woven for a lens sheet, written strip by strip with resolution and ICC profile.
 
 The photographs cover the whole sheet with its bleed.
 
@@ -36,7 +36,7 @@ Lenses = Literal["along", "across"]
 #: View columns per lens: bilinear samples between them stay sharp.
 _COLUMNS_PER_LENS = 2
 
-#: Rows of a PNG that are weave_rows at a time.
+#: Rows of a PNG that are woven at a time.
 _ROWS = 64
 
 

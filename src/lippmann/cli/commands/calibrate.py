@@ -106,7 +106,7 @@ def page(
         raise OutputError(f"the ending is '{output.suffix}'", where=str(output), rule="display files end in .toml")
     check_writable(output)
     monitor = Monitor.of_display(load_display(display))
-    site = CalibrationSite(monitor, output, lambda calibrated: console.remark(_save(output, calibrated)))
+    site = CalibrationSite(monitor, output, lambda calibrated: console.remark(_describe(output, calibrated)))
     viewing.serve(site, f"calibrate {monitor.name}", console, host=host, port=port, browser=not no_browser)
 
 
@@ -123,6 +123,6 @@ def _with_values(monitor: Monitor, pitch: str | None, slope: str | None, center:
     return replace(monitor, **changed)  # type: ignore[arg-type]
 
 
-def _save(output: Path, monitor: Monitor) -> str:
+def _describe(output: Path, monitor: Monitor) -> str:
     values = f"pitch {monitor.pitch:.6g} lpi, slope {monitor.slope:.6g}, center {monitor.center:.4g}"
     return f"{output}: {values}; use it as --display {output}"

@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lippmann.color.transfer import decode_srgb
+from lippmann.color.transfer import decode_srgb, encode_srgb
 from lippmann.scene.values.description import Material, Mesh
 
 #: Colours in [0, 1] overshoot it by less; real numbers beyond it count to 255.
 _MOST_OVERSHOOT = 2.0
 
 GREY = Material("grey", base_color=(0.7, 0.7, 0.7), roughness=0.6, double_sided=True)
+#: sRGB-coded colour in [0, 1] of what has none among vertices or faces that have one.
+GREY_CODES = encode_srgb(np.array(GREY.base_color))
 COLORED = Material("vertex colours", roughness=0.6, double_sided=True)
 _TRANSLUCENT = replace(COLORED, alpha_mode="blend")
 

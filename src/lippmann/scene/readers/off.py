@@ -8,13 +8,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import numpy as np
-
-from lippmann.color.transfer import encode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.parsing.ply_body import read_body
 from lippmann.scene.parsing.ply_header import Element, Header, Property
+from lippmann.scene.parsing.vertex_colors import GREY_CODES
 from lippmann.scene.readers.ply import describe_polygons
 from lippmann.scene.values.description import SceneDescription
 
@@ -100,7 +98,7 @@ def _outlines(faces: list[Row]) -> tuple[list[Row], list[Property]]:
     if not properties:
         return faces, []
     full = properties[0].brightest
-    grey = [str(full * float(encode_srgb(np.array(0.7)))).encode()] * 3
+    grey = [str(full * float(code)).encode() for code in GREY_CODES]
     opaque = str(full).encode()
     rows = [
         [*face[: _size(face)], *(color or grey)[:3], *(color[3:] or [opaque])]

@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import decode_srgb, encode_srgb
+from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.far_origin import near_origin
 from lippmann.scene.parsing.files import decode_text, read_bytes
+from lippmann.scene.parsing.vertex_colors import GREY_CODES
 from lippmann.scene.values.description import FloatArray, Instance, Material, Mesh, SceneDescription
 
 _HEADER = 84  # bytes
@@ -101,7 +102,7 @@ def _facet_colors(header: bytes, numbers: NDArray[np.uint16]) -> FloatArray | No
         inherits = numbers == 0 if header.startswith(_MESHLAB) or not numbers.any() else is_set
         codes = np.where(inherits[:, None], np.frombuffer(own, np.uint8) / 255.0, parts)
     elif is_set.any() and not numbers[~is_set].any():
-        codes = np.where(is_set[:, None], parts[:, ::-1], encode_srgb(np.array(0.7)))
+        codes = np.where(is_set[:, None], parts[:, ::-1], GREY_CODES)
     else:
         return None
     colors = np.concatenate([decode_srgb(codes), np.ones((len(codes), 1))], axis=1)

@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import encode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import decode_image
 from lippmann.scene.parsing.points_lines import as_mesh
 from lippmann.scene.parsing.texture_maps import unit
-from lippmann.scene.parsing.vertex_colors import COLORED, GREY, linear_colors, material_of
+from lippmann.scene.parsing.vertex_colors import COLORED, GREY, GREY_CODES, linear_colors, material_of
 from lippmann.scene.readers.three_mf.parts import Beam, Package, Part, Placed, Shape, Triangle
 from lippmann.scene.values.description import Image, Instance, Material, Mesh, SceneDescription, Texture, Wrap
 
@@ -115,7 +114,7 @@ class _Reader:
         """sRGB codes ``(2, 4)`` of a beam's ends, as those of a plain surface where it has no colours."""
         group = part.groups.get(beam.group or "")
         if group is None or group.picture:
-            return np.tile(255.0 * np.append(encode_srgb(np.array(GREY.base_color)), 1.0), (2, 1))
+            return np.tile(255.0 * np.append(GREY_CODES, 1.0), (2, 1))
         try:
             return np.rint(255.0 * np.array([group.values[at] for at in beam.colors]))
         except IndexError:
