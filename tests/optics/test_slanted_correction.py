@@ -151,5 +151,10 @@ def test_the_gain_of_noisy_light_is_that_against_light_without_noise(solved):
     halves = [[(part + 0.1 * rng.standard_normal(part.shape)).astype(np.float32) for part in parts] for _ in range(2)]
     step = correction.step([(0, halves)])
     mean = np.clip(np.mean(halves, axis=0), 0.0, 1.0)
-    plain, stepped = correction.eye_errors([correction.rows(mean, share=share) for share in (0.0, step.share)], parts)
+    pictures = [correction.rows(mean, share=share) for share in (0.0, step.share)]
+    goal, lights = (
+        correction._rows.light_meant(np.stack(parts), 0),
+        correction._rows.eyes(correction.display)(pictures, 0),
+    )
+    plain, stepped = (np.nanmean((light - goal) ** 2) for light in lights)
     assert step.gains["exact"] == pytest.approx(10.0 * np.log10(plain / stepped), abs=0.2)

@@ -55,11 +55,6 @@ class Frozen:
         with no_collection():
             return self._recorded(*arguments)
 
-    @property
-    def recordings(self) -> int:
-        """How often the kernel had to be told anew."""
-        return int(self._recorded.n_recordings)
-
 
 def _opaque_arrays(reads: object) -> list[object]:
     state = arrays_of(reads)

@@ -19,9 +19,6 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lippmann.display.array_ops import NUMPY, Array, ArrayOps
 from lippmann.display.distortion import Distortion
 from lippmann.display.lens_array import WHOLE_TOLERANCE, Lattice, LensArray, LensGrid, lattice_in_front_of
@@ -411,24 +408,6 @@ class Display:
         scale = self.gap / ez
         dx, dy = self.panel_offset((cx - ex) * scale, (cy - ey) * scale, ops)
         return cx + dx, cy + dy
-
-    def lenses_seeing(self, point: tuple[float, float, float]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """All lenses that show a 3D point, and where.
-
-        Returns
-        -------
-        ``(n, 2)`` lens indices ``(i, j)`` in the order of rows, then columns, and ``(n, 2)`` panel points in
-        millimetres. NumPy only.
-        """
-        grid = self.lens_grid
-        j, i = (a.ravel().astype(np.float64) for a in np.indices((grid.rows, grid.columns)))
-        px, py, pz = (np.full(i.shape, float(value)) for value in point)
-        x, y = self.project(px, py, pz, i, j, NUMPY)
-        owner_i, owner_j = self.lens_of(x, y, NUMPY)
-        u, v = self.pixel_coordinates(x, y)
-        on_panel = (u >= 0) & (u < self.panel.width) & (v >= 0) & (v < self.panel.height)
-        shows = on_panel & (owner_i == i) & (owner_j == j)
-        return np.stack([i[shows], j[shows]], axis=1).astype(np.intp), np.stack([x[shows], y[shows]], axis=1)
 
     def check_native(self) -> None:
         """Refuse, by a :class:`DisplayError`, a display that takes no native pixels."""

@@ -100,9 +100,8 @@ def perceived_height(z: float, distance: float, share: float) -> float:
 def comfortable_share(back: float, front: float, distance: float, eyes: float) -> float:
     """Share of the eye distance, at most 1, at which a scene from z = ``back`` to ``front`` mm is comfortable."""
     near, far = depth_of_disparity(COMFORTABLE, COMFORTABLE, distance, eyes)
-    wanted = (parallax(z, distance) for z in (front, back))
-    most = (parallax(z, distance) for z in (near, far))
-    return min(1.0, *(limit / found for limit, found in zip(most, wanted, strict=True) if limit * found > 0.0))
+    pairs = ((parallax(limit, distance), parallax(z, distance)) for limit, z in ((near, front), (far, back)))
+    return min(1.0, *(limit / value for limit, value in pairs if limit * value > 0.0))
 
 
 def _vergence(distance: float, eyes: float) -> float:

@@ -156,14 +156,6 @@ class LensCorrection:
         stepped: Floats = plain + np.float32(share) * (np.stack(solved, axis=-1) - plain)
         return stepped
 
-    def eye_errors(self, pictures: Sequence[Floats], parts: Sequence[Floats], first: int = 0) -> list[float]:
-        """Mean squared errors of the light that an eye sees of each picture, over all lenses and directions meant.
-
-        ``first`` is the number of the first row.
-        """
-        goal = self._rows.light_meant(self._meant(parts), first)
-        return [float(np.nanmean((light - goal) ** 2)) for light in self._rows.eyes(self.display)(pictures, first)]
-
     def step(self, bands: Sequence[tuple[int, Sequence[Sequence[Floats]]]]) -> CorrectionStep:
         """The step toward least squares of least mean error to eyes, over lenses within :data:`TOLERANCE`.
 

@@ -141,9 +141,9 @@ class SlantedRows:
             gathered = np.zeros((*points, *values.shape[2:]), dtype=np.float32)
             geometry = panel_frame(display), cells, tables, light.step, numbers, places, lines
             Bands(usable_cores()).pixels(gather_light, len(gathered), values, first, *geometry, gathered)
-            white, *seen = np.moveaxis(gathered.reshape(*shape, *values.shape[2:]), -1, 0)
+            white, *sums = np.moveaxis(gathered.reshape(*shape, *values.shape[2:]), -1, 0)
             is_lit = white > 0.0
-            return [np.divide(each, white, out=np.zeros_like(each), where=is_lit).ravel() for each in seen]
+            return [np.divide(each, white, out=np.zeros_like(each), where=is_lit).ravel() for each in sums]
 
         return lights
 

@@ -109,7 +109,7 @@ def options_of_sequence(value: object) -> PlacementOptions:
     Raises
     ------
     UsageError
-        As :func:`placement_of`, or it is a placement found before.
+        As :func:`placement_of`, or ``placement`` is already a :class:`Placement`.
     """
     options = placement_of(value)
     if isinstance(options, Placement):
@@ -200,12 +200,19 @@ def place(
         display_from_world = _resize(np.eye(4), options)
     display_from_world = translation(options.shift) @ display_from_world
     where = inverse(display_from_world)
-    share, seen = 1.0, None
+    share, visible_range = 1.0, None
     if mode == "camera" and display.stereo is not None:
-        share, seen = find_eye_share(where, bounds, display, bounds_in, probe, is_unbounded=is_unbounded)
+        share, visible_range = find_eye_share(where, bounds, display, bounds_in, probe, is_unbounded=is_unbounded)
         share = share if options.depth_scale is None else 1.0
     placement = stand(
-        where, bounds, display, mode=mode, bounds_in=bounds_in, warnings=warnings, eye_share=share, seen=seen
+        where,
+        bounds,
+        display,
+        mode=mode,
+        bounds_in=bounds_in,
+        warnings=warnings,
+        eye_share=share,
+        visible_range=visible_range,
     )
     is_whole = mode == "fit" and (fills_panel or (options.scale <= 1.0 and not any(options.shift)))
     return replace(placement, exposure=exposure, may_cut=None if is_whole else options)
@@ -220,15 +227,15 @@ def stand(
     bounds_in: Callable[[Matrix], Bounds] | None = None,
     warnings: Sequence[str] = (),
     eye_share: float = 1.0,
-    seen: tuple[float, float] | None = None,
+    visible_range: tuple[float, float] | None = None,
 ) -> Placement:
     """The placement of a display at a given place, with the depth range of the scene and warnings.
 
-    Parameters as of :func:`place`; ``warnings`` come first among those of the placement. ``seen`` are the back and
-    front of what is seen of the scene, in mm, where they are known.
+    Parameters as of :func:`place`; ``warnings`` come first among those of the placement. ``visible_range`` is the back
+    and the front of the visible part of the scene, in mm, where they are known.
     """
     corners = _corners_in(inverse(world_from_display), bounds, bounds_in)
-    back, front = seen or (float(corners[:, 2].min()), float(corners[:, 2].max()))
+    back, front = visible_range or (float(corners[:, 2].min()), float(corners[:, 2].max()))
     if eye_share != 1.0:
         back, front = (
             perceived_height(min(z, display.aperture_distance), display.viewing_distance, eye_share)

@@ -67,7 +67,7 @@ def refine(renderer, view):
 def recorded(renderer):
     """How often the renderer's kernels were recorded."""
     kernels = renderer._kernels
-    return sum(each.kernel.recordings for each in (*kernels._tracers.values(), *kernels._features.values()))
+    return sum(each.kernel._recorded.n_recordings for each in (*kernels._tracers.values(), *kernels._features.values()))
 
 
 def rest_of(renderer):

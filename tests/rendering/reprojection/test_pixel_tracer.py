@@ -100,7 +100,7 @@ def test_one_recording_serves_all_lists():
     for start, stop in ((0, 96), (1, 40), (2, 5), (5, 90), (7, 8)[:2], (3, 64)):
         tracer.trace(everything[start:stop], points)
     # A list of one is another kernel: there everything is the same for all lanes.
-    assert tracer._kernel.recordings <= 2
+    assert tracer._kernel._recorded.n_recordings <= 2
 
 
 def test_lists_longer_than_a_wavefront_are_traced_in_parts():

@@ -32,6 +32,11 @@ def scenes():
     return {name: bundled.make_classic(name) for name in bundled.names()}
 
 
+def in_display(place: Stage, points) -> np.ndarray:
+    """Points ``(..., 3)`` of the scene in the display frame: z > 0 lies in front of the lens plane."""
+    return (np.asarray(points) - place.target) @ place.rotation * place.unit
+
+
 def finite_points(scene: ClassicScene) -> np.ndarray:
     """Points that lie on the finite primitives, among them the extreme ones in any direction up to a rod's radius."""
     points = [
@@ -92,7 +97,7 @@ def test_make_gives_the_form_that_the_scene_was_made_for():
 def test_straddles_the_lens_plane_within_the_depth_of_the_papers_display(scenes, name):
     display = load_display("seed-lenticular")
     near, far = display.depth_budget
-    z = bundled.stage_of(name).in_display(finite_points(scenes[name]))[:, 2]
+    z = in_display(bundled.stage_of(name), finite_points(scenes[name]))[:, 2]
     assert 0 < z.max() < near
     assert far < z.min() < 0.75 * far
 
@@ -100,7 +105,7 @@ def test_straddles_the_lens_plane_within_the_depth_of_the_papers_display(scenes,
 @pytest.mark.parametrize("name", bundled.names())
 def test_fills_the_picture_and_stays_in_it(scenes, name):
     half = stage.PICTURE_HEIGHT / 2
-    across = bundled.stage_of(name).in_display(finite_points(scenes[name]))[:, :2]
+    across = in_display(bundled.stage_of(name), finite_points(scenes[name]))[:, :2]
     inside = (np.abs(across) < half).all(axis=1)
     assert inside.mean() > 0.95
     assert np.ptp(across[inside], axis=0).max() > half
@@ -142,8 +147,8 @@ def test_stage_is_a_similarity(elevation, azimuth, unit):
     assert np.linalg.det(matrix) > 0
     points = np.array([(4.0, -5.0, 6.0), (0.0, 0.0, 10.0)])
     there = points @ matrix[:3, :3].T + matrix[:3, 3]
-    np.testing.assert_allclose(place.in_display(there), points, atol=1e-9)
-    assert place.in_display(place.eye) == pytest.approx((0, 0, 400), abs=1e-9)
+    np.testing.assert_allclose(in_display(place, there), points, atol=1e-9)
+    assert in_display(place, place.eye) == pytest.approx((0, 0, 400), abs=1e-9)
 
 
 def test_stage_turns_the_eye_as_it_says():
@@ -179,7 +184,7 @@ def test_lamps_of_the_classic_scenes_stay_out_of_the_picture(scenes):
         place = bundled.stage_of(name)
         for light in scene.lights:
             if light.kind != "directional" and light.radius > 0:
-                x, y, z = place.in_display(light.center)
+                x, y, z = in_display(place, light.center)
                 shrink = 1 - z / place.eye_distance  # how far the pyramid of view has narrowed there
                 assert z > 20  # mm, twice as far as the scenes reach forward
                 assert max(abs(x), abs(y)) - light.radius > shrink * stage.PICTURE_HEIGHT / 2
@@ -250,7 +255,7 @@ class TestPrimitives:
         rotation = bundled.stage_of("primitives").rotation
         cylinders = scenes["primitives"].cylinders
         assert cylinders.axes @ rotation[:, 2] == pytest.approx(0, abs=1e-12)
-        depth = bundled.stage_of("primitives").in_display(cylinders.centers)[:, 2]
+        depth = in_display(bundled.stage_of("primitives"), cylinders.centers)[:, 2]
         assert -54.4 < depth[0] < 0
 
     def test_height_field_has_the_normals_of_its_surface(self):

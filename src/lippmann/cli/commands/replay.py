@@ -121,16 +121,16 @@ def replay(
         flag = "--frames" if width is None else "--sweep-width"
         raise UsageError("applies to a sweep only", where=flag, fix="add --sweep")
     places = None if path is None else head_path(path)
-    seen, target = _open_seen(picture, display, layout, aspect)
+    source, target = _open_source(picture, display, layout, aspect)
     position = default_eye(target) if eye is None else triple(eye, "--eye")
-    see = _view_of(seen, target, size, filter, console, optics=optics, stereo=stereo)
+    see = _view_of(source, target, size, filter, console, optics=optics, stereo=stereo)
     result: dict[str, Any] = {"output": str(output), "eye": list(position), "filter": filter, "optics": optics}
     if stereo is not None:
         result |= {"stereo": stereo[0], "eyes": stereo[1]}
     by = "" if stereo is None else f" by two eyes {stereo[1]:g} mm apart"
-    transfer = seen.provenance.transfer
+    transfer = source.provenance.transfer
     if not moves:
-        _write_seen(see(position), output, stereo, bits, transfer)
+        _write_eye_views(see(position), output, stereo, bits, transfer)
         console.result(result, f"{output}: seen{by} from {_position(position)}")
         return
     if places is None:
@@ -143,7 +143,7 @@ def replay(
 
 
 def _view_of(
-    seen: IntegralImage | LargePicture | Quilt,
+    source: IntegralImage | LargePicture | Quilt,
     display: Display,
     size: str | None,
     filter: Literal["nearest", "linear"],
@@ -158,19 +158,19 @@ def _view_of(
     from lippmann.viewing.stereo import stereo_pair
 
     pixels, framed = _size_of(size, display, console)
-    if optics and isinstance(seen, Quilt):
+    if optics and isinstance(source, Quilt):
         rule = "a quilt is seen without lenses"
         raise UsageError("this is a quilt", where="--optics", rule=rule, fix="weave it for its display first")
 
     def replay_from(place: Place) -> FloatArray:
-        if isinstance(seen, Quilt):
-            return framed(replay_quilt(seen, display, place, size=pixels, linear=filter == "linear"))
-        return framed(seen.replay(place, size=pixels, filter=filter, optics=optics))
+        if isinstance(source, Quilt):
+            return framed(replay_quilt(source, display, place, size=pixels, linear=filter == "linear"))
+        return framed(source.replay(place, size=pixels, filter=filter, optics=optics))
 
     return replay_from if stereo is None else lambda place: stereo_pair(replay_from, place, *stereo)
 
 
-def _write_seen(
+def _write_eye_views(
     picture: FloatArray, output: Path, stereo: tuple[Stereo, float] | None, bits: int | None, transfer: Transfer
 ) -> None:
     """Write what one eye or two see, two as a file of a pair where ``output`` is one."""
@@ -303,13 +303,13 @@ def refocus(
     else:
         check_output(output, bits)
     planes_asked = heights if plane is None else [plane]
-    seen, target = _open_seen(picture, display, layout, aspect)
-    transfer = seen.provenance.transfer
+    source, target = _open_source(picture, display, layout, aspect)
+    transfer = source.provenance.transfer
     pixels, framed = _size_of(size, target, console)
-    if isinstance(seen, Quilt):
-        focused = refocus_quilt(seen, target, planes_asked, size=pixels)
+    if isinstance(source, Quilt):
+        focused = refocus_quilt(source, target, planes_asked, size=pixels)
     else:
-        focused = focal_planes(seen, planes_asked, size=pixels)
+        focused = focal_planes(source, planes_asked, size=pixels)
     focused = (framed(each) for each in focused)
     if plane is not None:
         write_plain_picture(next(focused), output, bits=bits, transfer=transfer)
@@ -321,7 +321,7 @@ def refocus(
     console.result({"output": str(output), "planes": heights}, line)
 
 
-def _open_seen(
+def _open_source(
     picture: Path, display: str | None, layout: str | None, aspect: float | None
 ) -> tuple[IntegralImage | LargePicture | Quilt, Display]:
     """The picture or the quilt in a file, and the display that shows it."""

@@ -49,12 +49,12 @@ def make_plan(
     """
     check_scene(request, scene)
     integrator = _integrator(request, scene)
-    seen = None if form == "quilt" else display
-    is_seen_whole = seen is not None and seen.lens is not None and request.pixel_filter != "point"
-    facts = _Facts(request, scene, integrator.value, form, is_seen_whole)
+    lens_display = None if form == "quilt" else display
+    is_area_sampled = lens_display is not None and lens_display.lens is not None and request.pixel_filter != "point"
+    facts = _Facts(request, scene, integrator.value, form, is_area_sampled)
     method = _method(facts)
     denoise = _denoise(facts, method)
-    subpixels = _subpixels(facts, method.value, seen)
+    subpixels = _subpixels(facts, method.value, lens_display)
     if size is None and display is not None:
         size = display.panel.width, display.panel.height
     values = None if size is None else size[0] * size[1] * (3 if subpixels.value else 1)
@@ -145,7 +145,7 @@ class _Facts:
     scene: Scene
     integrator: Integrator
     form: Form
-    is_seen_whole: bool  # each pixel's lens, by rays all over it
+    is_area_sampled: bool  # the lens is known, and a pixel's rays are spread over the pixel
 
     @property
     def is_draft(self) -> bool:
@@ -187,7 +187,7 @@ class _Facts:
     def is_one_ray(self) -> bool:
         """Whether a single ray through each pixel's centre is enough: not for a whole lens, nor for a fine volume."""
         request = self.request
-        is_usual = request.spp is None and not self.is_seen_whole and (self.is_photograph or self.scene.has_splats)
+        is_usual = request.spp is None and not self.is_area_sampled and (self.is_photograph or self.scene.has_splats)
         return self.is_exact and (is_usual or request.spp == 1 or self.is_draft) and not request.is_open_ended
 
 
@@ -278,7 +278,7 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
     of_file = 1 + (classic.camera.antialiasing if classic is not None and facts.form == "preview" else 0)
     is_large = (values or 0) > TUNING.values * TUNING.usual
     is_budgeted = method == "pooled" or facts.is_exact or classic is not None
-    fewest = TUNING.fewest - subpixels * (1 + is_large) if method == "pooled" or facts.is_seen_whole else 1
+    fewest = TUNING.fewest - subpixels * (1 + is_large) if method == "pooled" or facts.is_area_sampled else 1
     of_budget = 1 << max(round(math.log2(TUNING.values / (values or TUNING.values))), 0)
     budgeted = f"about a million for the picture, but {fewest} to {TUNING.usual} of each pixel"
     usual = _first(
@@ -287,7 +287,7 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
         (facts.is_one_ray, 1, "one ray through each pixel's middle shows it"),
         (facts.is_final(method), TUNING.final_most, "a final picture, at most"),
         (request.effort == "final", TUNING.final_samples, "a final picture, where no quality can be worked for"),
-        (classic is not None and not facts.is_seen_whole, of_file, "as the scene's file says"),
+        (classic is not None and not facts.is_area_sampled, of_file, "as the scene's file says"),
         (values is None or not is_budgeted, TUNING.usual, "the usual number where light is not pooled"),
         (True, min(max(of_budget, fewest), TUNING.usual), budgeted),
     )

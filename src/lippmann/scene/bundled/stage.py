@@ -17,7 +17,7 @@ from math import atan, cos, radians, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from lippmann.scene.values.description import Camera, Matrix
 
@@ -63,11 +63,6 @@ class Stage:
         matrix[:3, :3] = self.rotation / self.unit
         matrix[:3, 3] = self.target
         return matrix
-
-    def in_display(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Transform points ``(..., 3)`` of the scene into the display frame: z > 0 lies in front of the lens plane."""
-        offsets: NDArray[np.float64] = np.asarray(points, dtype=np.float64) - self.target
-        return offsets @ self.rotation * self.unit
 
     @property
     def eye(self) -> Point:
