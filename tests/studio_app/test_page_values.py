@@ -81,8 +81,9 @@ def test_any_values_are_a_state_or_refused(values):
 def test_facts_are_plain_values_in_the_words_of_the_page():
     display = load_display(TINY)
     facts = facts_of_view(display, placement(), 0.5)
-    assert facts["depth"] == {"scene": [-10.0, 5.0], "sharp": [-8.0, 8.0], "strains": False}
-    assert facts_of_view(load_display("odyssey-3d"), placement(), 0.5)["depth"]["strains"] is True
+    assert facts["depth"] == {"scene": [-10.0, 5.0], "sharp": [-8.0, 8.0]}
+    assert facts["eye_tracked"] is False
+    assert facts_of_view(load_display("odyssey-3d"), placement(), 0.5)["eye_tracked"] is True
     assert facts["warnings"] == ["depth scale 1 shows it whole"]
     assert ["Panel", f"{display.panel.width} x {display.panel.height} pixels"] in facts["display_facts"]
     assert optics_of(display, subpixels=None)["panel"]["subpixels"] is False

@@ -23,7 +23,6 @@ from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, Values
 from lippmann.image.views import Resampling, exact_view_shape, resampled_views, view_grid
 from lippmann.options.option import checked
-from lippmann.printable import shorten
 from lippmann.scene.matrices import check_placement
 
 if TYPE_CHECKING:
@@ -126,6 +125,7 @@ class Parts(TypedDict, total=False):
     stored: Stored
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class IntegralImage(Picture):
     """The pixels of a panel in linear RGB, in memory.
@@ -171,9 +171,6 @@ class IntegralImage(Picture):
     stored: Stored = "float32"
 
     def __post_init__(self) -> None:
-        for name, kind in (("display", Display), ("provenance", Provenance), ("maps", Mapping)):
-            if not isinstance(value := getattr(self, name), kind):
-                raise UsageError(shorten(value), parameter=name, rule=f"must be a {kind.__name__}")
         object.__setattr__(self, "pixels", _checked_pixels(self.pixels, self.display))
         object.__setattr__(self, "world_from_display", check_placement(self.world_from_display))
         size = self.pixels.shape[:2]

@@ -368,6 +368,7 @@ _KINDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
     "tuple[int, int]": ("two whole numbers", _pair),
     "Sequence[float]": ("numbers, at least one", _numbers),
     "Values": ("an array (height, width, 3)", _colours),
+    "Mapping[str, Layer]": ("a mapping of names to arrays", dict),
     "Sequence[tuple[str, Picture]]": ('titles and pictures, such as [("teapot", image)]', _titled),
     **dict.fromkeys(("ProgressCallback", "Runner"), ("a function", _function)),
     **{

@@ -63,8 +63,8 @@ def facts_of_view(display: Display, placement: Placement, exposure: float) -> di
         "depth": {
             "scene": _pair(placement.depth_range),
             "sharp": _pair(placement.depth_budget),
-            "strains": display.stereo is not None,
         },
+        "eye_tracked": display.stereo is not None,
         "warnings": [_in_words(line) for line in placement.warnings],
         "depth_scale": placement.depth_scale,
         "exposure": exposure,

@@ -83,7 +83,7 @@ class Studio {
     if (facts.optics !== null) this.stage.setOptics(facts.optics);
     this.panel.showFacts(facts);
     this.page.showCommand(facts.command, facts.title);
-    this.page.showNative(!facts.depth.strains);
+    this.page.showNative(!facts.eye_tracked);
     this.jobs.showSettings(facts.command);
   }
 

@@ -13,10 +13,11 @@ export function depthBars() {
   const element = h("div", { class: "depth-bars" }, svg, note);
 
   /**
-   * @param depth `{ scene: [back, front], sharp: [back, front], strains }` in mm toward the viewer; an end may be null;
-   *   `strains` where two eyes see all depths sharp, and those beyond `sharp` with a strain
+   * @param depth `{ scene: [back, front], sharp: [back, front] }` in mm toward the viewer; an end may be null
+   * @param isEyeTracked whether each eye has a picture of its own: all depths are sharp then, and those beyond `sharp`
+   *   strain the eyes
    */
-  function show({ scene, sharp, strains }) {
+  function show({ scene, sharp }, isEyeTracked) {
     const ends = [...scene, ...sharp].filter((value) => value !== null);
     const reach = 1.08 * Math.max(1e-3, ...ends.map(Math.abs));
     const at = (z) => WIDTH / 2 + (Math.max(-reach, Math.min(reach, z ?? Infinity)) / reach) * (WIDTH / 2 - MARGIN);
@@ -37,7 +38,7 @@ export function depthBars() {
       text(at(back), 80, `${Math.abs(back).toFixed(0)} mm`, back < -0.55 * reach ? "start" : "middle"),
       text(at(front), 80, `${Math.abs(front).toFixed(0)} mm`, front > 0.55 * reach ? "end" : "middle"),
     );
-    const words = sentence(scene, [sharpBack, sharpFront], strains);
+    const words = sentence(scene, [sharpBack, sharpFront], isEyeTracked);
     note.textContent = words;
     svg.setAttribute("aria-label", `${words} The scene reaches from ${back.toFixed(1)} to ${front.toFixed(1)} mm.`);
   }
@@ -45,10 +46,10 @@ export function depthBars() {
 }
 
 /** One sentence that says which parts blur, or strain the eyes. */
-export function sentence([back, front], [sharpBack, sharpFront], strains) {
+export function sentence([back, front], [sharpBack, sharpFront], isEyeTracked) {
   const isBlurredBehind = back < sharpBack - 0.05;
   const isBlurredBefore = front > sharpFront + 0.05;
-  const [good, bad] = strains ? ["comfortable", "strain the eyes"] : ["sharp", "blur"];
+  const [good, bad] = isEyeTracked ? ["comfortable", "strain the eyes"] : ["sharp", "blur"];
   const range = `from ${-sharpBack.toFixed(0)} mm behind to ${sharpFront.toFixed(0)} mm in front.`;
   const sharp = `${good[0].toUpperCase()}${good.slice(1)} ${range}`;
   if (isBlurredBehind && isBlurredBefore) return `${sharp} The nearest and the farthest parts ${bad}.`;

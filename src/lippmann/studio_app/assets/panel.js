@@ -41,7 +41,7 @@ export class Panel {
   /** Displays what the studio found out about a state: depth, automatic values, warnings. */
   showFacts(facts) {
     this.facts = facts;
-    this.bars.show(facts.depth);
+    this.bars.show(facts.depth, facts.eye_tracked);
     this.warnings.replaceChildren(...facts.warnings.map((line) => h("li", {}, line)));
     this.warnings.hidden = facts.warnings.length === 0;
     this.show(this.store.state);

@@ -412,6 +412,25 @@ def test_copies_that_inherit_colours_of_their_own(read):
     assert [mesh.colors[0].tolist() for mesh in scene.meshes] == [[1, 0, 0], [0, 1, 0]]
 
 
+def test_copies_inherit_colours_that_materials_of_subsets_read(read):
+    subset = """    def GeomSubset "all" (prepend apiSchemas = ["MaterialBindingAPI"]) {
+        uniform token elementType = "face"
+        uniform token familyName = "materialBind"
+        int[] indices = [0]
+        rel material:binding = </mat>
+    }
+"""
+    body = painted(reader("c", "float3", "heat", "(0.5, 0.25, 1)"), HEAT)
+    body = body.replace("    rel material:binding = </mat>\n    point3f", f"{subset}    point3f")
+    body = body.replace('def Mesh "', 'class "shape"\n{\ndef Mesh "')
+    copies = "".join(
+        f'def "{name}" (instanceable = true\n inherits = </shape>)\n{{\n{color}\n}}\n'
+        for name, color in (("red", "color3f primvars:heat = (1, 0, 0)"), ("plain", ""))
+    )
+    scene = read(f"{body}\n}}\n{copies}")
+    assert [mesh.colors[0].tolist() for mesh in scene.meshes] == [[1, 0, 0], [0.5, 0.25, 1]]
+
+
 def test_other_inputs_by_primvars_are_named(read):
     nodes = reader("e", "float3", "displayColor", "(1, 1, 1)")
     scene = read(painted(nodes, "color3f inputs:emissiveColor.connect = </mat/e.outputs:result>"))

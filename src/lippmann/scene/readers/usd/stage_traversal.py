@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom, UsdLux, UsdSkel
+from pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdSkel
 
 from lippmann.scene.readers.usd.records import Arrays, Record
 from lippmann.scene.readers.usd.stage_layers import StageError
@@ -147,6 +147,8 @@ class Traversal:
         if skin is not None:
             place = self._world(skin.skeleton)
         material = self._materials.bound(prim)
+        for subset in UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets():
+            self._materials.bound(subset.GetPrim())  # whose colours part copies, too
         own = prim.GetPrimInPrototype() if prim.IsInstanceProxy() and skin is None else prim
         inherited = {name: inherited_color(prim, name) for name in self._materials.color_names}
         colors = {name: color for name, color in inherited.items() if color is not None}
