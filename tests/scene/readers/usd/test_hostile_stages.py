@@ -56,12 +56,24 @@ def test_a_layer_that_is_not_there_is_named(read):
     assert scene.notes == ["layer 'none.usda' not found: the scene lacks what it holds"]
 
 
-@pytest.mark.parametrize("ending", ["mtlx", "obj"])
-def test_a_layer_of_a_format_without_plugin_is_left_out(read, ending):
-    body = triangle() + f'def Scope "x" (prepend references = @look.{ending}@</MaterialX>) {{}}\n'
-    scene = read(body, files={f"look.{ending}": "<materialx/>"})
+@pytest.mark.parametrize(
+    ("name", "content", "note"),
+    [
+        ("look.obj", "v 0 0 0", "is of a format that the installed USD does not read: left out"),
+        ("look.mtlx", "<materialx>", "is no MaterialX that can be read (no element found"),
+        (
+            "look.mtlx",
+            '<materialx><standard_surface name="s"><input name="base" type="float" value="x"/></standard_surface>'
+            '<surfacematerial name="m"><input name="surfaceshader" nodename="s"/></surfacematerial></materialx>',
+            "is no MaterialX that can be read (could not convert string to float: 'x'): left out",
+        ),
+    ],
+)
+def test_a_layer_that_is_not_read_is_left_out(read, name, content, note):
+    body = triangle() + f'def Scope "x" (prepend references = @{name}@</MaterialX>) {{}}\n'
+    scene = read(body, files={name: content})
     assert len(scene.meshes) == 1
-    assert f"layer 'look.{ending}' is of a format that the installed USD does not read: left out" in scene.notes
+    assert scene.notes[0].startswith(f"layer '{name}' {note}")
 
 
 def test_a_unit_that_is_stored_in_single_precision_counts(tmp_path):

@@ -68,6 +68,13 @@ def test_a_coloured_coat_tints_the_base(read):
     assert read(material_x(STANDARD, inputs)).materials[0].base_color == pytest.approx((1.0, 0.5, 0.25))
 
 
+@pytest.mark.parametrize(("kind", "share"), [(STANDARD, "subsurface"), (OPEN_PBR, "subsurface_weight")])
+def test_light_that_is_scattered_below_has_its_own_colour(read, kind, share):
+    inputs = f"color3f inputs:base_color = (1, 0, 0)\n float inputs:{share} = 0.75\n"
+    inputs += "color3f inputs:subsurface_color = (0, 0, 1)"
+    assert read(material_x(kind, inputs)).materials[0].base_color == pytest.approx((0.25, 0.0, 0.75))
+
+
 def test_images_repeat_and_are_decoded_by_their_colour_space(read):
     nodes = """
     def Shader "t" {

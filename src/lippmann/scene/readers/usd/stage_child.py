@@ -80,13 +80,13 @@ def _open(request: Record) -> tuple[Usd.Stage, dict[str, None]]:
     key = json.dumps([request[name] for name in ("path", "stamp", "folder", "variants")])
     if key not in _opened:
         _opened.clear()
-        missing = check_layers(request["path"], request["folder"])
         layer = Sdf.Layer.FindOrOpen(request["path"])
         if layer is None:
             raise StageError("is no USD file", rule="its beginning is not that of one")
         layer.Reload()  # another file may have had this name
+        held, missing = check_layers(request["path"], request["folder"])
         stage = Usd.Stage.Open(layer, Usd.Stage.LoadAll)
-        stage.missing_layers = missing
+        stage.held_layers, stage.missing_layers = held, missing
         choose_variants(stage, request["variants"])
         _opened[key] = stage
     stage = _opened[key]

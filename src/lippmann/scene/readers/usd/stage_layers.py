@@ -6,6 +6,8 @@ import os
 
 from pxr import Sdf, Usd
 
+from lippmann.scene.readers.usd.stage_materialx import materialx_layer
+
 #: Layers that a stage may be made of.
 _MOST_LAYERS = 10_000
 #: Rounds in which a chosen variant may bring prims that have variants themselves.
@@ -20,8 +22,10 @@ class StageError(Exception):
         self.what, self.rule, self.fix = what, rule, fix
 
 
-def check_layers(path: str, folder: str | None) -> list[str]:
+def check_layers(path: str, folder: str | None) -> tuple[list[Sdf.Layer], list[str]]:
     """Look at all layers that a file leads to, before a stage is made of them.
+
+    In place of MaterialX documents, those that name them name layers of the same content.
 
     Parameters
     ----------
@@ -30,7 +34,7 @@ def check_layers(path: str, folder: str | None) -> list[str]:
 
     Returns
     -------
-    Notes on layers that are not there or not understood.
+    The layers, which must be held until the stage is made, and notes on those that are not there or not understood.
 
     Raises
     ------
@@ -39,12 +43,17 @@ def check_layers(path: str, folder: str | None) -> list[str]:
     """
     home = None if folder is None else os.path.realpath(folder)
     waiting, known, notes = [path], {path}, []
+    layers: list[Sdf.Layer] = []
+    documents: dict[str, Sdf.Layer] = {}
     while waiting:
         layer = Sdf.Layer.FindOrOpen(waiting.pop())
         if layer is None:
             continue
+        layers.append(layer)
         for name in sorted(filter(None, layer.GetCompositionAssetDependencies())):
             layer_path = layer.ComputeAbsolutePath(name)
+            if layer_path in documents:
+                _replace(layer, name, documents[layer_path])
             if layer_path in known:
                 continue
             known.add(layer_path)
@@ -58,11 +67,28 @@ def check_layers(path: str, folder: str | None) -> list[str]:
                 )
             if not os.path.isfile(_outer(layer_path)):
                 notes.append(f"layer '{name}' not found: the scene lacks what it holds")
-            elif Sdf.FileFormat.FindByExtension(layer_path) is None:  # MaterialX and others without a plugin
-                notes.append(f"layer '{name}' is of a format that the installed USD does not read: left out")
-            else:
+            elif Sdf.FileFormat.FindByExtension(layer_path) is not None:
                 waiting.append(layer_path)
-    return notes
+            elif _is_materialx(layer_path):
+                try:
+                    documents[layer_path] = materialx_layer(layer_path)
+                except ValueError as error:
+                    notes.append(f"layer '{name}' is no MaterialX that can be read ({error}): left out")
+                else:
+                    _replace(layer, name, documents[layer_path])
+            else:
+                notes.append(f"layer '{name}' is of a format that the installed USD does not read: left out")
+    return [*layers, *documents.values()], notes
+
+
+def _is_materialx(path: str) -> bool:
+    return path.rstrip("]").lower().endswith(".mtlx")
+
+
+def _replace(layer: Sdf.Layer, name: str, document: Sdf.Layer) -> None:
+    """Let a layer name a document's layer, in memory alone."""
+    layer.SetPermissionToEdit(True)
+    layer.UpdateCompositionAssetDependency(name, document.identifier)
 
 
 def _outer(name: str) -> str:
@@ -77,7 +103,8 @@ def _lies_in(name: str, home: str) -> bool:
 
 def used_files(stage: Usd.Stage) -> list[str]:
     """The files of all layers that a stage is made of."""
-    return sorted({_outer(layer.realPath) for layer in stage.GetUsedLayers() if layer.realPath})
+    names = [layer.realPath or layer.GetDisplayName().removesuffix(".usda") for layer in stage.GetUsedLayers()]
+    return sorted({_outer(name) for name in names if os.path.isfile(_outer(name))})
 
 
 def choose_variants(stage: Usd.Stage, choices: dict[str, str]) -> None:

@@ -21,11 +21,15 @@ _CONTEXTS = ("mtlx", "mdl")
 
 @dataclass(frozen=True)
 class _Model:
-    """Inputs by those of ``UsdPreviewSurface``: name and default; and what multiplies them, with its default."""
+    """Inputs by those of ``UsdPreviewSurface``: name and default; and what multiplies them, with its default.
+
+    ``subsurface`` is the share of light that is scattered below the surface, and has ``subsurface_color``.
+    """
 
     inputs: dict[str, tuple[str, Any]]
     weights: dict[str, tuple[str, float]] = field(default_factory=dict)
     coat_color: str = ""
+    subsurface: str = ""
 
 
 _WHITE, _LIGHT_GREY = [1.0, 1.0, 1.0], [0.8, 0.8, 0.8]
@@ -45,6 +49,7 @@ _MODELS = {
         },
         {"diffuseColor": ("base", 1.0), "emissiveColor": ("emission", 0.0)},
         "coat_color",
+        "subsurface",
     ),
     "ND_open_pbr_surface_surfaceshader": _Model(
         {
@@ -61,6 +66,7 @@ _MODELS = {
         },
         {"diffuseColor": ("base_weight", 1.0), "emissiveColor": ("emission_luminance", 0.0)},
         "coat_color",
+        "subsurface_weight",
     ),
     "ND_gltf_pbr_surfaceshader": _Model(
         {
@@ -144,6 +150,8 @@ def as_preview(kind: str, given: Record) -> Record:
     for preview, (name, usual) in model.weights.items():
         weight = _number(given, name, usual)
         inputs[preview] = _scale(inputs[preview], [weight, weight, weight])
+    if share := _number(given, model.subsurface, 0.0):
+        inputs["diffuseColor"] = _mix(inputs["diffuseColor"], given.get("subsurface_color", {"value": _WHITE}), share)
     coat, tint = _number(inputs, "clearcoat", 0.0), given.get(model.coat_color)
     if coat > 0.0 and tint is not None:
         inputs["diffuseColor"] = _under_coat(inputs["diffuseColor"], tint, coat)
@@ -184,6 +192,14 @@ def _under_coat(base: Record, tint: Record, coat: float) -> Record:
     if coat == 1.0 and isinstance(color := base.get("value"), list):
         return _scale(tint, color)
     return base
+
+
+def _mix(below: Record, above: Record, share: float) -> Record:
+    """One colour over another; where one is a picture, that of the larger share."""
+    first, second = below.get("value"), above.get("value")
+    if isinstance(first, list) and isinstance(second, list):
+        return {"value": [a + share * (b - a) for a, b in zip(first, second, strict=True)]}
+    return above if share >= 0.5 else below
 
 
 def _scale(source: Record, factors: list[float]) -> Record:

@@ -1,0 +1,91 @@
+"""MaterialX documents that stages refer to: their materials are those of the paths that USD's own plugin gives them."""
+
+import zipfile
+
+import numpy as np
+import pytest
+
+from lippmann.scene.readers.load import load_scene
+
+from .conftest import HEAD, triangle
+from .test_stage_materials import PICTURE, png
+
+DOCUMENT = """<?xml version="1.0"?>
+<materialx version="1.38" colorspace="lin_rec709">
+  <nodegraph name="NG" fileprefix="tex/">
+    <input name="tiling" type="vector2" value="2, 3"/>
+    <tiledimage name="color" type="color3">
+      <input name="file" type="filename" value="t.png" colorspace="srgb_texture"/>
+      <input name="uvtiling" type="vector2" interfacename="tiling"/>
+    </tiledimage>
+    <image name="rough" type="float"><input name="file" type="filename" value="t.png"/></image>
+    <image name="bent" type="vector3"><input name="file" type="filename" value="t.png"/></image>
+    <normalmap name="normal" type="vector3"><input name="in" type="vector3" nodename="bent"/></normalmap>
+    <output name="o_color" type="color3" nodename="color"/>
+    <output name="rough" type="float" nodename="rough"/>
+    <output name="normal" type="vector3" nodename="normal"/>
+  </nodegraph>
+  <constant name="half" type="float"><input name="value" type="float" value="0.5"/></constant>
+  <standard_surface name="s" type="surfaceshader">
+    <input name="base" type="float" value="1"/>
+    <input name="base_color" type="color3" nodegraph="NG" output="o_color"/>
+    <input name="specular_roughness" type="float" nodegraph="NG" output="rough"/>
+    <input name="normal" type="vector3" nodegraph="NG" output="normal"/>
+    <input name="metalness" type="float" nodename="half"/>
+  </standard_surface>
+  <surfacematerial name="pictures" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="s"/>
+  </surfacematerial>
+  <UsdPreviewSurface name="p" type="surfaceshader">
+    <input name="diffuseColor" type="color3" value="0.2, 0.4, 0.6"/>
+    <input name="roughness" type="float" value="0.25"/>
+  </UsdPreviewSurface>
+  <surfacematerial name="plain" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="p"/>
+  </surfacematerial>
+</materialx>
+"""
+
+
+def looks(material, more=""):
+    mesh = triangle(
+        more=f"rel material:binding = </looks/{material}>\n"
+        'texCoord2f[] primvars:st = [(0, 0), (1, 0), (0, 1)] (interpolation = "vertex")'
+    ).replace('"m"', '"m" (prepend apiSchemas = ["MaterialBindingAPI"])')
+    return f'def "looks" (prepend references = @look/x.mtlx@</MaterialX/Materials>) {{\n{more}\n}}\n' + mesh
+
+
+FILES = {"look/x.mtlx": DOCUMENT, "look/tex/t.png": png(PICTURE)}
+
+
+def test_images_of_a_graph(read):
+    scene = read(looks("pictures"), files=FILES)
+    material = scene.materials[0]
+    texture = material.base_color_texture
+    assert texture.srgb
+    assert (texture.uv_transform[0, 0], texture.uv_transform[1, 1]) == (2.0, 3.0)
+    rough = material.metallic_roughness_texture.image.pixels[..., 1]
+    np.testing.assert_allclose(rough, np.asarray(PICTURE)[..., 0] / 255, atol=1 / 255)
+    assert material.metallic == 0.5
+    assert material.normal_texture is not None
+    assert scene.notes == []
+
+
+@pytest.mark.parametrize(
+    ("more", "color"),
+    [("", (0.2, 0.4, 0.6)), ('over "plain" {\ncolor3f inputs:diffuseColor = (1, 0, 0)\n}', (1.0, 0.0, 0.0))],
+)
+def test_plain_values_and_those_that_a_stage_sets(read, more, color):
+    material = read(looks("plain", more), files=FILES).materials[0]
+    assert material.base_color == pytest.approx(color)
+    assert material.roughness == 0.25
+
+
+def test_a_document_in_a_package(tmp_path):
+    with zipfile.ZipFile(tmp_path / "s.usdz", "w") as package:
+        package.writestr("stage.usda", HEAD + looks("pictures"))
+        for name, data in FILES.items():
+            package.writestr(name, data)
+    scene = load_scene(tmp_path / "s.usdz").description
+    assert scene.materials[0].base_color_texture.image.pixels.shape == (*np.shape(PICTURE)[:2], 3)
+    assert scene.notes == []
