@@ -110,6 +110,20 @@ def test_a_comment_after_a_texture(material, picture):
     assert material("map_Kd wood.png # of the door\n").base_color_texture.image.pixels[0, 0, 0] == 100
 
 
+def test_textures_in_tiles_lie_where_their_coordinates_are(material, picture):
+    picture("t.1002.png", [[[255, 0, 0]]])
+    picture("t.1011.png", np.full((2, 2, 3), (0, 255, 0)))
+    texture = material("map_Kd t.<UDIM>.png\n").base_color_texture
+    pixels = texture.image.pixels
+    assert pixels.shape == (4, 4, 3)  # two by two tiles, each as large as the largest
+    for place, color in (((1.5, 0.5), (255, 0, 0)), ((0.25, 1.25), (0, 255, 0)), ((0.5, 0.5), (0, 0, 0))):
+        u, v, _ = texture.uv_transform @ (place[0], 1.0 - place[1], 1.0)
+        assert pixels[int(4 * v), int(4 * u)].tolist() == list(color)
+    assert material("map_Kd none.<UDIM>.png\n", notes=True) == [
+        "m.mtl:2: texture 'none.1001.png' not found: shown without it"
+    ]
+
+
 def test_quotes_around_a_texture(material, picture):
     picture("old wood.png", np.full((2, 2, 3), 100))
     found = material('map_Kd -s 1 1 1 "old wood.png" # of the door\n')

@@ -237,6 +237,14 @@ def test_comments_after_names(read):
     assert not scene.notes
 
 
+def test_backslashes_before_the_spaces_of_libraries(read):
+    text = "mtllib none.mtl first\\ half.mtl second\\ half.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n"
+    libraries = {"first half.mtl": "newmtl a\nKd 1 0 0\n", "second half.mtl": "newmtl b\nKd 0 0 1\n"}
+    scene = read(text, **libraries)
+    assert {material.base_color for material in scene.materials} == {(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)}
+    assert len(scene.notes) == 1  # of the first name alone
+
+
 def test_quotes_around_a_library(read):
     scene = read(
         'mtllib "my colours.mtl"\n' + SQUARE + "usemtl a\nf 1 2 3\n", **{"my colours__mtl": "newmtl a\nKd 1 0 0\n"}

@@ -184,9 +184,10 @@ class NamedFiles:
 
 
 def names_on_line(body: str) -> tuple[str, str, str]:
-    """Names that the rest of a line may be: all of it, what stands before a comment, and that without its quotes."""
+    """Names that the rest of a line may be: all of it, what stands before a comment, and that without quotes and the
+    backslashes before its spaces."""
     plain = strip_comment(body)
-    return body, plain, plain.strip('"')
+    return body, plain, plain.strip('"').replace("\\ ", " ")
 
 
 def strip_comment(body: str) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lippmann.scene.parsing import texture_maps
 from lippmann.scene.parsing.files import MissingFileError, NamedFiles, read_image
+from lippmann.scene.parsing.udim import TiledImage, is_tiled, read_tiles
 from lippmann.scene.readers.mtl import MapReference, MtlRecord
 from lippmann.scene.values.description import Color, Image, Material, Texture, Wrap
 
@@ -80,7 +81,7 @@ class MaterialMapper:
         maps, numbers = dict(record.maps), dict(record.numbers)
         for key, reference in record.maps.items():
             try:
-                self._path(reference)
+                self._image(reference) if is_tiled(reference.file) else self._path(reference)
             except MissingFileError as error:
                 self._note_once(error.note("shown without it"))
                 del maps[key]
@@ -219,6 +220,18 @@ class MaterialMapper:
             self._note(record, f"{key.capitalize()} above 1 is taken as 1")
         return _clip(color, 1.0 if clip else np.inf)
 
+    def _image(self, reference: MapReference) -> Image:
+        name = reference.file
+        if is_tiled(name):
+            key = Path(name)  # which no file can have
+            if key not in self._images:
+                self._images[key] = read_tiles(name, lambda tile: self._image(replace(reference, file=tile(name))))
+            return self._images[key]
+        path = self._path(reference)
+        if path not in self._images:
+            self._images[path] = read_image(path, where=reference.where)
+        return self._images[path]
+
     def _path(self, reference: MapReference) -> Path:
         name = reference.file
         if name not in self._paths:
@@ -226,18 +239,16 @@ class MaterialMapper:
         return self._paths[name]
 
     def _texture(self, reference: MapReference, *, srgb: bool) -> Texture:
-        path = self._path(reference)
-        if path not in self._images:
-            self._images[path] = read_image(path, where=reference.where)
+        image, transform = self._image(reference), _uv_transform(reference)
         ignored = sorted(set(reference.options) & {"-mm", "-t", "-cc"})
         if ignored:
             self._note_once(f"{reference.where}: not honoured: {', '.join(ignored)}")
         is_clamped = reference.options.get("-clamp", ("off",))[0].lower() == "on"
+        if isinstance(image, TiledImage):
+            is_clamped, transform = True, image.inside @ transform
         wrap: Wrap = "clamp" if is_clamped else "repeat"
         srgb = srgb and reference.options.get("-colorspace", ("sRGB",))[0].lower() != "linear"
-        return Texture(
-            image=self._images[path], srgb=srgb, wrap_u=wrap, wrap_v=wrap, uv_transform=_uv_transform(reference)
-        )
+        return Texture(image, srgb, wrap, wrap, uv_transform=transform)
 
     def _note(self, record: MtlRecord, text: str) -> None:
         self._note_once(f"material '{record.name}': {text}")

@@ -7,6 +7,7 @@ Python (tinyobjloader). Materials are mapped in ``mtl_to_pbr.py``.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -398,7 +399,8 @@ def _read_libraries(libraries: Lines, file: str, named: NamedFiles) -> tuple[dic
         # One name with spaces, or several names: only the folder can tell.
         names = names_on_line(body)
         whole = next((name for name in names if is_file(named.folder / name)), None)
-        for name in [whole] if whole else names[1].split():
+        for word in [whole] if whole else re.split(r"(?<!\\)\s+", names[1]):
+            name = word if whole else word.replace("\\ ", " ")
             looked_for += 1
             if looked_for > _MOST_LIBRARIES:
                 rule = f"at most {_MOST_LIBRARIES} are looked for"

@@ -118,6 +118,18 @@ def test_a_colour_texture(read):
     assert place == {(0, 0, 0): [0, 1], (1, 0, 0): [1, 1], (0, 1, 0): [0, 0]}
 
 
+def test_a_texture_in_tiles(read):
+    body = surface("color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>", texture(file="tex/t.<UDIM>.png"))
+    files = {"tex/t.1001.png": png([[[255, 0, 0]]]), "tex/t.1012.png": png([[[0, 0, 255]]])}
+    scene = read(body, files=files)
+    found = scene.materials[0].base_color_texture
+    assert (found.wrap_u, found.wrap_v) == ("clamp", "clamp")
+    for place, color in (((0.5, 0.5), (255, 0, 0)), ((1.5, 1.5), (0, 0, 255))):
+        u, v, _ = found.uv_transform @ (place[0], 1.0 - place[1], 1.0)
+        assert found.image.pixels[int(2 * v), int(2 * u)].tolist() == list(color)
+    assert scene.notes == []
+
+
 def test_scale_is_a_factor_and_bias_is_added_to_linear_values(read):
     scaled = surface(
         "color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>",

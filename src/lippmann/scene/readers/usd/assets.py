@@ -18,6 +18,7 @@ from lippmann.runtime.atomic_write import scratch_folder
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import MissingFileError, NamedFiles, decode_image, read_bytes
 from lippmann.scene.parsing.texture_maps import unit
+from lippmann.scene.parsing.udim import is_tiled, read_tiles
 from lippmann.scene.readers.environment_map import possible_light, read_environment, read_linear
 from lippmann.scene.readers.usd.records import Record
 from lippmann.scene.values.description import Image
@@ -69,7 +70,7 @@ class Assets:
     _images: dict[str, Image | None] = field(default_factory=dict)
 
     def image(self, asset: Record) -> Image | None:
-        """A texture; None, with a note, of one in tiles (``<UDIM>``) and of one that is not found.
+        """A texture; None, with a note, of one that is not found.
 
         Pictures of light (OpenEXR, Radiance) are linear float32, finite and not negative.
 
@@ -87,11 +88,12 @@ class Assets:
                 self._images[key] = None
         return self._images[key]
 
-    def _load(self, asset: Record) -> Image | None:
+    def _load(self, asset: Record) -> Image:
         name = asset["name"]
-        if "<UDIM>" in name:
-            self.notes[f"texture '{name}' is in tiles, which are not read"] = None
-            return None
+        if is_tiled(name):
+            return read_tiles(
+                name, lambda tile: self._load({**asset, "name": tile(name), "found": tile(asset["found"])})
+            )
         if name.lower().endswith(_LIGHT_SUFFIXES):
             with self._file(asset) as path:
                 pixels, notes = read_linear(path)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.scene.parsing import texture_maps
+from lippmann.scene.parsing.udim import TiledImage
 from lippmann.scene.readers.usd.assets import Assets
 from lippmann.scene.readers.usd.records import Record
 from lippmann.scene.values.description import AlphaMode, Color, Image, Material, Matrix, Texture, Wrap
@@ -235,13 +236,16 @@ class SurfaceReader:
         if uv_name not in self._uv_names:
             self._uv_names.append(uv_name)
         wraps = [_WRAPS.get(str(node.get(key, {}).get("value", ""))) for key in ("wrapS", "wrapT")]
+        if isinstance(image, TiledImage):
+            wraps = ["clamp", "clamp"]
         border = [2 * int(wrap is None) for wrap in wraps]
+        inside = image.inside if isinstance(image, TiledImage) else _inside_border(image, border[0], border[1])
         return Texture(
             image=image if not any(border) else _with_border(image, border[0], border[1]),
             srgb=False,
             wrap_u=wraps[0] or "clamp",
             wrap_v=wraps[1] or "clamp",
-            uv_transform=_inside_border(image, border[0], border[1]) @ transform,
+            uv_transform=inside @ transform,
             uv_set=self._uv_names.index(uv_name),
         )
 
