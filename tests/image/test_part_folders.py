@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import OutputError, PictureError
-from lippmann.image import compose, read_picture, write_micro_images, write_views
+from lippmann.image import IntegralImage, compose, read_picture, write_micro_images, write_views
 from lippmann.image.part_folders import MANIFEST
 from lippmann.image.write import write_plain_picture
 
@@ -147,8 +147,9 @@ def test_a_file_of_another_size_or_depth_is_named(views):
 def test_other_layers_than_the_first_are_refused(tmp_path, display, picture):
     folder = tmp_path / "views"
     write_views(picture(display("square")), folder)
-    map_ = np.zeros((3, 4), np.float32)
-    write_plain_picture(np.zeros((3, 4, 3), np.float32), folder / "view_1_2.exr", maps={"depth": map_})
+    maps = {"depth": np.zeros((3, 4), np.float32)}
+    view = IntegralImage(np.zeros((3, 4, 3), np.float32), display("square").resized(4, 3), maps=maps)
+    view.save(folder / "view_1_2.exr")
     with pytest.raises(PictureError, match=r"view_1_2.exr: has the layers RGB, depth; all files"):
         compose(folder)
 

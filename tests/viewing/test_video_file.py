@@ -80,7 +80,7 @@ def test_depth_beside_colour_comes_back_within_its_code(tmp_path, codec):
 def test_a_film_of_quilts_says_its_layout(tmp_path, codec):
     layout = QuiltLayout(8, 6, 0.75)
     path = tmp_path / "film_qs8x6a0.75.mp4"
-    write_animation(frames(), path, codec=codec, quilt=layout)
+    write_codes((quantize(frame, 8, "srgb") for frame in frames()), path, codec=codec, quilt=layout)
     with av.open(str(path)) as video:
         assert video.metadata["title"] == "film_qs8x6a0.75"
         assert metadata_of_text(video.metadata["comment"], "film").layout == layout
@@ -95,7 +95,7 @@ def test_views_of_a_film_of_quilts_are_whole_pixels(tmp_path):
     greys = np.linspace(0.05, 0.95, 15).reshape(3, 5)
     frame = np.repeat(np.kron(greys, np.ones((151, 103)))[..., None], 3, axis=2).astype(np.float32)
     path = tmp_path / "film_qs5x3a1.mp4"
-    write_animation([frame], path, quilt=layout)
+    write_codes([quantize(frame, 8, "srgb")], path, quilt=layout)
     with av.open(str(path)) as video:
         codes = next(video.decode(video=0)).to_ndarray(format="rgb24")
     assert codes.shape == (450, 510, 3)

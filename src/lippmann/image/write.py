@@ -137,7 +137,6 @@ def write_plain_picture(
     *,
     bits: int | None = None,
     transfer: Transfer = "srgb",
-    maps: Mapping[str, Layer] | None = None,
 ) -> None:
     """Write an ordinary picture, such as a replay or a preview, without metadata.
 
@@ -149,8 +148,6 @@ def write_plain_picture(
         The file and its bits per channel, see :func:`format_for`.
     transfer:
         Coding of the values in integer formats.
-    maps:
-        Further layers, ``(H, W)`` or ``(H, W, 2 to 4)``; OpenEXR alone keeps them.
 
     Raises
     ------
@@ -162,7 +159,7 @@ def write_plain_picture(
     target, (height, width) = format_for(path, bits), pixels.shape[:2]
     if not np.isfinite(pixels).all():
         raise PictureError("the picture holds values that are not finite", where=str(path))
-    _write(path, target, lambda first, last: pixels[first:last], (width, height), transfer, maps=maps)
+    _write(path, target, lambda first, last: pixels[first:last], (width, height), transfer)
 
 
 @contextmanager

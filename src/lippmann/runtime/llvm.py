@@ -207,9 +207,9 @@ def _ask(path: Path) -> tuple[int, ...]:
 
 
 @functools.cache
-def elf_head(program: Path = Path(sys.executable)) -> tuple[bytes, bytes]:
-    """Of a program of Linux, and of all libraries that go with it: kind of the ELF file, and code of the processor."""
-    with program.open("rb") as file:
+def elf_head() -> tuple[bytes, bytes]:
+    """Kind of the ELF file and code of the processor, of the running Python and all libraries that go with it."""
+    with Path(sys.executable).open("rb") as file:
         return kind_of(file.read(20))
 
 

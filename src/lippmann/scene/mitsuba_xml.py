@@ -162,7 +162,7 @@ class _Reader:
             elif child.tag == "path":
                 value = self._substitute(child, known).get("value")
                 near = [path.parent, *paths, *folders, self.folder]
-                paths.insert(0, self.named.find_folder(value, where=child._origin, what="search path", folders=near))
+                paths.insert(0, self.named.find_folder(value, where=child._origin, folders=near))
         if level == 0:
             self._scene_folders = [*paths, self.folder]
         return self._element(raw, path, parameters, [*paths, *folders], level, is_root=True)

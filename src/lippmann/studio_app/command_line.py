@@ -22,9 +22,9 @@ _ASSUMED = {
 }
 
 
-def render_command(state: StudioState, output: str | None = None, *, allow_outside: bool = False) -> list[str]:
+def render_command(state: StudioState, *, allow_outside: bool = False) -> list[str]:
     """The words of the ``lippmann render`` command that renders a state; ``shlex.join`` makes a line of them."""
-    words = ["lippmann", "render", *words_of_state(state), *(() if output is None else ("--output", output))]
+    words = ["lippmann", "render", *words_of_state(state)]
     return [*words, "--allow-outside"] if allow_outside else words
 
 

@@ -29,11 +29,12 @@ from lippmann.studio_app.session import WITHOUT_FILE, StudioSession, open_state
 from lippmann.studio_app.state import StudioState
 from lippmann.studio_app.state_toml import text_of_state, with_whole_paths
 from lippmann.studio_app.wire import (
+    LARGEST_NUMBER,
     Coding,
     FrameHeader,
+    count_of,
     encode_frame,
     message_text,
-    number_of,
     numbers_of,
     parse_message,
 )
@@ -46,7 +47,6 @@ _VIEW_SECONDS = 1 / 120
 
 #: Longest side of a picture in pixels, and the farthest that an eye may stand, in mm.
 _MOST_SIDE, _FARTHEST = 4096, 1e5
-_LARGEST_NUMBER = 2**32 - 1
 
 #: How a page leaves, perhaps in the middle of a frame, and how one that takes nothing any more is left.
 _PAGE_LEFT = (WebSocketDisconnect, ConnectionError, TimeoutError, asyncio.TimeoutError)
@@ -160,7 +160,7 @@ class LiveSocket:
         }
 
     def _acknowledge(self, said: dict[str, Any]) -> None:
-        self._acknowledged = max(self._acknowledged, min(self._sent, int(number_of(said, "frame", 0, _LARGEST_NUMBER))))
+        self._acknowledged = max(self._acknowledged, min(self._sent, count_of(said, "frame")))
         self._changed.set()
 
     def _set_view(self, said: dict[str, Any]) -> None:
@@ -168,11 +168,11 @@ class LiveSocket:
         self._looked.set()
 
     def _want(self, said: dict[str, Any]) -> None:
-        self._view = int(number_of(said, "number", 0, _LARGEST_NUMBER))
+        self._view = count_of(said, "number")
         width, height = (max(1, round(side)) for side in numbers_of(said, "size", 2, _MOST_SIDE))
         state = self._take_over(said)
         if said.get("eye") is None:
-            left, top, columns, rows = (round(part) for part in numbers_of(said, "window", 4, _LARGEST_NUMBER))
+            left, top, columns, rows = (round(part) for part in numbers_of(said, "window", 4, LARGEST_NUMBER))
             panel = self._session.display(state).panel
             left, top = min(max(left, 0), panel.width - 1), min(max(top, 0), panel.height - 1)
             columns, rows = min(max(columns, 1), panel.width - left), min(max(rows, 1), panel.height - top)

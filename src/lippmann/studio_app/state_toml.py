@@ -86,14 +86,9 @@ def state_of_text(text: str, *, where: str = "state", folder: Path | None = None
         raise UsageError(error.what, where=place, parameter=error.parameter, rule=error.rule, fix=error.fix) from None
 
 
-def text_of_state(state: StudioState, folder: Path | None = None) -> str:
-    """A state as TOML: scene, display, and what differs from a new studio.
-
-    ``folder`` is where the file will lie: names of files in it or below it are told from there.
-    """
+def text_of_state(state: StudioState) -> str:
+    """A state as TOML: scene, display, and what differs from a new studio."""
     values = {name: getattr(state, name) for name in _FIRST} | changed_options(state)
-    if folder is not None:
-        values |= {name: _relative_name(values[name], folder) for name in FILES if values.get(name) is not None}
     return "\n".join(lines_of(values)) + "\n"
 
 
@@ -113,14 +108,6 @@ def _resolve_file(name: str, folder: Path) -> str:
     """A file's name as seen from the working directory, if there is such a file in ``folder``; else the name itself."""
     path = folder / name
     return str(path) if not Path(name).is_absolute() and path.is_file() else name
-
-
-def _relative_name(name: str, folder: Path) -> str:
-    path = Path(name)
-    if not _is_file(name):
-        return name
-    absolute, base = path.resolve(), folder.resolve()
-    return absolute.relative_to(base).as_posix() if absolute.is_relative_to(base) else str(absolute)
 
 
 def _syntax_error(message: str, where: str) -> UsageError:

@@ -33,6 +33,9 @@ from lippmann.errors import UsageError
 
 Coding = Literal["jpeg", "png", "rgb"]
 
+#: Of frames and views, which messages have as unsigned 32-bit numbers.
+LARGEST_NUMBER = 2**32 - 1
+
 CODINGS: tuple[Coding, ...] = ("jpeg", "png", "rgb")
 
 #: Quality of JPEG, 4:4:4: its errors stay below those of a single sample per pixel.
@@ -112,12 +115,12 @@ def parse_message(text: object) -> dict[str, Any]:
     return message
 
 
-def number_of(message: dict[str, Any], name: str, low: float, high: float) -> float:
-    """A number of a message, within its range; a UsageError otherwise."""
+def count_of(message: dict[str, Any], name: str) -> int:
+    """A count of a message, 0 to :data:`LARGEST_NUMBER`; a UsageError otherwise."""
     value = message.get(name)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-        raise UsageError(f"{str(value)[:40]!r}", parameter=name, rule=f"must be a number from {low:g} to {high:g}")
-    return float(value)
+    if not _is_number(value, LARGEST_NUMBER) or value < 0:
+        raise UsageError(f"{str(value)[:40]!r}", parameter=name, rule=f"must be a number from 0 to {LARGEST_NUMBER:g}")
+    return int(value)
 
 
 def numbers_of(message: dict[str, Any], name: str, count: int, limit: float) -> tuple[float, ...]:

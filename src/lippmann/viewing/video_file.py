@@ -70,7 +70,6 @@ def write_animation(
     frames_per_second: float = 24.0,
     transfer: Transfer = "srgb",
     codec: Codec | None = None,
-    quilt: QuiltLayout | None = None,
 ) -> None:
     """Write frames as an animation.
 
@@ -80,8 +79,7 @@ def write_animation(
         At least one frame ``(H, W, 3)`` of linear RGB; all have one size.
     path:
         The file: ``.png`` or ``.apng`` for APNG, which repeats forever, ``.mp4``, or an ending of a plugin's. MP4 needs
-        even sizes: an odd last column or row is doubled; of quilts, each view loses one, so that views stay whole
-        pixels.
+        even sizes: an odd last column or row is doubled.
     frames_per_second:
         Frame rate.
     transfer:
@@ -89,8 +87,6 @@ def write_animation(
     codec:
         Of an MP4 file; None for ``h264``, or ``hevc`` where a side is longer than 4096. ``h264-rgb`` and ``vp9-rgb``
         keep each code as it is, and odd sizes.
-    quilt:
-        Layout of the frames if they are quilts; an MP4 file says it in its metadata.
 
     Raises
     ------
@@ -99,13 +95,8 @@ def write_animation(
     UsageError
         If a codec is given, and the file is no MP4.
     """
-    write_codes(
-        (quantize(frame, 8, transfer) for frame in frames),
-        path,
-        frames_per_second=frames_per_second,
-        codec=codec,
-        quilt=quilt,
-    )
+    codes = (quantize(frame, 8, transfer) for frame in frames)
+    write_codes(codes, path, frames_per_second=frames_per_second, codec=codec)
 
 
 def write_codes(
@@ -119,8 +110,9 @@ def write_codes(
 ) -> None:
     """Write frames ``(H, W, 3)`` of 8-bit codes as an animation; parameters and errors as of :func:`write_animation`.
 
-    The next frame is made while one is coded and written; no more are held. With ``has_depth`` a lossy codec loses next
-    to nothing, about two codes at most.
+    The next frame is made while one is coded and written; no more are held. ``quilt`` is the layout of frames that are
+    quilts: an MP4 file says it in its metadata, and views of odd sizes lose a column or row, so that they stay whole
+    pixels. With ``has_depth`` a lossy codec loses next to nothing, about two codes at most.
     """
     check_animation_path(path, codec)
     film = _film_of(path)

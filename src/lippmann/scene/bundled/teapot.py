@@ -321,11 +321,12 @@ def describe() -> SceneDescription:
     )
 
 
-def _studio(height: int = 256) -> FloatArray:
+def _studio() -> FloatArray:
     """Paint a studio: a grey shell, brighter above, with two soft boxes and a strip whose reflections model the glaze.
 
-    Equirectangular ``(height, 2 height, 3)`` radiance, row 0 up, the middle column toward -z.
+    Equirectangular ``(256, 512, 3)`` radiance, row 0 up, the middle column toward -z.
     """
+    height = 256
     elevation = np.pi / 2 - (np.arange(height) + 0.5) * np.pi / height
     azimuth = (np.arange(2 * height) + 0.5) * np.pi / height - np.pi
     up = np.sin(elevation)[:, None, None]

@@ -158,25 +158,24 @@ class NamedFiles:
             raise _outside(name, where, what)
         raise MissingFileError(f"{what} '{name}' not found", where=where, fix=_similar(allowed[0]) if allowed else "")
 
-    def find_on_line(self, body: str, *, where: str, what: str) -> Path:
-        """The file that the rest of a line names: all of it, spaces and all, or what stands before a comment; quotes
+    def find_on_line(self, body: str, *, where: str) -> Path:
+        """The texture that the rest of a line names: all of it, spaces and all, or what stands before a comment; quotes
         around a name, as some exporters write them, are none of it."""
         names = names_on_line(body)
-        return self.find(
-            next((name for name in names if is_file(self.folder / name)), names[-1]), where=where, what=what
-        )
+        name = next((name for name in names if is_file(self.folder / name)), names[-1])
+        return self.find(name, where=where, what="texture")
 
-    def find_folder(self, name: str, *, where: str, what: str, folders: Sequence[Path]) -> Path:
-        """The folder that ``name`` means, seen from the first of ``folders`` that has it; errors as of :meth:`find`."""
+    def find_folder(self, name: str, *, where: str, folders: Sequence[Path]) -> Path:
+        """The search path that ``name`` means, in the first of ``folders`` that has it; errors as of :meth:`find`."""
         plain = name.replace("\\", "/")
         candidates = [Path(plain)] if _is_absolute(name) else [folder / plain for folder in folders]
         allowed = [candidate for candidate in candidates if self.admits(candidate)]
         if not allowed:
-            raise _outside(name, where, what)
+            raise _outside(name, where, "search path")
         for candidate in allowed:
             if is_folder(candidate):
                 return candidate
-        raise SceneError(f"{what} '{name}' not found", where=where, rule="it must be a folder")
+        raise SceneError(f"search path '{name}' not found", where=where, rule="it must be a folder")
 
     def admits(self, path: Path) -> bool:
         """Whether the scene file may name a file, wherever links lead."""

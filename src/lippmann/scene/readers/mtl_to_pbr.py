@@ -235,7 +235,7 @@ class MaterialMapper:
     def _path(self, reference: MapReference) -> Path:
         name = reference.file
         if name not in self._paths:
-            self._paths[name] = self._named.find_on_line(name, where=reference.where, what="texture")
+            self._paths[name] = self._named.find_on_line(name, where=reference.where)
         return self._paths[name]
 
     def _texture(self, reference: MapReference, *, srgb: bool) -> Texture:

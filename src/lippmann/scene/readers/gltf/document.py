@@ -165,11 +165,11 @@ class Document:
             raise source.error(key, "it is required")
         return index
 
-    def references(self, source: Fields, key: str, kind: Kind) -> list[int]:
-        """As :meth:`reference`, for a list of indices."""
+    def node_references(self, source: Fields, key: str) -> list[int]:
+        """As :meth:`reference`, for a list of nodes."""
         indices = source.integers(key)
-        if any(index >= len(self.all(kind)) for index in indices):
-            raise source.error(key, f"there are {len(self.all(kind))} {kind}, counted from 0")
+        if any(index >= len(self.all("nodes")) for index in indices):
+            raise source.error(key, f"there are {len(self.all('nodes'))} nodes, counted from 0")
         return indices
 
     def error(self, what: str, rule: str = "", fix: str = "") -> SceneError:

@@ -41,7 +41,7 @@ class Nodes:
         self._is_near = np.abs(self._locals).max(axis=(1, 2), initial=0.0) < _FARTHEST
         self._worlds: dict[int, Matrix] = {}
         for index, fields in enumerate(document.all("nodes")):
-            for child in document.references(fields, "children", "nodes"):
+            for child in document.node_references(fields, "children"):
                 if child in self._parents:
                     raise document.error(
                         f"nodes[{child}] is a child of nodes[{self._parents[child]}] and of nodes[{index}]",
@@ -77,7 +77,7 @@ class Nodes:
         scene = scenes[document.reference(document.root, "scene", "scenes") or 0]
         if len(scenes) > 1:
             document.notes.add(f"of {len(scenes)} scenes '{scene.text('name') or scene.place}' is shown")
-        return document.references(scene, "nodes", "nodes")
+        return document.node_references(scene, "nodes")
 
     def world(self, index: int) -> Matrix:
         """``world_from_node`` of a node, 4x4 float64.

@@ -31,7 +31,7 @@ def read_skin(index: int, document: Document, accessors: Accessors, nodes: Nodes
         A skin without joints, or with fewer inverse bind matrices than joints.
     """
     fields = document.all("skins")[index]
-    joints = document.references(fields, "joints", "nodes")
+    joints = document.node_references(fields, "joints")
     if not joints:
         raise fields.error("joints", "a skin has at least one")
     worlds = np.array([nodes.world(joint) for joint in joints])

@@ -69,7 +69,7 @@ class SurfaceReader:
         self._uv_names = []
         inputs = record["inputs"]
         name = record["name"]
-        if _is_set(inputs, "displacement"):
+        if _is_displaced(inputs):
             self.notes["displacement is not honoured"] = None
         color, color_texture = self._color(inputs, "diffuseColor", (0.18, 0.18, 0.18))
         emission, emission_texture = self._color(inputs, "emissiveColor", (0.0, 0.0, 0.0))
@@ -364,6 +364,6 @@ def _fraction(color: Color) -> Color:
     return (red, green, blue)
 
 
-def _is_set(inputs: Record, name: str) -> bool:
-    source = inputs.get(name)
+def _is_displaced(inputs: Record) -> bool:
+    source = inputs.get("displacement")
     return source is not None and ("texture" in source or _scalar_of(source, 0.0) != 0.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,66 +54,80 @@ def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
         The plotter shows no surface and no volume, or several volumes.
     """
     renderer = plotter.renderers[0]
-    notes: list[str] = []
+    scene = _Plotted()
     if len(plotter.renderers) > 1:
-        notes.append(f"of {len(plotter.renderers)} renderers the first is shown")
-    meshes: list[Mesh] = []
-    materials: list[Material] = []
-    instances: list[Instance] = []
-    volumes: list[Volume] = []
+        scene.notes.append(f"of {len(plotter.renderers)} renderers the first is shown")
     ignored = 0
     for name, actor in renderer.actors.items():
         mapper = getattr(actor, "mapper", None)
         if mapper is not None and mapper.GetInputAlgorithm() is not None:
             mapper.GetInputAlgorithm().Update()  # data are made of others when they are first drawn
-        source = getattr(mapper, "dataset", None)
-        if source is None or not actor.GetVisibility():
+        if getattr(mapper, "dataset", None) is None or not actor.GetVisibility():
             ignored += 1
-            continue
-        title = str(name).partition("(Addr=")[0]
-        left_out = _left_out(actor, mapper)
-        if left_out:
-            notes.append(f"'{title[:40]}': {', '.join(left_out)}: not taken over")
-        if actor.IsA("vtkVolume"):
-            volumes.append(_volume(actor, source, title))
-            continue
-        for block in _blocks(mapper, source, title):
-            try:
-                surface, texture, is_mapped = _surface(mapper, block, actor)
-            except SceneError:
-                notes.append(f"'{block.name[:40]}' has no surface, and is not shown")
-                continue
-            notes += [f"'{block.name[:40]}': {note}" for note in surface.notes]
-            if actor.prop.GetInterpolation() == _FLAT:
-                surface = replace(surface, normals=None)
-            drawn = [mesh_of(surface, block.name, len(materials))]
-            material = _material(actor.prop, block, texture, is_mapped=is_mapped)
-            if surface.faces.shape[1] < 3:
-                drawn, width = draw_thin(drawn)
-                material = replace(material, unlit=True)
-                notes.append(f"'{block.name[:40]}': {width.note}")
-            materials.append(material)
-            instances += [Instance(len(meshes) + number, _matrix(actor.GetMatrix())) for number in range(len(drawn))]
-            meshes += drawn
+        else:
+            scene.add(actor, str(name).partition("(Addr=")[0])
     if ignored:
-        notes.append(f"{ignored} annotations and hidden objects of the plotter are not shown")
-    if len(volumes) > 1:
-        raise SceneError(f"the plotter shows {len(volumes)} volumes", rule="one is rendered")
-    if not meshes and not volumes:
+        scene.notes.append(f"{ignored} annotations and hidden objects of the plotter are not shown")
+    if len(scene.volumes) > 1:
+        raise SceneError(f"the plotter shows {len(scene.volumes)} volumes", rule="one is rendered")
+    if not scene.meshes and not scene.volumes:
         raise SceneError("the plotter shows no surface and no volume", rule="there must be something to see")
     if renderer.GetGradientBackground() or renderer.GetTexturedBackground():
-        notes.append("the plotter's background is shown in one colour")
-    notes.append("the plotter's light sources are not taken over")
+        scene.notes.append("the plotter's background is shown in one colour")
+    scene.notes.append("the plotter's light sources are not taken over")
     return SceneDescription(
         "pyvista",
-        meshes,
-        materials,
-        instances,
+        scene.meshes,
+        scene.materials,
+        scene.instances,
         cameras=[_camera(renderer, plotter.window_size)],
         background=_linear(renderer.background_color.float_rgb),
-        notes=notes,
-        volume=volumes[0] if volumes else None,
+        notes=scene.notes,
+        volume=scene.volumes[0] if scene.volumes else None,
     )
+
+
+@dataclass(eq=False)
+class _Plotted:
+    """What is read of a plotter's actors."""
+
+    meshes: list[Mesh] = field(default_factory=list)
+    materials: list[Material] = field(default_factory=list)
+    instances: list[Instance] = field(default_factory=list)
+    volumes: list[Volume] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def add(self, actor: Any, title: str) -> None:
+        """Read a volume, or the surfaces of an actor."""
+        features = _left_out(actor, actor.mapper)
+        if features:
+            self.notes.append(f"'{title[:40]}': {', '.join(features)}: not taken over")
+        source = actor.mapper.dataset
+        if actor.IsA("vtkVolume"):
+            self.volumes.append(_volume(actor, source, title))
+            return
+        for block in _blocks(actor.mapper, source, title):
+            self._add_surface(actor, block)
+
+    def _add_surface(self, actor: Any, block: _Block) -> None:
+        try:
+            surface, texture, is_mapped = _surface(actor.mapper, block, actor)
+        except SceneError:
+            self.notes.append(f"'{block.name[:40]}' has no surface, and is not shown")
+            return
+        self.notes += [f"'{block.name[:40]}': {note}" for note in surface.notes]
+        if actor.prop.GetInterpolation() == _FLAT:
+            surface = replace(surface, normals=None)
+        meshes = [mesh_of(surface, block.name, len(self.materials))]
+        material = _material(actor.prop, block, texture, is_mapped=is_mapped)
+        if surface.faces.shape[1] < 3:
+            meshes, width = draw_thin(meshes)
+            material = replace(material, unlit=True)
+            self.notes.append(f"'{block.name[:40]}': {width.note}")
+        self.materials.append(material)
+        matrix = _matrix(actor.GetMatrix())
+        self.instances += [Instance(len(self.meshes) + number, matrix) for number in range(len(meshes))]
+        self.meshes += meshes
 
 
 def _left_out(actor: Any, mapper: Any) -> list[str]:
