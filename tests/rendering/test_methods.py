@@ -12,7 +12,7 @@ def pictures(engine, monkeypatch):
     from lippmann.display import Display, LensArray, Panel
     from lippmann.rendering.adaptive import stopping
 
-    monkeypatch.setattr(stopping, "_affordable", lambda *_: 0)
+    monkeypatch.setattr(stopping, "_count_affordable", lambda *_: 0)
     display = Display("test", Panel(64, 64, 1.0), LensArray("square", 8.0), 30.0, "", 500.0, 80.0)
 
     def picture(seconds, **options):

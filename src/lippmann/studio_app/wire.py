@@ -117,7 +117,7 @@ def parse_message(text: object) -> dict[str, Any]:
 
 def count_of(message: dict[str, Any], name: str) -> int:
     """A count of a message, 0 to :data:`LARGEST_NUMBER`; a UsageError otherwise."""
-    value = message.get(name)
+    value: Any = message.get(name)
     if not _is_number(value, LARGEST_NUMBER) or value < 0:
         raise UsageError(f"{str(value)[:40]!r}", parameter=name, rule=f"must be a number from 0 to {LARGEST_NUMBER:g}")
     return int(value)

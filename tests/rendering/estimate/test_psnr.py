@@ -159,12 +159,12 @@ def test_the_better_end_of_the_worst_micro_image_leaves_out_blur_too():
 
 @pytest.mark.parametrize(("samples", "low", "worst_low"), [(4, 33.0, 23.0), (8, 33.0, 23.0), (16, 38.0, 30.0)])
 def test_intervals_of_few_samples_among_mirrors_reach_down_farther(samples, low, worst_low):
-    found = Estimate(40.0, 38.0, 43.0, 34.0, 30.0, 37.0, (3, 0)).among_mirrors(samples)
+    found = Estimate(40.0, 38.0, 43.0, 34.0, 30.0, 37.0, (3, 0)).widen_for_mirrors(samples)
     assert found == Estimate(40.0, low, 43.0, 34.0, worst_low, 37.0, (3, 0))
 
 
 def test_no_psnr_is_below_nothing():
-    poor = Estimate(5.0, 3.0, 6.0, 4.0, 2.0, 5.0, (0, 0)).among_mirrors(2)
+    poor = Estimate(5.0, 3.0, 6.0, 4.0, 2.0, 5.0, (0, 0)).widen_for_mirrors(2)
     assert (poor.psnr_low, poor.worst_low) == (0.0, 0.0)
 
 
@@ -172,4 +172,4 @@ def test_an_estimator_among_mirrors_states_that_interval():
     shown = display()
     errors, _ = noisy_picture(shown, 1)
     plain, mirrored = (PictureEstimator(shown, among).estimate(errors, 4) for among in (False, True))
-    assert mirrored == plain.among_mirrors(4)
+    assert mirrored == plain.widen_for_mirrors(4)

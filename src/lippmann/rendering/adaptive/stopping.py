@@ -87,7 +87,7 @@ class Goal:
     def missing(self, estimate: Estimate) -> float:
         """PSNR in dB that the picture lacks: at most 0 at the goal, minus infinity without a quality."""
         short = -math.inf
-        for _, value, low, asked in self._asked(estimate):
+        for _, value, low, asked in self._list_requirements(estimate):
             has = min(value, low + TUNING.tolerance) if self.is_promise else value
             short = max(short, asked - has)
         return short
@@ -103,14 +103,14 @@ class Goal:
     def describe_shortfall(self, estimate: Estimate) -> str:
         """The shortfall of a picture that ended before the goal; no figure is rounded up to the goal."""
         shortfalls = []
-        for what, value, low, asked in self._asked(estimate):
+        for what, value, low, asked in self._list_requirements(estimate):
             if value < asked:
                 shortfalls.append(f"{what} is estimated at {_floor(value):.1f} dB, goal {asked:g} dB")
             elif low < asked - TUNING.tolerance:
                 shortfalls.append(f"{what} is likely at the goal of {asked:g} dB, but may have {_floor(low):.1f} dB")
         return ", ".join(shortfalls) or "too few samples to be sure"
 
-    def _asked(self, estimate: Estimate) -> list[tuple[str, float, float, float]]:
+    def _list_requirements(self, estimate: Estimate) -> list[tuple[str, float, float, float]]:
         """Name, PSNR, lower end of its interval and required PSNR: of the picture and of its worst part, as far as a
         quality is asked of them."""
         both = [
@@ -177,7 +177,7 @@ def reach(
         sampler.add(samples, _of_all(progress, sampler.samples, samples, expected, note, seconds))
         left = goal.seconds_left(clock() - began)
         if sampler.samples < first:
-            samples = min(first - sampler.samples, _affordable(left - assessment, sampler))
+            samples = min(first - sampler.samples, _count_affordable(left - assessment, sampler))
             if samples >= 1:
                 continue
             if sampler.samples == 1:
@@ -195,7 +195,7 @@ def reach(
             return Outcome("samples", estimate, errors)
         needed = _next_total(sampler.samples, growth)
         samples = min(needed, goal.most) - sampler.samples
-        samples = min(samples, _affordable(left - assessment, sampler))
+        samples = min(samples, _count_affordable(left - assessment, sampler))
         if samples < 1:
             return Outcome("time", estimate, errors)
         if goal.has_quality:
@@ -213,7 +213,7 @@ def _next_total(samples: int, growth: float) -> int:
     return STREAMS * math.ceil(target / STREAMS)
 
 
-def _affordable(seconds: float, sampler: FullInBatches) -> int:
+def _count_affordable(seconds: float, sampler: FullInBatches) -> int:
     """Samples per pixel that are taken within a share of ``seconds``."""
     most = TUNING.time_share * max(0.0, seconds) / max(_seconds_per_sample(sampler), 1e-9)
     return math.floor(min(most, MOST_SAMPLES))

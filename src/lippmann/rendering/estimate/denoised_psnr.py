@@ -54,7 +54,7 @@ _RATIOS = np.exp(_LOGARITHMS)
 class PictureEstimator:
     """Estimator of the PSNR of pictures of one display, or of one division into parts.
 
-    ``is_among_mirrors``: whether mirrors may show small emitters, see :meth:`Estimate.among_mirrors`.
+    ``is_among_mirrors``: whether mirrors may show small emitters, see :meth:`Estimate.widen_for_mirrors`.
     """
 
     def __init__(self, of: Display | Parts, is_among_mirrors: bool = False) -> None:
@@ -87,7 +87,7 @@ def estimate_sums(
     per pixel; ``is_among_mirrors`` is that of :class:`PictureEstimator`.
     """
     estimate = estimate_plain(sums, grid) if of_samples is None else estimate_denoised(sums, of_samples, grid)
-    return estimate.among_mirrors(samples) if is_among_mirrors else estimate
+    return estimate.widen_for_mirrors(samples) if is_among_mirrors else estimate
 
 
 def estimate_denoised(errors: ErrorSums, samples: ErrorSums, grid: tuple[int, int]) -> Estimate:

@@ -198,8 +198,8 @@ class Estimate:
     def __str__(self) -> str:
         return self.in_words()
 
-    def among_mirrors(self, samples: int) -> Estimate:
-        """The estimate for a picture of ``samples`` per pixel in which mirrors may show small emitters.
+    def widen_for_mirrors(self, samples: int) -> Estimate:
+        """The estimate with wider intervals, as of ``samples`` per pixel where mirrors may show small emitters.
 
         Few samples may all miss a mirrored emitter or its caustic, and then their variance does not reveal it. So both
         intervals are extended downwards by the largest overestimate that was measured.

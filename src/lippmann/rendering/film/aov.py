@@ -112,6 +112,6 @@ def _trace_tile(
 
 
 def to_frame(matrix: NDArray[np.float64], vector: Vector3f) -> Vector3f:
-    """The linear part ``(3, 3)`` of ``matrix`` on a vector of the device."""
+    """Rotate and scale a vector on the device by the linear part ``(3, 3)`` of ``matrix``."""
     rows = matrix[:3, :3].tolist()
     return mi.Vector3f(*(row[0] * vector.x + row[1] * vector.y + row[2] * vector.z for row in rows))

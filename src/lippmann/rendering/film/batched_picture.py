@@ -283,8 +283,9 @@ class _Batches:
             mixed += difference
             number += dr.select(known, mi.Float(1), mi.Float(0))
         filled = sum((dr.select(count > 0, mi.Float(1), mi.Float(0)) for count in self.counts), mi.Float(0))
-        # In linear light the jackknife is the mean over (batches - 1) orthogonal ways to halve the batches, one of them
-        # by streams. With this weight, jackknife and evenness add up to the squared difference of the streams.
+        # In linear light the jackknife equals the mean squared difference of halves, over (batches - 1) orthogonal ways
+        # to halve the batches, of which the two streams are one. The weight is such that the jackknife and this value
+        # add up to the squared difference of the streams.
         weight = (filled - 2) / dr.maximum(filled - 1, 1)
         return dr.select(number > 0, weight * (streams - mixed / dr.maximum(number, 1)), 0)
 

@@ -45,10 +45,10 @@ class Guides:
     height: FloatArray | None = None
     coverage: tuple[Coverage, Coverage] | None = None
 
-    def reflected(self) -> FloatArray:
-        """``(H, W, 3)``: divisor that demodulates colour into light that can be shared, and the factor back.
+    def offset_albedo(self) -> FloatArray:
+        """Divisor that demodulates colour into irradiance, ``(H, W, 3)``, and factor that modulates it again.
 
-        The albedo plus a small offset, as black glossy surfaces reflect light, too.
+        It is the albedo plus a small offset, because black glossy surfaces reflect light, too.
         """
         return np.asarray(np.clip(self.albedo, 0, 1) + np.float32(0.02), dtype=np.float32)
 

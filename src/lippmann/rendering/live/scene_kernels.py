@@ -78,14 +78,14 @@ class SceneKernels:
         """The tracer of a resolved request."""
         integrator, sampling = self._integrator(request), _sampling_of(request)
         key = display, *sampling, *_traced_by(request)
-        tracer = _cached(self._tracers, key, lambda: LiveTracer(display, integrator, *sampling))
+        tracer = _find_or_make(self._tracers, key, lambda: LiveTracer(display, integrator, *sampling))
         tracer.trace_by(integrator)
         return tracer
 
     def feature_tracer(self, display: Display, request: RenderRequest) -> FeatureTracer:
         """The tracer of feature buffers of a resolved request."""
         sampling = _sampling_of(request)
-        return _cached(
+        return _find_or_make(
             self._features, (display, *sampling), lambda: FeatureTracer(display, make_surfaces(self.built), *sampling)
         )
 
@@ -134,7 +134,7 @@ def _sampling_of(request: RenderRequest) -> tuple[bool, bool]:
     return bool(request.subpixels), request.box_filter
 
 
-def _cached(kernels: dict[_Key, Kernel], key: _Key, make: Callable[[], Kernel]) -> Kernel:
+def _find_or_make(kernels: dict[_Key, Kernel], key: _Key, make: Callable[[], Kernel]) -> Kernel:
     if key not in kernels:
         while len(kernels) >= _MOST_KERNELS:
             del kernels[next(iter(kernels))]

@@ -94,7 +94,7 @@ def brightest_specular_light(integrator: PathIntegrator, source: RaySource) -> f
     """Largest exposed radiance, mean of its components, of the pilot's specular chains."""
     stream, column, row, _ = _place_of(dr.arange(mi.UInt32, TRANSPORT.probe_side**2), source)
     pixel, number = PixelRays(source, column, row, mi.UInt32(0)), dr.opaque(mi.UInt32, 1)
-    light = integrator.exposed(specular_light(integrator, pixel, stream, number, mi.Bool(True))[0])
+    light = integrator.expose(specular_light(integrator, pixel, stream, number, mi.Bool(True))[0])
     return float(dr.max(dr.mean(light))[0])
 
 
@@ -177,7 +177,7 @@ def _contributions(
         # By MIS as if the emitter were the only one.
         ds, emitted = integrator.light_sampler.sample_direction(si, uniform, sampling)
         value, pdf = bsdf.eval_pdf(context, si, si.to_local(ds.d), sampling)
-        light, _ = integrator.reflected(si, ds, emitted, value, pdf, sampling, emitters)
+        light, _ = integrator.reflect(si, ds, emitted, value, pdf, sampling, emitters)
         contribution = dr.mean(throughput * light / emitters)
         squares += dr.square(dr.minimum(contribution, 1))
         is_rough = dr.squared_norm(sharp_lobe(si, bsdf, sampling)) == 0

@@ -18,12 +18,12 @@ from lippmann.runtime.row_threads import Bands
 
 
 class DefaultOrder:
-    """Makes the micro-images of a display.
+    """Micro-images of a display, reprojected from coarse to fine, with their missed pixels traced.
 
     Under straight cylindrical lenses each row of pixels is independent of the others (an epipolar plane), and a forward
     warp of spans takes a seventh of the time of the backward warp that all other layouts need.
 
-    ``points`` receives the picture, and is empty at first.
+    ``points`` is the picture that is filled; it must be empty at first.
     """
 
     def __init__(self, display: Display, points: PointImage, tracer: PixelTracer, bands: Bands, rules: Rules) -> None:

@@ -72,7 +72,7 @@ def share_light(
     float32 of the same shape.
     """
     assert guides.height is not None
-    albedo = guides.reflected()
+    albedo = guides.offset_albedo()
     light = np.ascontiguousarray(pixels / albedo, dtype=np.float32)
     shared = np.empty_like(light)
     is_lenticular = display.lens_array.layout == "lenticular"

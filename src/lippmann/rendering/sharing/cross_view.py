@@ -47,7 +47,7 @@ def share_views(pixels: Floats, source: QuiltRays, guides: Guides) -> Floats:
     """
     assert guides.height is not None
     slopes = ((2 * np.arange(source.views) + 1) / source.views - 1) * cone_tangent(source.display)
-    albedo = guides.reflected()
+    albedo = guides.offset_albedo()
     light = pixels / albedo
     step = 2 * cone_tangent(source.display) / source.views
     display_width, _ = source.display.size_mm
@@ -70,8 +70,8 @@ class _Views:
 
     ``light`` and ``normal`` are ``(H, W, 3)``, ``height`` ``(H, W)`` z in millimetres, of a quilt of ``columns`` views
     in a row; ``slopes`` (N) holds for every view, from the leftmost camera, its sideways offset over its distance.
-    A point that view k sees at height z, view j sees ``(s_k - s_j) z / (1 - z / D)`` millimetres to the
-    right of it in its picture. Views up to ``reach`` to the side share.
+    A point at height z appears in view j ``(s_k - s_j) z / (1 - z / D)`` millimetres to the right of its place in
+    view k. Views up to ``reach`` to the side share.
     """
 
     def __init__(

@@ -128,9 +128,9 @@ class EmitterRays:
         from_point = mi.warp.square_to_uniform_sphere(direction)
         ray = dr.select(has_size, start.spawn_ray(from_surface), mi.Ray3f(center, from_point))
         si = scene.ray_intersect(ray, mi.RayFlags.All, False, mi.Bool(True))
-        return self._scattered(si, ray.d, emitter, center, has_size, density)
+        return self._scatter(si, ray.d, emitter, center, has_size, density)
 
-    def _scattered(
+    def _scatter(
         self,
         si: SurfaceInteraction3f,
         along: Vector3f,

@@ -276,7 +276,7 @@ class Clamp:
     def __init__(self, most: Float | None) -> None:
         self._most = most
 
-    def limited(self, light: Spectrum, is_indirect: Bool | None = None) -> Spectrum:
+    def apply(self, light: Spectrum, is_indirect: Bool | None = None) -> Spectrum:
         """``light`` scaled so that no component exceeds the limit; only where ``is_indirect``, if that is given."""
         if self._most is None:
             return light

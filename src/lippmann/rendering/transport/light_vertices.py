@@ -267,7 +267,7 @@ class LightVertexPasses:
         """The light vertices of pass ``number``, from 0 on."""
         assert self._chances is not None
         if self._current is None or self._current[0] != number:
-            chosen, chances = _dealt(self._chances, TUNING.light_vertices)
+            chosen, chances = _deal_emitters(self._chances, TUNING.light_vertices)
             seeds = (named_seed("light vertices", self._seed, number, half) for half in range(2))
             first, second = (self._rays.meet(chosen, chances, seed)[0] for seed in seeds)
             densities = self._rays.densities(chances)
@@ -280,7 +280,7 @@ class LightVertexPasses:
         if senders == 0:
             return None
         even = np.full(senders, 1 / senders)
-        chosen, chances = _dealt(even, TUNING.light_vertices)
+        chosen, chances = _deal_emitters(even, TUNING.light_vertices)
         points, met = self._rays.meet(chosen, chances, named_seed("pilot of light vertices", self._seed))
         inside = are_inside(points.position, region)
         if not inside.any():
@@ -290,8 +290,11 @@ class LightVertexPasses:
         return np.asarray(TUNING.uniform_share * even + (1 - TUNING.uniform_share) * sums / sums.sum())
 
 
-def _dealt(chances: NDArray[np.float64], count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Shuffled indices of emitters, ``count`` in all, in proportion to ``chances``; and their shares after rounding."""
+def _deal_emitters(chances: NDArray[np.float64], count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Give ``count`` light vertices to emitters in proportion to ``chances``.
+
+    Returns the shuffled emitter indices ``(count,)``, and the share of each emitter after rounding.
+    """
     edges = np.round(np.cumsum(chances) / chances.sum() * count).astype(np.int64)
     each = np.diff(edges, prepend=0)
     number = np.repeat(np.arange(len(chances)), each)

@@ -217,7 +217,7 @@ class PathIntegrator:
 
             # ---- emission ----
             emission = self.emission(si, last, depth, techniques, states, mi.UInt32(stream.half))
-            radiance += self.limited(throughput * techniques.meet_emitter(states, depth, si, emission), depth)
+            radiance += self.clamp_indirect(throughput * techniques.meet_emitter(states, depth, si, emission), depth)
 
             # ---- next-event estimation ----
             continues = si.is_valid() & (depth < self.depth)
@@ -237,7 +237,7 @@ class PathIntegrator:
             pi = scene.ray_intersect_preliminary(mi.Ray3f(o, d), coherent=False, active=active)
             secondary += dr.select(active, mi.UInt32(1), mi.UInt32(0))
 
-        return self.exposed(radiance), RayCounts(secondary, shadow), FirstHit(first_distance, view_dependent)
+        return self.expose(radiance), RayCounts(secondary, shadow), FirstHit(first_distance, view_dependent)
 
     @syntax
     def _leave(self, vertex: Vertex, techniques: Techniques, state: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -288,7 +288,7 @@ class PathIntegrator:
         state = radiance, shadow, eta, crossings, o, d, last, all_specular
         return states, throughput, depth, continues, passes, *state
 
-    def exposed(self, radiance: Spectrum) -> Spectrum:
+    def expose(self, radiance: Spectrum) -> Spectrum:
         """``radiance`` times the gain."""
         return radiance if self.light.gain is None else radiance * self.light.gain
 
@@ -353,9 +353,9 @@ class PathIntegrator:
         """Whether rays that hit no surface carry radiance."""
         return self._environment is not None or self.features.background is not None
 
-    def limited(self, met: Spectrum, depth: UInt32) -> Spectrum:
+    def clamp_indirect(self, light: Spectrum, depth: UInt32) -> Spectrum:
         """A path's contribution after ``depth`` surfaces, clamped where it is indirect."""
-        return self._clamp.limited(met, depth > 1)
+        return self._clamp.apply(light, depth > 1)
 
     def first_emitter_samples(self, sample: UInt32) -> UInt32:
         """Emitter samples at the first surface that is not purely specular, of a pixel's path number ``sample``."""
@@ -373,11 +373,11 @@ class PathIntegrator:
         active: Bool,
     ) -> tuple[Spectrum, UInt32]:
         """A path's contribution by one of ``samples`` emitter samples at a vertex, and the shadow rays traced."""
-        light, tests = self.reflected(vertex.si, ds, emitted, value, pdf, active, samples, vertex.arrival)
+        light, tests = self.reflect(vertex.si, ds, emitted, value, pdf, active, samples, vertex.arrival)
         light = techniques.sample_emitter(vertex, ds, light)
-        return self._clamp.limited(vertex.throughput * light, vertex.depth > 0) / samples, tests
+        return self._clamp.apply(vertex.throughput * light, vertex.depth > 0) / samples, tests
 
-    def reflected(
+    def reflect(
         self,
         si: SurfaceInteraction3f,
         ds: DirectionSample3f,

@@ -256,7 +256,7 @@ class LightVertexJoins(Technique):
         light, tests = self._vertices.join(
             vertex.si, vertex.bsdf, choice, half, self._joins(vertex), not self._has_absorption
         )
-        return radiance + self._clamp.limited(vertex.throughput * light), shadow + tests
+        return radiance + self._clamp.apply(vertex.throughput * light), shadow + tests
 
     def _arrival(self, state: _Joint, vertex: Vertex) -> Arrival:
         reach = reach_of(vertex.si, vertex.bsdf, vertex.d, state.departure, vertex.active)

@@ -59,9 +59,9 @@ class Photons:
 
     def inside(self, region: NDArray[np.float64] | None) -> Photons:
         """The photons in a box."""
-        return self.chosen(are_inside(self.position, region))
+        return self.select(are_inside(self.position, region))
 
-    def chosen(self, which: NDArray[np.generic]) -> Photons:
+    def select(self, which: NDArray[np.generic]) -> Photons:
         """The photons that a mask or indices select."""
         return Photons(*(getattr(self, each.name)[which] for each in fields(self)))
 
@@ -72,7 +72,7 @@ class Photons:
         return Photons(point, point, point, point, np.zeros(count, np.uint32))
 
     @staticmethod
-    def joined(parts: list[Photons]) -> Photons:
+    def join(parts: list[Photons]) -> Photons:
         """All photons of several sets."""
         return Photons(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Photons)))
 
@@ -128,14 +128,14 @@ class PhotonMap:
         for half in halves:
             # In single precision as on the device, so that both find the same cells.
             cell = np.floor(half.position / np.float32(radius)).astype(np.int32).astype(np.uint32)
-            bucket = _mixed(cell) & np.uint32(self._mask)
+            bucket = _hash_cells(cell) & np.uint32(self._mask)
             order = np.argsort(bucket, kind="stable")
             edges = np.searchsorted(bucket[order], np.arange(self._mask + 2))
             starts.append(edges + before)
             before += len(half)
-            ordered.append(half.chosen(order))
+            ordered.append(half.select(order))
             _mark_near(near, half.position, radius)
-        photons = Photons.joined(ordered)
+        photons = Photons.join(ordered)
         if not len(photons):  # gathers need something to point at
             photons = Photons.dark(1)
         self._start = upload(np.concatenate(starts).astype(np.uint32))
@@ -150,7 +150,7 @@ class PhotonMap:
 
     def may_reach(self, p: Point3f, active: Bool) -> Bool:
         """Whether photons may be in reach of a look-up at ``p``: in a large world most points have none."""
-        cell = _mixed_number(dr.floor(p / (_NEAR_WIDTH * self._r))) & self._last_near
+        cell = _hash_cell(dr.floor(p / (_NEAR_WIDTH * self._r))) & self._last_near
         word = dr.gather(mi.UInt32, self._near, cell >> 5, active)
         return (word >> (cell & 31) & 1) != 0
 
@@ -217,7 +217,7 @@ class PhotonMap:
             from_center = (cell + 0.5) * r - p
             touches = dr.abs(dr.dot(from_center, normal)) < reach
             touches &= dr.squared_norm(dr.maximum(dr.abs(from_center) - 0.5 * r, 0)) < r * r
-            bucket = first_bucket + (_mixed_number(cell) & self._last_bucket)
+            bucket = first_bucket + (_hash_cell(cell) & self._last_bucket)
             number = dr.gather(mi.UInt32, self._start, bucket, looking)
             end = dr.gather(mi.UInt32, self._start, bucket + 1, looking)
             # The least power of two of which `most` steps go through all.
@@ -262,14 +262,14 @@ class PhotonMap:
         return Gathered(total * density, chosen, color * weights * density)
 
 
-def _mixed(cell: NDArray[np.uint32]) -> NDArray[np.uint32]:
+def _hash_cells(cell: NDArray[np.uint32]) -> NDArray[np.uint32]:
     """``(n,)``: hashes of cells ``(n, 3)``."""
     x, y, z = (cell[:, axis] * np.uint32(factor) for axis, factor in enumerate(_FACTORS))
     return np.asarray(x ^ y ^ z, dtype=np.uint32)
 
 
-def _mixed_number(cell: Point3f) -> UInt32:
-    """:func:`_mixed` on the device."""
+def _hash_cell(cell: Point3f) -> UInt32:
+    """:func:`_hash_cells` on the device."""
     x, y, z = (mi.UInt32(mi.Int32(part)) * factor for part, factor in zip(cell, _FACTORS, strict=True))
     return x ^ y ^ z
 
@@ -279,7 +279,7 @@ def _mark_near(near: NDArray[np.bool_], position: Floats, radius: float) -> None
     width = np.float32(_NEAR_WIDTH) * np.float32(radius)
     for corner in itertools.product((-1, 1), repeat=3):
         cell = np.floor((position + np.float32((1 + TUNING.rounding) * radius) * np.array(corner, np.float32)) / width)
-        near[_mixed(cell.astype(np.int32).astype(np.uint32)) & np.uint32(len(near) - 1)] = True
+        near[_hash_cells(cell.astype(np.int32).astype(np.uint32)) & np.uint32(len(near) - 1)] = True
 
 
 def _area_in_cell(place: Vector3f, normal: Vector3f, side: Float) -> Float:

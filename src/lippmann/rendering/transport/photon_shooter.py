@@ -57,7 +57,7 @@ class PhotonShooter:
             photons, lanes = self._wavefront(part, each, first, seed)
             landed.append(photons)
             pairs.append(part[lanes])
-        return Photons.joined(landed), np.concatenate(pairs)
+        return Photons.join(landed), np.concatenate(pairs)
 
     def _lit_points(
         self, pair: NDArray[np.int64], stream: SampleStream
@@ -79,7 +79,7 @@ class PhotonShooter:
         # Opaque to the compiler, so that all wavefronts share a kernel.
         index = dr.arange(mi.UInt32, lanes) + dr.opaque(mi.UInt32, first)
         stream = SampleStream.of_pixels(mi.UInt32(0), index, dr.opaque(mi.UInt32, seed))
-        ray, power = self._emitted(pair, share, stream)
+        ray, power = self._emit(pair, share, stream)
         o, d, is_lit = mi.Point3f(ray.o), mi.Vector3f(ray.d), dr.max(power) > 0
         dr.eval(o, d, power, is_lit)
         # Half of the points on a body face away from an emitter, and many lie in shadow: only the others are followed.
@@ -94,7 +94,7 @@ class PhotonShooter:
         photons, lanes_of_photons = landed.photons()
         return photons, np.array(lit, dtype=np.int64)[lanes_of_photons]
 
-    def _emitted(self, pair: NDArray[np.int64], share: mi.Float, stream: SampleStream) -> tuple[Ray3f, Color3f]:
+    def _emit(self, pair: NDArray[np.int64], share: mi.Float, stream: SampleStream) -> tuple[Ray3f, Color3f]:
         """Rays from emitters to the casters, and the flux along each; 0 where the way is blocked."""
         scene = self._scene
         point, ds, light = self._lit_points(pair, stream)
@@ -132,7 +132,7 @@ class PhotonShooter:
         while dr.hint(active, label="photon events", exclude=[scene, features, stream, landed, surfaces]):
             si = scene.ray_intersect(mi.Ray3f(o, d), mi.RayFlags.All, False, active)
             active &= si.is_valid()
-            power = _absorbed(power, absorption, si)
+            power = _absorb(power, absorption, si)
             landed.note(si, power, events, turn, active & (events > 0))
             active &= turn < surfaces
             o, d, power, events, absorption, active = self._next_ray(
@@ -174,7 +174,7 @@ class PhotonShooter:
         return ray.o, ray.d, power, events, absorption, active
 
 
-def _absorbed(power: Color3f, absorption: Color3f | None, si: SurfaceInteraction3f) -> Color3f:
+def _absorb(power: Color3f, absorption: Color3f | None, si: SurfaceInteraction3f) -> Color3f:
     """``power`` after Beer-Lambert absorption on the way to ``si``."""
     return power if absorption is None else power * dr.exp(-absorption * dr.select(si.is_valid(), si.t, 0))
 

@@ -152,7 +152,7 @@ def _chain(
         bsdf = si.bsdf(toward)
         throughput = techniques.travel(states, si, throughput)
         emission = integrator.emission(si, last, depth, techniques, states, mi.UInt32(0))
-        light += integrator.limited(throughput * emission, depth)
+        light += integrator.clamp_indirect(throughput * emission, depth)
 
         dimension = (depth * 2 + crossings) * DIMENSIONS + 1
         continues = active & si.is_valid() & (depth < integrator.depth)
@@ -179,8 +179,8 @@ def _leave(integrator: PathIntegrator, vertex: Vertex, at_first: UInt32, state: 
     if continues:
         if dr.hint(len(integrator.without_size) > 0, mode="scalar"):
             point = stream.next_2d(dimension + 2)
-            drawn, tests = _without_size(integrator, si, bsdf, vertex.lobe, point, continues)
-            light += integrator.limited(throughput * drawn, depth + 1)
+            reflection, tests = _without_size(integrator, si, bsdf, vertex.lobe, point, continues)
+            light += integrator.clamp_indirect(throughput * reflection, depth + 1)
             shadow += tests
         bs, weight = bsdf.sample(context, si, stream.next_1d(dimension), stream.next_2d(dimension + 1), continues)
         scattering = Scattering(vertex, bs, weight)

@@ -59,7 +59,7 @@ class VisibleBlur:
             active &= (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
             onward = si.spawn_ray(si.to_world(bs.wo))
             o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
-        return paths.exposed(added)
+        return paths.expose(added)
 
     def _light(
         self,
