@@ -23,6 +23,9 @@ GRID = [(row, column) for row in range(2) for column in range(3)]
         ("lego_{0:02}_{1:02}", GRID),
         ("scene2_{0}-{1}_rgb", GRID),
         ("{0:03}_{1:03}_640_480", GRID),  # numbers that all share say nothing
+        ("view_x{1}_y{0}", GRID),
+        ("Col{1:02}Row{0:02}_rgb", GRID),
+        ("row{0}_col{1}", GRID),
         ("Cam{2:03}", [(number,) for number in range(6)]),
         ("shot2_{2:03}_30_36", [(number,) for number in range(6)]),
         ("take{2}_view{2}", [(number,) for number in range(6)]),  # both count: no rows repeat

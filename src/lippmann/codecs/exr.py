@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import io
 import struct
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -32,7 +32,7 @@ _SQUARE = struct.pack("<f", 1.0)
 #: Standard attributes that say how colours or views are meant, and do not count here.
 _UNUSED = ("adoptedNeutral", "lookModTransform", "multiView", "renderingTransform", "whiteLuminance")
 
-_TILED, _DEEP, _MULTIPART = 0x200, 0x800, 0x1000
+_DEEP, _MULTIPART = 0x800, 0x1000
 _DTYPES = {0: "uint32", 1: "float16", 2: "float32"}
 #: Rows per chunk by compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
 _ROWS_PER_CHUNK = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)
@@ -73,6 +73,8 @@ class ExrHeader:
     chromaticities: tuple[float, ...] | None
     notes: tuple[str, ...] = ()
     layer: str = ""
+    part: int = 0
+    other_bytes: int = 0
 
     def rec709(self, pixels: Pixels) -> Pixels:
         """Linear RGB ``(..., 3)`` of the file as that of Rec. 709; colours beyond it are clipped at 0.
@@ -119,32 +121,39 @@ def write_exr(
         raise OSError(str(error)) from error
 
 
-def read_exr_header(path: Path) -> ExrHeader:
+def read_exr_header(path: Path, fits: Callable[[Collection[str]], bool] | None = None) -> ExrHeader:
     """Size, channels and texts of an EXR, and whether all of it is there, without decoding its pixels.
+
+    Of several parts the first counts whose channels' names ``fits`` accepts (None: colours), else the first.
 
     Raises
     ------
     PictureError
-        If the file is truncated, damaged, no EXR, or of a kind that holds no plain picture (deep, several parts).
+        If the file is truncated, damaged, no EXR, or of a kind that holds no plain picture (deep).
     """
     with path.open("rb") as file:
-        return exr_header(file, path)
+        return exr_header(file, path, fits)
 
 
-def exr_header(file: BinaryIO, path: Path) -> ExrHeader:
+def exr_header(file: BinaryIO, path: Path, fits: Callable[[Collection[str]], bool] | None = None) -> ExrHeader:
     """:func:`read_exr_header` of a file that is open, at its beginning; ``path`` is its name, for errors."""
     if file.read(4) != SIGNATURE:
         raise PictureError("is no OpenEXR file", where=str(path))
     try:
         (version,) = struct.unpack("<I", _exactly(file, 4))
-        if version & (_DEEP | _MULTIPART):
+        if version & _DEEP:
             raise PictureError(
-                "is a deep or multi-part OpenEXR file",
+                "is a deep OpenEXR file",
                 where=str(path),
-                rule="one flat part is read",
-                fix="save that alone, by oiiotool: 'in.exr --subimage 0 -o out.exr', with --flatten if it is deep",
+                rule="flat ones are read",
+                fix="flatten it, by oiiotool: oiiotool in.exr --flatten -o out.exr",
             )
-        attributes = _attributes(file)
+        parts = [_attributes(file)]
+        while version & _MULTIPART and (more := _attributes(file)):
+            parts.append(more)
+        names = (_channel_list(each["channels"][1])[0] for each in parts)
+        part = next((number for number, held in enumerate(names) if (fits or _has_colors)(held)), 0)
+        attributes = parts[part]
         x0, y0, x1, y1 = struct.unpack("<4i", attributes["dataWindow"][1])
         channels, subsampled = _channel_list(attributes["channels"][1])
         layer = _picture_layer(channels)
@@ -163,10 +172,13 @@ def exr_header(file: BinaryIO, path: Path) -> ExrHeader:
         primaries = attributes.get("chromaticities", ("", b""))[1]
         chromaticities = struct.unpack("<8f", primaries) if primaries else None
         (aspect,) = struct.unpack("<f", attributes.get("pixelAspectRatio", ("", _SQUARE))[1])
-        if version & _TILED:
+        if "tiles" in attributes:
             _check_tiles(attributes["tiles"][1], stored_width * stored_height, path)
         else:
-            _check_chunks(file, stored_height, attributes["compression"][1][0])
+            file.seek(sum(8 * struct.unpack("<I", each["chunkCount"][1])[0] for each in parts[:part]), 1)
+            part_number = 4 if version & _MULTIPART else 0
+            _check_chunks(file, stored_height, attributes["compression"][1][0], part_number)
+        other_bytes = sum(map(_bytes_of, parts)) - _bytes_of(attributes)
         text = {name: value.decode("utf-8") for name, (kind, value) in attributes.items() if kind == "string"}
     except (struct.error, KeyError, IndexError, EOFError, UnicodeDecodeError) as error:
         raise _damaged(path, "it is cut short or its header makes no sense") from error
@@ -176,8 +188,9 @@ def exr_header(file: BinaryIO, path: Path) -> ExrHeader:
         + unused
         + tuple(f"its channel {name} is subsampled: it is left out" for name in subsampled)
         + ((f"its layer {layer[:-1]} is taken for the picture",) if layer else ())
+        + ((f"of its {len(parts)} parts '{text.get('name', part)}' is shown",) if len(parts) > 1 else ())
     )
-    return ExrHeader(width, height, channels, text, window, chromaticities, notes, layer)
+    return ExrHeader(width, height, channels, text, window, chromaticities, notes, layer, part, other_bytes)
 
 
 def read_exr(path: Path, header: ExrHeader) -> dict[str, Pixels]:
@@ -195,18 +208,19 @@ def read_exr(path: Path, header: ExrHeader) -> dict[str, Pixels]:
     pixel = sum(np.dtype(kind).itemsize for kind in header.channels.values())
     # The library's own planes, and those that it is asked for.
     stored = header.window[2] * header.window[3]
-    check_input(2 * pixel * max(header.width * header.height, stored), "its picture", where=str(path))
+    whole = 2 * pixel * max(header.width * header.height, stored) + header.other_bytes
+    check_input(whole, "its picture", where=str(path))
     # The binding prints a warning where it should raise; what it read then has no parts.
     with contextlib.redirect_stdout(io.StringIO()), silence_libraries():
         try:
             file = OpenEXR.File(str(path), separate_channels=True)
         except (RuntimeError, ValueError) as error:
             raise _damaged(path, str(error)) from error
-    if not file.parts:
+    if len(file.parts) <= header.part:
         raise _damaged(path, "its pixels cannot be decoded")
     return {
         name.removeprefix(header.layer): _in_display_window(np.asarray(channel.pixels), header)
-        for name, channel in file.channels().items()
+        for name, channel in file.parts[header.part].channels.items()
     }
 
 
@@ -276,6 +290,18 @@ def _channel_list(raw: bytes) -> tuple[dict[str, str], list[str]]:
     return channels, subsampled
 
 
+def _has_colors(names: Collection[str]) -> bool:
+    """Whether channels are the colours of a picture, of its own or of the layer that stands for it."""
+    return {"R", "G", "B"} <= {*names} or bool(_picture_layer(names))
+
+
+def _bytes_of(attributes: Mapping[str, tuple[str, bytes]]) -> int:
+    """Bytes of a part's pixels."""
+    x0, y0, x1, y1 = struct.unpack("<4i", attributes["dataWindow"][1])
+    channels, subsampled = _channel_list(attributes["channels"][1])
+    return 4 * (len(channels) + len(subsampled)) * max(x1 - x0 + 1, 0) * max(y1 - y0 + 1, 0)
+
+
 def _picture_layer(names: Collection[str]) -> str:
     """The layer with colours that stands for the missing picture: the only one, or Blender's ``Combined``."""
     layers = [each[:-1] for each in names if each.endswith(".R") and {f"{each[:-1]}G", f"{each[:-1]}B"} <= {*names}]
@@ -283,8 +309,11 @@ def _picture_layer(names: Collection[str]) -> str:
     return layers[0] if len(layers) == 1 and not {"R", "Y"} & {*names} else ""
 
 
-def _check_chunks(file: BinaryIO, height: int, compression: int) -> None:
-    """EOFError if a chunk of rows lies (partly) beyond the file's end; later compressions are left to the library."""
+def _check_chunks(file: BinaryIO, height: int, compression: int, part_number: int) -> None:
+    """EOFError if a chunk of rows lies (partly) beyond the file's end; later compressions are left to the library.
+
+    A chunk begins with ``part_number`` bytes of that, and its first row.
+    """
     if compression >= len(_ROWS_PER_CHUNK):
         return
     count = -(-height // _ROWS_PER_CHUNK[compression])
@@ -294,11 +323,12 @@ def _check_chunks(file: BinaryIO, height: int, compression: int) -> None:
         raise EOFError
     file.seek(table)
     for (start,) in struct.iter_unpack("<Q", _exactly(file, 8 * count)):
-        if start + 8 > size:
+        body = start + part_number + 8
+        if body > size:
             raise EOFError
-        file.seek(start + 4)
+        file.seek(body - 4)
         (length,) = struct.unpack("<i", _exactly(file, 4))
-        if length < 0 or start + 8 + length > size:
+        if length < 0 or body + length > size:
             raise EOFError
 
 

@@ -1,9 +1,9 @@
 """Places of a folder's views, by the numbers in their files' names.
 
 Numbers that all names share say nothing. Of the others the last one counts the views, or the last two side by side are
-row and column, where rows and columns repeat. Folders of the 4D Light Field Benchmark count row by row, in rows as long
-as their ``parameters.cfg`` says; without it a square number of views, counted from 0, is a square grid. Names of the
-Stanford light field archive also hold where the camera stood, ``out_ROW_COLUMN_Y_X``, in mm, x to the right and y
+row and column, where rows and columns repeat; column and row where names say so (``x3_y0``, ``col3_row0``). Folders
+of the 4D Light Field Benchmark count row by row, in rows as long as their ``parameters.cfg`` says; without it a square
+number of views, counted from 0, is a square grid. Names of the Stanford light field archive also hold where the camera stood, ``out_ROW_COLUMN_Y_X``, in mm, x to the right and y
 downwards; their rows and columns run either way.
 """
 
@@ -25,6 +25,8 @@ from lippmann.runtime.regular_file import unreadable
 Place = tuple[int, ...]
 
 _NUMBER = re.compile(r"[0-9]{1,9}")
+#: The end of a name that says itself that its column comes first.
+_COLUMN_FIRST = re.compile(r"(?<![a-z])(x|col|column)[ _=-]?\d+[^a-z0-9]*(y|row)[ _=-]?\d+\D*$", re.IGNORECASE)
 _HCI = re.compile(r"input_Cam(\d{3,6})")
 _HCI_COLUMNS = re.compile(rb"^\s*num_cams_x\s*=\s*([1-9]\d{0,4})\s*$", re.MULTILINE)
 _STANFORD = re.compile(r"_(\d{1,6})_(\d{1,6})_(-?\d{1,9}\.\d{1,9})_(-?\d{1,9}\.\d{1,9})(?![\d.])")
@@ -72,6 +74,8 @@ def places_of_views(paths: Sequence[Path]) -> dict[Place, Path]:
     last = varying[-1]
     repeating = [index for index in varying if len(set(columns[index])) < len(paths)]
     pair = (last - 1, last) if {last - 1, last} <= {*repeating} else (last,)
+    if all(map(_COLUMN_FIRST.search, stems)):
+        pair = pair[::-1]
     return _by_place(paths, [tuple(parts[index] for index in pair) for parts in numbers])
 
 

@@ -206,6 +206,17 @@ def test_channels_of_depth_by_their_layers(tmp_path, names):
     assert read_depth_map(tmp_path / "d.exr").inverse == pytest.approx(1 / depth)
 
 
+def test_of_several_parts_the_first_with_depth_counts(tmp_path):
+    import OpenEXR
+
+    depth = np.array([[1.0, 2.0], [4.0, 8.0]], np.float32)
+    held = {"beauty": {"RGB": np.full((2, 2, 3), 7, np.float32)}, "depth": {"Z": depth}}
+    parts = [OpenEXR.Part({"name": name, "type": OpenEXR.scanlineimage}, each) for name, each in held.items()]
+    with OpenEXR.File(parts) as file:
+        file.write(str(tmp_path / "d.exr"))
+    assert read_depth_map(tmp_path / "d.exr").inverse == pytest.approx(1 / depth)
+
+
 def test_pictures_in_colours_are_no_depth(tmp_path):
     """As programs that estimate depth colour their maps; JPEG's greys and equal channels are grey."""
     ramp = np.tile(np.arange(0, 256, 4, dtype=np.uint8), (8, 1))

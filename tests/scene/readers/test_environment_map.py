@@ -104,14 +104,32 @@ def test_several_layers_of_which_none_is_the_picture(tmp_path, pixels):
         read_environment(save_exr(tmp_path / "sky.exr", channels))
 
 
-def test_several_parts_are_refused_with_the_tool_that_takes_one_out(tmp_path, pixels):
-    parts = [OpenEXR.Part({"name": name, "type": OpenEXR.scanlineimage}, {"RGB": pixels}) for name in "ab"]
+def save_parts(path, parts):
+    parts = [OpenEXR.Part({"name": name, "type": OpenEXR.scanlineimage}, held) for name, held in parts.items()]
     with OpenEXR.File(parts) as file:
-        file.write(str(tmp_path / "sky.exr"))
-    with pytest.raises(
-        SceneError, match=r"multi-part OpenEXR file\); one flat part is read; save that alone"
-    ) as caught:
-        read_environment(tmp_path / "sky.exr")
+        file.write(str(path))
+    return path
+
+
+def test_of_several_parts_the_first_with_colours_is_the_picture(tmp_path, pixels):
+    depth, other = np.ones(pixels.shape[:2], np.float32), np.ones_like(pixels)
+    path = save_parts(tmp_path / "sky.exr", {"depth": {"Z": depth}, "beauty": {"RGB": pixels}, "light": {"RGB": other}})
+    sky = read_environment(path)
+    assert (sky.pixels == pixels).all()
+    assert sky.notes == ("sky.exr: of its 3 parts 'beauty' is shown",)
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) - len(other.tobytes()) // 2])
+    with pytest.raises(SceneError, match=r"sky\.exr: cannot be decoded"):
+        read_environment(path)
+
+
+def test_deep_parts_are_refused_with_the_tool_that_flattens_them(tmp_path, pixels):
+    path = save_exr(tmp_path / "sky.exr", {"RGB": pixels})
+    data = bytearray(path.read_bytes())
+    data[5] |= 0x08  # the flag of deep data
+    path.write_bytes(data)
+    with pytest.raises(SceneError, match=r"deep OpenEXR file\); flat ones are read; flatten it, by oiiotool") as caught:
+        read_environment(path)
     assert "cut short" not in str(caught.value)
 
 

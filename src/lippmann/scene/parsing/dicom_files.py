@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
 from collections.abc import Iterator
 from itertools import islice
@@ -10,6 +11,11 @@ from pathlib import Path
 
 #: The mark after the first 128 bytes of a file.
 DICOM = b"DICM"
+
+#: Bytes at the beginning of a file that tell whether it is one.
+HEAD_LENGTH = 132
+#: The first element of a data set that stands without the mark, of group 2 or 8: its length, or its kind in letters.
+_BARE = re.compile(rb"[\x02\x08]\0.\0(?:[A-Z]{2}[\0-\x7f]\0|[\0-\x7f]\0\0\0)", re.DOTALL)
 
 #: Files and levels of folders that are looked at.
 MOST_FILES, MOST_LEVELS = 20_000, 4
@@ -20,6 +26,11 @@ _A_FEW = 64
 def holds_dicom(folder: Path) -> bool:
     """Whether one of the first files of a folder is a DICOM file."""
     return any(fault_of(path) is None for path in islice(files_in(folder), _A_FEW))
+
+
+def begins_dicom(head: bytes) -> bool:
+    """Whether a file begins as DICOM files do, those of before 2000 too, whose data set stands without the mark."""
+    return head[128:HEAD_LENGTH] == DICOM or _BARE.match(head) is not None
 
 
 def fault_of(path: str) -> str | None:
@@ -33,7 +44,7 @@ def fault_of(path: str) -> str | None:
         if not status.st_size:
             return "empty"
         with open(path, "rb") as file:
-            return None if file.read(132)[128:] == DICOM else "no DICOM"
+            return None if begins_dicom(file.read(HEAD_LENGTH)) else "no DICOM"
     except OSError:
         return "no DICOM"
 

@@ -116,12 +116,11 @@ def _numpy_array(path: Path) -> NDArray[np.generic]:
 
 
 def _exr(path: Path) -> NDArray[np.float32]:
-    header = read_exr_header(path)
+    header = read_exr_header(path, lambda names: any(_matches(form, name) for form in _CHANNELS[:-1] for name in names))
     check_input(4 * header.height * header.width * len(header.channels), "the depth map", where=path.name)
     channels = read_exr(path, header)
     scalars = [name for name in sorted(channels) if not (name.endswith(".Z") and f"{name[:-1]}X" in channels)]
-    matches = (name for form in _CHANNELS for name in scalars if re.fullmatch(form, name, re.IGNORECASE))
-    name = next(matches, None)
+    name = next((name for form in _CHANNELS for name in scalars if _matches(form, name)), None)
     if name is None:
         held, rule = ", ".join(sorted(channels)), "depth is Z, V, Y, R or that of a layer, such as depth.Z"
         raise SceneError(f"has the channels {held}", where=path.name, rule=rule)
@@ -130,6 +129,10 @@ def _exr(path: Path) -> NDArray[np.float32]:
     if any(other in channels and not np.array_equal(channels[other], depth, equal_nan=True) for other in others):
         raise _color_error(path.name)
     return depth
+
+
+def _matches(form: str, name: str) -> bool:
+    return re.fullmatch(form, name, re.IGNORECASE) is not None
 
 
 def _color_error(where: str) -> SceneError:

@@ -17,7 +17,7 @@ from lippmann.options.outputs import AccessOptions
 from lippmann.options.scene import LoadKeywords, SceneOptions, Up
 from lippmann.options.texts import settings_of
 from lippmann.runtime.plugins import Plugin, function_of
-from lippmann.scene.parsing.dicom_files import DICOM, holds_dicom
+from lippmann.scene.parsing.dicom_files import HEAD_LENGTH, begins_dicom, holds_dicom
 from lippmann.scene.parsing.far_origin import make_traceable
 from lippmann.scene.parsing.files import NamedFiles, read_bytes
 from lippmann.scene.readers.registry import READERS, VTK, MovingScene, Reader, ReaderOption, suffixes_with
@@ -468,8 +468,8 @@ def _suffix_by_content(path: Path) -> str | None:
         return ".dcm"
     if holds_sog(path):
         return ".sog"
-    head = read_bytes(path, 132)
-    if head[128:] == DICOM:
+    head = read_bytes(path, HEAD_LENGTH)
+    if begins_dicom(head):
         return ".dcm"
     head = head.removeprefix(b"\xef\xbb\xbf").lstrip()
     if b"<VTKFile" in head or (kind_of_name(path) in VTK and head.startswith(b"<")):  # they are XML, too

@@ -1,5 +1,6 @@
 """DICOM series: the order and distance of slices, which series, and what is refused."""
 
+import io
 import sys
 from pathlib import Path
 
@@ -212,6 +213,27 @@ def test_files_that_are_no_slices_are_counted(tmp_path):
         scene = load_scene(path)
         assert line in scene.notes
         assert gaps in scene.notes
+
+
+def test_slices_without_the_mark_are_read_beside_others(tmp_path):
+    folder = tmp_path / "ct"
+    save_series(folder, range(0, 18, 3))
+    expected = load_scene(folder).description.volume.grid
+    for path in sorted(folder.iterdir())[1::2]:
+        save_bare(path)
+    for path in (folder, folder / "a-1", folder / "a-2"):
+        scene = load_scene(path)
+        assert not any("left out" in note for note in scene.notes)
+        assert np.array_equal(scene.description.volume.grid, expected)
+
+
+def save_bare(path):
+    """Write a file as before 2000: the data set alone, without the mark and what goes with it."""
+    import pydicom
+
+    data, whole = pydicom.dcmread(path), io.BytesIO()
+    pydicom.dcmwrite(whole, pydicom.Dataset(data), implicit_vr=True, little_endian=True, enforce_file_format=False)
+    path.write_bytes(whole.getvalue())
 
 
 @pytest.mark.parametrize("size", [140, 200, 250, 400])

@@ -113,7 +113,7 @@ def _losses(lost: dict[str, list[str]], total: int) -> list[str]:
 
 
 def _header(name: str) -> pydicom.Dataset:
-    return pydicom.dcmread(name, stop_before_pixels=True, specific_tags=_TAGS, force=name.lower().endswith(".dcm"))
+    return pydicom.dcmread(name, stop_before_pixels=True, specific_tags=_TAGS, force=True)
 
 
 def _frames(name: str, header: pydicom.Dataset) -> Iterator[Frame]:
@@ -270,7 +270,7 @@ def _fill(frames: list[Frame], lost: dict[str, list[str]], memory: int) -> tuple
 
 
 def _pixels(frame: Frame) -> np.ndarray[Any, Any]:
-    dataset = pydicom.dcmread(frame.file, force=frame.file.lower().endswith(".dcm"))
+    dataset = pydicom.dcmread(frame.file, force=True)
     syntax = getattr(getattr(dataset, "file_meta", None), "TransferSyntaxUID", None)
     if syntax is None:
         dataset.file_meta = pydicom.dataset.FileMetaDataset()
