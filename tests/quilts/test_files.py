@@ -387,5 +387,5 @@ def test_two_pictures_that_nothing_calls_a_pair_are_none(tmp_path):
     file = pillow_heif.from_pillow(Image.new("RGB", (320, 256)))
     file.add_from_pillow(Image.new("RGB", (320, 256)))
     file.save(tmp_path / "two.heic")
-    with pytest.raises(PictureError, match=r"two\.heic: holds no stereo pair; two views that are marked as such"):
+    with pytest.raises(PictureError, match=r"two\.heic: holds no stereo pair; a pair is two views"):
         read_quilt(tmp_path / "two.heic")

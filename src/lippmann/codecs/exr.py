@@ -299,7 +299,7 @@ def _bytes_of(attributes: Mapping[str, tuple[str, bytes]]) -> int:
     """Bytes of a part's pixels."""
     x0, y0, x1, y1 = struct.unpack("<4i", attributes["dataWindow"][1])
     channels, subsampled = _channel_list(attributes["channels"][1])
-    return 4 * (len(channels) + len(subsampled)) * max(x1 - x0 + 1, 0) * max(y1 - y0 + 1, 0)
+    return int(4 * (len(channels) + len(subsampled)) * max(x1 - x0 + 1, 0) * max(y1 - y0 + 1, 0))
 
 
 def _picture_layer(names: Collection[str]) -> str:

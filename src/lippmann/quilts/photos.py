@@ -186,7 +186,13 @@ def quilt_of_pair(path: Path, *, half: bool = False) -> Quilt:
     """
     sources = _views_in(path)
     if len(sources) < 2:
-        raise PictureError("holds no stereo pair", where=str(path), rule="two views that are marked as such")
+        what, fix = "holds no stereo pair", ""
+        if path.suffix.lower() in HEIF:
+            from lippmann.scene.readers.heif import has_depth
+
+            if has_depth(path):
+                what, fix = "is a photograph with depth, no stereo pair", "show it by 'lippmann render'"
+        raise PictureError(what, where=str(path), rule="a pair is two views that are marked as such", fix=fix)
     (width, height), second = (_header(source).size for source in sources)
     size = (width + 1) // 2 if half else width, height
     read = read_photos([path], size, (width, height), fit="cover", keeps_profile=False)

@@ -3,8 +3,9 @@
 Numbers that all names share say nothing. Of the others the last one counts the views, or the last two side by side are
 row and column, where rows and columns repeat; column and row where names say so (``x3_y0``, ``col3_row0``). Folders
 of the 4D Light Field Benchmark count row by row, in rows as long as their ``parameters.cfg`` says; without it a square
-number of views, counted from 0, is a square grid. Names of the Stanford light field archive also hold where the camera stood, ``out_ROW_COLUMN_Y_X``, in mm, x to the right and y
-downwards; their rows and columns run either way.
+number of views, counted from 0, is a square grid. Names of the Stanford light field archive also
+hold where the camera stood, ``out_ROW_COLUMN_Y_X``, in mm, x to the right and y downwards; their rows and columns run
+either way.
 """
 
 from __future__ import annotations

@@ -206,6 +206,34 @@ def test_channels_of_depth_by_their_layers(tmp_path, names):
     assert read_depth_map(tmp_path / "d.exr").inverse == pytest.approx(1 / depth)
 
 
+def with_xmp(picture, text):
+    """A JPEG file with XMP in its first segment."""
+    body = b"http://ns.adobe.com/xap/1.0/\0<x:xmpmeta>" + text + b"</x:xmpmeta>"
+    return picture[:2] + b"\xff\xe1" + (len(body) + 2).to_bytes(2, "big") + body + picture[2:]
+
+
+def test_the_disparity_behind_the_picture_of_an_apple_telephone(tmp_path):
+    """Its last pictures are a gain map and a matte, which are no depth."""
+    photo = encoded(np.full((16, 32, 3), 90, np.uint8), "JPEG")
+    kind = b"<apdi:AuxiliaryImageType>%s</apdi:AuxiliaryImageType>"
+    ramp = np.tile(np.repeat(np.array([[40, 200]], np.uint8), 8, axis=1), (8, 1))
+    others = (b"urn:com:apple:photo:2020:aux:hdrgainmap", b"portraiteffectsmatte")
+    gain, matte = (with_xmp(encoded(np.zeros((8, 16), np.uint8), "JPEG"), kind % each) for each in others)
+    disparity = with_xmp(encoded(ramp, "JPEG"), kind % b"disparity")
+    found = embedded_depth(photo + gain + disparity + matte, "p.jpg").inverse
+    assert found == pytest.approx(ramp.astype(np.float32), abs=3)  # brighter is nearer
+    assert embedded_depth(photo + gain + matte, "p.jpg") is None
+    turned = embedded_depth(photo + disparity, "p.jpg", 3).inverse
+    assert turned == pytest.approx(found[::-1, ::-1])
+
+
+def test_the_depth_of_samsung_s_telephones_is_named_with_the_tool_that_takes_it_out(tmp_path):
+    photo = encoded(np.zeros((4, 4, 3), np.uint8), "JPEG")
+    (tmp_path / "p.jpg").write_bytes(photo + b"SEFH....SEFT")
+    with pytest.raises(SceneError, match=r"needs a depth map; .*exiftool -b -SingleShotDepthMapTiff"):
+        load_scene(tmp_path / "p.jpg")
+
+
 def test_of_several_parts_the_first_with_depth_counts(tmp_path):
     import OpenEXR
 
@@ -366,6 +394,9 @@ def test_without_any_depth_there_is_no_scene(tmp_path):
     slices.save(tmp_path / "cells.tif", save_all=True, append_images=[slices])
     with pytest.raises(SceneError, match=r"^cells\.tif: needs a depth map; .*; slices of a volume are read as \.npy"):
         load_scene(tmp_path / "cells.tif")
+    slices.save(tmp_path / "pair.jpg", "MPO", save_all=True, append_images=[slices])
+    with pytest.raises(SceneError, match=r"^pair\.jpg: needs a depth map; .* beside it$"):
+        load_scene(tmp_path / "pair.jpg")
 
 
 @pytest.mark.parametrize(

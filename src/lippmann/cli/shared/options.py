@@ -82,8 +82,8 @@ Scene = Annotated[
     str,
     typer.Argument(
         help="A .glb, .gltf, .obj, .ply, .spz, .sog, .stl, .off, .blend, .usd, Mitsuba .xml, Tachyon .dat or .nff "
-        "file, a volume (.nii, .nii.gz, .vdb, .npy, .npz, .vol, a DICOM folder), a VTK file, a photograph with depth, "
-        "or a bundled scene's name.",
+        "file, a volume (.nii, .nii.gz, .nrrd, .mhd, .vdb, .npy, .npz, .vol, a DICOM folder), a VTK file, a photograph "
+        "with depth, or a bundled scene's name.",
         autocompletion=complete_scenes,
     ),
 ]

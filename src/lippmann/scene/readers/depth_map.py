@@ -1,4 +1,4 @@
-"""Depth maps: files of distances, pictures of nearness, and XMP GDepth within JPEG files."""
+"""Depth maps: files of distances, pictures of nearness, and those within JPEG files."""
 
 from __future__ import annotations
 
@@ -43,6 +43,9 @@ _GDEPTH = re.compile(rb"""xmlns:([\w.-]+)\s*=\s*["']http://ns\.google\.com/photo
 _PROPERTY = rb"""\b%s:(%s)(?:\s*=\s*(["'])(.*?)\2|\s*>([^<]*)<)"""
 #: An item of the directory that says what follows the picture in its file, and its properties.
 _ITEM = re.compile(rb"<([\w.-]+:Item)\b(.{0,2000}?)(?:/>|</\1>)", re.DOTALL)
+#: What the XMP of a picture behind a JPEG file's own says of it, as Apple's telephones write portraits.
+_APPLE_DISPARITY = re.compile(rb"""\b[\w.-]+:AuxiliaryImageType\s*(?:>|=\s*["'])\s*disparity\b""")
+_START_OF_IMAGE = b"\xff\xd8\xff"
 _PRIMARY = (b"Primary", b"primary_image")
 #: Digits of a length and a padding together; no file is so long.
 _LONGEST_NUMBER = 30
@@ -215,7 +218,7 @@ def of_nearness(codes: NDArray[np.generic], white: White, where: str) -> DepthMa
 
 def embedded_depth(data: bytes, where: str, turn: int = 1) -> DepthMap | None:
     """The depth that a JPEG file carries, as Android's portraits have it: in its XMP (GDepth), or behind its picture
-    (Dynamic Depth 1.0); None without it.
+    (Dynamic Depth 1.0), or as Apple's: a picture of disparity behind it (multi-picture format); None without it.
 
     Its pixels lie as those of the picture are stored, whose EXIF orientation is ``turn``.
 
@@ -227,6 +230,9 @@ def embedded_depth(data: bytes, where: str, turn: int = 1) -> DepthMap | None:
     SceneError
         Its values mean nothing, or its picture is damaged.
     """
+    apple = _APPLE_DISPARITY.search(data) if data.startswith(_START_OF_IMAGE) else None
+    if apple is not None and (start := data.rfind(_START_OF_IMAGE, 1, apple.start())) > 0:
+        return DepthMap(without_stairs(_gray(data[start:], where, turn)[0]))
     entries: dict[bytes, bytes] = {}
     xmp = _xmp(data)
     for prefix in dict.fromkeys((b"GDepth", *_GDEPTH.findall(xmp))):

@@ -30,6 +30,10 @@ _DEPTH = re.compile(
 )
 #: The end of a photograph's name that says that it is the one of both with the colours.
 _COLOR = re.compile(r"(?:^|[-_. ])(?:image|img|rgb|colou?r)$", re.IGNORECASE)
+#: Endings of files that may hold the slices of a volume.
+_TIFF = (".tif", ".tiff")
+#: The last bytes of a JPEG file behind whose picture Samsung's telephones lay more.
+_SAMSUNG = b"SEFT"
 #: How deep the height field is, over the shorter side of the picture; displays scale it to what they resolve.
 DEPTH = 0.5
 #: Points of the height field; of larger depth maps one pixel in so many is taken.
@@ -51,8 +55,8 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
     ----------
     depth_map:
         A depth map; None for one beside the colours, where the name ends in ``_rgbd`` (:func:`rgbd_of_name`), one
-        within the picture (Dynamic Depth or XMP GDepth in JPEG files, an auxiliary picture in
-        HEIF files), or one beside it (:func:`depth_beside`).
+        within the picture (Dynamic Depth, XMP GDepth or Apple's disparity in JPEG files, an
+        auxiliary picture in HEIF files), or one beside it (:func:`depth_beside`).
 
     Raises
     ------
@@ -81,7 +85,9 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
         if depth_map is None:
             fix = f"add depth_map=..., or lay {path.stem[:40]}_depth.png beside it"
             rule = "pictures are read as photographs with depth: 'lippmann weave' takes quilts, 'lippmann view' our own"
-            if any(note.endswith("the first is shown") for note in notes):
+            if data.endswith(_SAMSUNG):
+                fix += "; Samsung's own is taken out by: exiftool -b -SingleShotDepthMapTiff a.jpg > a_depth.tif"
+            if path.suffix.lower() in _TIFF and any(note.endswith("the first is shown") for note in notes):
                 fix += "; slices of a volume are read as .npy: numpy.save('a.npy', tifffile.imread('a.tif'))"
             raise SceneError("needs a depth map", where=path.name, rule=rule, fix=fix)
         notes = (*notes, f"depth from {depth_map.name}, which lies beside it")

@@ -55,7 +55,6 @@ _PAPER_DEPTH = 2
 _BLENDER = "open it in Blender, then File > Export > glTF 2.0 (.glb)"
 _FREECAD = "open it in FreeCAD, then File > Export > glTF (.glb)"
 _CLOUD_COMPARE = "save it as .ply, in CloudCompare for instance"
-_SLICER_3D = "save it as .nii.gz, in 3D Slicer for instance"
 _NIBABEL = "save it as .nii.gz, in Python by: nibabel.save(nibabel.load('a{0}'), 'a.nii.gz')"
 _MAYA = "export it from Maya as FBX, and that from Blender as glTF 2.0 (.glb)"
 _ASSIMP = "convert it by Assimp: assimp export in{0} out.glb"
@@ -91,7 +90,7 @@ _ELSEWHERE = {
     ".vtm": "save its blocks as one data set, in PyVista by: pyvista.read('a.vtm').combine().save('a.vtu')",
     ".pvd": "name one of the files that it lists",
     ".vtkhdf": "save it as .vtu, in PyVista by: pyvista.read('a.vtkhdf').cast_to_unstructured_grid().save('a.vtu')",
-    **dict.fromkeys((".nrrd", ".nhdr", ".mha", ".mhd"), _SLICER_3D),
+    ".raw": "name the .mhd or .nhdr file beside it, or save it as .npy: numpy.fromfile(...).reshape(z, y, x)",
     **dict.fromkeys((".mgz", ".mgh"), "convert it by FreeSurfer: mri_convert in.mgz out.nii.gz"),
     **{kind: _NIBABEL.format(kind) for kind in (".mnc", ".par", ".rec")},
     ".mtl": "it holds the materials of an .obj file: name that",
@@ -103,7 +102,7 @@ _ELSEWHERE = {
     **dict.fromkeys((".las", ".laz", ".e57", ".pcd", ".pts", ".ptx", ".xyzrgb"), _CLOUD_COMPARE),
     ".txt": "save clouds of points as .ply, in CloudCompare for instance, COLMAP's by its model_converter",
     **dict.fromkeys((".mrc", ".map", ".ccp4"), "save it as .npy: numpy.save('a.npy', mrcfile.read('a.mrc'))"),
-    **{kind: _OPEN_BABEL.format(kind) for kind in (".sdf", ".mol", ".mol2", ".cube", ".gro")},
+    **{kind: _OPEN_BABEL.format(kind) for kind in (".cube", ".gro", ".mae", ".pqr")},
     **dict.fromkeys((".bcif", ".mmtf"), "take the entry's .cif file from the data bank"),
     **dict.fromkeys((".bmp", ".avif"), "save photographs with depth as .png or .jpg"),
     **dict.fromkeys(FILMS, "take its pictures out: ffmpeg -i in.mp4 frames/%04d.png"),
@@ -131,9 +130,10 @@ def load_scene(
     source:
         Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.spz``, ``.sog``, ``.stl``, ``.off``, ``.blend``, ``.usd``
         (``.usda``, ``.usdc``, ``.usdz``), Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff`` file; of a volume (``.nii``,
-        ``.nii.gz``, ``.vdb``, ``.npy``, ``.npz``, Mitsuba ``.vol``, ``.dcm`` or a folder of such) or of VTK (``.vtp``,
-        ``.vtu``, ``.vtk``, ``.vti``); name of a bundled scene; a ``mi.Scene`` or Mitsuba dict; a trimesh scene or
-        mesh; a PyVista data set or plotter; a :class:`~lippmann.scene.values.description.SceneDescription`.
+        ``.nii.gz``, ``.nrrd``, ``.mha``, ``.mhd``, ``.vdb``, ``.npy``, ``.npz``, Mitsuba ``.vol``, ``.dcm`` or a folder
+        of such) or of VTK (``.vtp``, ``.vtu``, ``.vtk``, ``.vti``); name of a bundled scene; a ``mi.Scene`` or Mitsuba
+        dict; a trimesh scene or mesh; a PyVista data set or plotter; a
+        :class:`~lippmann.scene.values.description.SceneDescription`.
     light:
         A :class:`~lippmann.options.light.LightOptions`, or a dict of them: turns and scales the scene's light.
     **options:

@@ -188,8 +188,14 @@ _OWN = {
     "dicom": Reader((".dcm",), f"{_HERE}.volumes.dicom:read_dicom", options=("series",)),
     "vdb": Reader((".vdb",), f"{_HERE}.volumes.vdb:read_vdb", options=("series",), up="y"),
     "mitsuba-volume": Reader((".vol",), f"{_HERE}.volumes.mitsuba_grid:read_mitsuba_grid"),
+    "header-grid": Reader(
+        (".nrrd", ".nhdr", ".mha", ".mhd"),
+        f"{_HERE}.volumes.header_grids:read_header_grid",
+        {b"NRRD": ".nrrd"},
+        ("files",),
+    ),
     "molecules": Reader(
-        (".pdb", ".ent", ".cif", ".xyz", ".json", ".pdb.gz", ".ent.gz", ".cif.gz"),
+        (".pdb", ".ent", ".cif", ".xyz", ".sdf", ".sd", ".mol", ".mol2", ".json", ".pdb.gz", ".ent.gz", ".cif.gz"),
         f"{_HERE}.molecules.reader:read_molecule",
         {b'{"data_': ".json"},
     ),

@@ -8,7 +8,8 @@ import pytest
 from PIL import Image as Pillow
 
 from lippmann.codecs.icc import rgb_profile
-from lippmann.errors import MemoryLimitError, SceneError
+from lippmann.errors import MemoryLimitError, PictureError, SceneError
+from lippmann.quilts.files import read_quilt
 from lippmann.runtime import machine
 from lippmann.scene.readers.heif.photo import read_heif_photo
 from lippmann.scene.readers.load import load_scene
@@ -75,6 +76,13 @@ def test_another_depth_map_takes_the_place_of_its_own(tmp_path):
         load_scene(path)
     np.save(tmp_path / "d.npy", 1.0 / (1.0 + DEPTH))
     assert load_scene(path, depth_map=tmp_path / "d.npy").description.meshes
+
+
+def test_a_portrait_that_is_asked_for_as_a_pair_says_what_it_is(tmp_path):
+    path = tmp_path / "portrait.heic"
+    path.write_bytes(heif(np.zeros((64, 64, 3), np.uint8), np.zeros((32, 32), np.uint8)))
+    with pytest.raises(PictureError, match=r"portrait\.heic: is a photograph with depth, no .*'lippmann render'"):
+        read_quilt(path)
 
 
 def test_depth_of_another_kind_is_named():

@@ -326,3 +326,67 @@ def test_what_is_no_xyz_file_of_molecules(read, text, line):
     with pytest.raises(SceneError, match=r"^m\.xyz: is no molecule that is understood") as caught:
         read(text, "m.xyz")
     assert line in str(caught.value)
+
+
+V2000 = """\
+water
+  by hand 01012600003D
+
+  3  2  0  0  0  0  0  0  0  0999 V2000
+    0.0000    0.0000    0.0000 O   0  0  0  0  0  0
+    0.9570    0.0000    0.0000 H   0  0  0  0  0  0
+   -0.2400    0.9270    0.0000 H   0  0  0  0  0  0
+  1  2  1  0
+  1  3  1  0
+M  END
+"""
+V3000 = """\
+water
+  by hand 01012600003D
+
+  0  0  0     0  0            999 V3000
+M  V30 BEGIN CTAB
+M  V30 COUNTS 3 2 0 0 0
+M  V30 BEGIN ATOM
+M  V30 1 O 0 0 0 0
+M  V30 2 H 0.957 0 0 0
+M  V30 3 H -0.24 0.927 0 0
+M  V30 END ATOM
+M  V30 END CTAB
+M  END
+"""
+MOL2 = """\
+# by hand
+@<TRIPOS>MOLECULE
+water
+ 3 2
+
+@<TRIPOS>ATOM
+ 1 O1  0.0    0.0   0.0 O.3 1 HOH 0.0
+ 2 H1  0.957  0.0   0.0 H
+ 3 H2 -0.24   0.927 0.0 H
+@<TRIPOS>BOND
+ 1 1 2 1
+"""
+
+
+@pytest.mark.parametrize(("text", "name"), [(V2000, "m.mol"), (V3000, "m.sdf"), (MOL2, "m.mol2")])
+def test_files_of_chemists(read, text, name):
+    end = "> <name>\nwater\n\n$$$$\n" if name == "m.sdf" else ""
+    scene = read(text + end, name)
+    assert places(scene, "balls of element 8").tolist() == [[0, 0, 0]]
+    assert places(scene, "balls of element 1").tolist() == [[0.957, 0, 0], [-0.24, 0.927, 0]]
+    assert scene.notes == ["3 atoms, 2 bonds by their distance"]
+    end = end or ("" if name == "m.mol2" else "$$$$\n")
+    assert "2 molecules: the first is shown" in read(text + end + text + end, name).notes
+
+
+def test_a_flat_drawing_is_noted(read):
+    (note,) = (line for line in read(V2000.replace("3D", "2D"), "m.mol").notes if "drawing" in line)
+    assert note.startswith("it is a flat drawing")
+
+
+@pytest.mark.parametrize(("text", "name"), [(V2000[:120], "m.mol"), (V3000[:150], "m.sdf"), (MOL2[:120], "m.mol2")])
+def test_files_of_chemists_that_are_cut_short_are_refused(read, text, name):
+    with pytest.raises(SceneError, match=rf"^{name}: is no molecule that is understood"):
+        read(text, name)

@@ -40,3 +40,10 @@ def read_heif_pair(path: Path) -> tuple[Photograph, Photograph] | None:
     except (ValueError, RuntimeError, EOFError, KeyError, IndexError, TypeError) as error:
         raise PictureError(f"cannot be decoded ({error})", where=str(path), rule="a HEIF picture") from None
     return Photograph.of_codes(first, icc), Photograph.of_codes(second, other_icc)
+
+
+def has_depth(path: Path) -> bool:
+    """Whether a HEIF file that can be read is a photograph with depth."""
+    import pillow_heif
+
+    return bool(pillow_heif.open_heif(path).info.get("depth_images"))

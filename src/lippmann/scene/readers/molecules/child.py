@@ -24,6 +24,8 @@ _COMPONENT_TAGS = (
     "_chem_comp_atom.pdbx_model_Cartn_x_ideal",
 )
 
+#: Files of chemists: MDL's molfiles, several of them one after another, and Tripos's.
+_TABLES = (".sdf", ".sd", ".mol", ".mol2")
 _PDB = (".pdb", ".ent", ".pdb.gz", ".ent.gz")
 #: CHARMM's names of ions, whose first letters mean other elements.
 _IONS = {
@@ -63,6 +65,8 @@ def _atoms(path: str, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.f
         return _of_structure(gemmi.read_pdb(path, max_line_length=_columns(path)), notes)
     if path.lower().endswith(".xyz"):
         return _of_xyz(path, notes)
+    if path.lower().endswith(_TABLES):
+        return _of_table(path, notes)
     if not path.lower().endswith((".cif", ".cif.gz")):
         return _of_structure(gemmi.read_structure(path), notes)
     document = gemmi.cif.read(path)
@@ -109,6 +113,40 @@ def _of_xyz(path: str, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.
     ]
     places = [gemmi.Position(*(float(word) for word in row[at["pos"] : at["pos"] + 3])) for row in rows]
     return _arrays(elements, places)
+
+
+def _of_table(path: str, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Atoms of the first molecule of an MDL file (V2000 and V3000, CTfile Formats, Biovia 2020) or Tripos Mol2."""
+    with open(path, encoding="utf-8-sig", errors="replace") as file:
+        lines = file.read().splitlines()
+    is_tripos = path.lower().endswith(".mol2")
+    mark = "@<TRIPOS>MOLECULE" if is_tripos else "$$$$"
+    ends = [number for number, line in enumerate(lines) if line.startswith(mark)]
+    if is_tripos:
+        molecules, lines = len(ends), lines[ends[0] : (*ends[1:], None)[0]]
+        first = lines.index("@<TRIPOS>ATOM") + 1
+        count = next((n for n, line in enumerate(lines[first:]) if line.startswith("@")), len(lines) - first)
+        rows = [line.split() for line in lines[first : first + count] if line.strip()]
+        atoms = [(row[5].partition(".")[0], row[2:5]) for row in rows]
+    else:
+        molecules = sum(any(line.strip() for line in lines[end + 1 :]) for end in ends[:-1]) + 1
+        lines = lines[: (*ends, None)[0]]
+        if lines[1][20:22] == "2D":
+            notes.append("it is a flat drawing: a data bank's file of a conformer (3D) has places in space")
+        if lines[3].rstrip().endswith("V3000"):
+            first = lines.index("M  V30 BEGIN ATOM") + 1
+            rows = [line.split() for line in lines[first : lines.index("M  V30 END ATOM")]]
+            atoms = [(row[3], row[4:7]) for row in rows]
+        else:
+            count = int(lines[3][:3])
+            rows = [[line[31:34], line[:10], line[10:20], line[20:30]] for line in lines[4 : 4 + count]]
+            if len(rows) < count:
+                raise ValueError(f"it holds fewer than {count} atoms: is it cut short?")
+            atoms = [(row[0].strip(), row[1:]) for row in rows]
+    if molecules > 1:
+        notes.append(f"{molecules} molecules: the first is shown")
+    places = [gemmi.Position(*map(float, place)) for _, place in atoms[: MOST_ATOMS + 1]]
+    return _arrays([gemmi.Element(name) for name, _ in atoms[: MOST_ATOMS + 1]], places)
 
 
 def _columns(path: str) -> int:

@@ -1,4 +1,4 @@
-"""Molecules (``.pdb``, ``.cif``, ``.xyz``, mmJSON) as balls and sticks in the colours of Corey, Pauling and Koltun."""
+"""Molecules (PDB, CIF, XYZ, SDF, Mol2, mmJSON) as balls and sticks in the colours of Corey, Pauling and Koltun."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _process = HelperProcess("from lippmann.scene.readers.molecules.child import mai
 
 
 def read_molecule(path: Path) -> SceneDescription:
-    """Read a molecule: PDB, mmCIF, mmJSON, XYZ, or the CIF of a small molecule. A unit is an angstrom.
+    """Read a molecule: PDB, mmCIF, mmJSON, XYZ, SDF, Mol2, or the CIF of a small molecule. A unit is an angstrom.
 
     The first block with atoms and the first model are shown; of residues and atoms that share a place, the first.
     Balls have a quarter of van der Waals radii. Two atoms that lie within their covalent radii and 0.45 angstroms are

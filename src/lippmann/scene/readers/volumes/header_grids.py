@@ -1,0 +1,167 @@
+"""Volumes of NRRD (``.nrrd``, ``.nhdr``) and MetaImage files (``.mha``, ``.mhd``): a header of lines, then the voxels.
+
+Sources: "Definition of NRRD File Format" (teem.sourceforge.net), ITK's "MetaIO" documentation; a row of MetaImage's
+``TransformMatrix`` is the direction of an axis, and its places are those of a patient: left, back, head.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.errors import SceneError
+from lippmann.runtime.machine import check_input
+from lippmann.scene.parsing.files import NamedFiles, read_bytes
+from lippmann.scene.values.description import SceneDescription
+from lippmann.scene.volumes.description import WORLD_FROM_LPS, describe_volume
+
+#: The longest header.
+_MOST_HEADER = 1 << 20
+#: Types of voxels by the names that NRRD and MetaImage have for them, in small letters.
+_TYPES = {
+    **dict.fromkeys(("char", "int8", "int8_t"), "i1"),
+    **dict.fromkeys(("uchar", "unsigned char", "uint8", "uint8_t"), "u1"),
+    **dict.fromkeys(("short", "short int", "int16", "int16_t"), "i2"),
+    **dict.fromkeys(("ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"), "u2"),
+    **dict.fromkeys(("int", "int32", "int32_t"), "i4"),
+    **dict.fromkeys(("uint", "unsigned int", "uint32", "uint32_t"), "u4"),
+    **dict.fromkeys(("longlong", "long long", "long_long", "int64", "int64_t"), "i8"),
+    **dict.fromkeys(("ulonglong", "unsigned long long", "ulong_long", "uint64", "uint64_t"), "u8"),
+    "long": "i4",
+    "ulong": "u4",  # of MetaImage
+    "float": "f4",
+    "double": "f8",
+}
+#: Without a word on how a patient lies: slice 0 in front, row 0 on top.
+_WORLD_FROM_SLICES = np.diag([1.0, -1.0, -1.0, 1.0])
+_LINE = re.compile(r"\s*([^:=#]+?)\s*[:=]\s*(.*?)\s*")
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Voxels of ``dtype``, ``sizes`` along each axis (the fastest first), in ``file`` (None: behind the header)."""
+
+    sizes: list[int]
+    dtype: np.dtype[np.generic]
+    matrix: NDArray[np.float64]
+    file: str | None
+    skip: int
+    is_packed: bool
+    notes: list[str]
+
+
+def read_header_grid(path: Path, *, files: NamedFiles) -> SceneDescription:
+    """Read a volume of one number a voxel, raw or packed by zlib. World units are millimetres.
+
+    A patient is seen from the front, head up.
+
+    Raises
+    ------
+    SceneError
+        The file or that of its voxels is missing, damaged or cut short; it holds no such volume.
+    MemoryLimitError
+        It holds more than the memory that is left.
+    """
+    where, data = path.name, read_bytes(path)
+    is_nrrd = data.startswith(b"NRRD")
+    end = re.search(rb"\r?\n\r?\n" if is_nrrd else rb"ElementDataFile[^\n]*\n?", data[:_MOST_HEADER])
+    text = data[: end.end() if end else _MOST_HEADER].decode("latin-1")
+    entries = {match[1].lower(): match[2] for line in text.splitlines() if (match := _LINE.fullmatch(line))}
+    try:
+        grid = _nrrd(entries) if is_nrrd else _metaimage(entries)
+    except (KeyError, ValueError, IndexError) as error:
+        raise SceneError(f"has a header without sense ({error})", where=where, rule="NRRD or MetaImage") from None
+    sizes = [size for size in grid.sizes if size != 1] if len(grid.sizes) > 3 else grid.sizes
+    if not 2 <= len(sizes) <= 3 or min(sizes) < 1:
+        raise SceneError(f"has {grid.sizes} values", where=where, rule="one number a voxel on three axes is shown")
+    shape = [*sizes, 1][2::-1]
+    size = math.prod(shape) * grid.dtype.itemsize
+    check_input(size + 4 * math.prod(shape), f"{' x '.join(map(str, sizes))} voxels", where=where)
+    if grid.file is not None:
+        if "%" in grid.file or grid.file.startswith("LIST"):
+            raise SceneError("names a file for each slice", where=where, rule="voxels in one file are read")
+        data = read_bytes(files.find(grid.file, where=where, what="file of voxels"))
+    start = grid.skip if grid.file is not None or end is None else end.end() + max(grid.skip, 0)
+    if grid.is_packed:
+        try:
+            body = zlib.decompressobj(47).decompress(data[max(start, 0) :], size)  # of zlib or gzip
+        except zlib.error as error:
+            raise SceneError(f"cannot be unpacked ({error})", where=where, fix="is it whole?") from None
+    else:
+        body = data[-size:] if grid.skip < 0 else data[start : start + size]
+    if len(body) < size:
+        raise SceneError(f"holds {len(body)} of {size} bytes of voxels", where=where, fix="is it whole?")
+    return describe_volume(path.stem, np.frombuffer(body, grid.dtype).reshape(shape), grid.matrix, notes=grid.notes)
+
+
+def _matrix(steps: NDArray[np.float64], origin: NDArray[np.float64]) -> NDArray[np.float64]:
+    """From voxels to places: a row of ``steps`` ``(n, 3)`` for each axis."""
+    matrix = np.eye(4)
+    matrix[: len(steps[0]), : len(steps)] = steps.T
+    matrix[: len(origin), 3] = origin
+    if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix)) == 0.0:
+        raise ValueError("its voxels have no extent")
+    return matrix
+
+
+def _numbers(text: str) -> NDArray[np.float64]:
+    return np.array([float(word) for word in text.replace(",", " ").strip("() ").split()])
+
+
+def _nrrd(entries: Mapping[str, str]) -> _Grid:
+    encoding = entries["encoding"].lower()
+    if encoding not in ("raw", "gzip", "gz"):
+        raise ValueError(f"encoding {encoding}; raw and gzip are read")
+    order = ">" if entries.get("endian", "little").lower() == "big" else "<"
+    dtype = np.dtype(order + _TYPES[entries["type"].lower().removeprefix("signed ")])
+    sizes = [int(word) for word in entries["sizes"].split()]
+    space = entries.get("space", "").lower().replace("-", " ").split()
+    letters = space[0] if len(space) == 1 else "".join(word[:1] for word in space)
+    to_lps = [{"l": 1.0, "r": -1.0}.get(letters[:1]), {"p": 1.0, "a": -1.0}.get(letters[1:2])]
+    to_lps.append({"s": 1.0, "i": -1.0}.get(letters[2:3]))
+    notes, world = [], _WORLD_FROM_SLICES
+    if None not in to_lps:
+        world = WORLD_FROM_LPS @ np.diag([*map(float, filter(None, to_lps)), 1.0])
+    else:
+        notes.append("nothing says how a patient lies: slice 0 is in front, its row 0 on top")
+    directions = [_numbers(word) for word in re.findall(r"\([^)]*\)", entries.get("space directions", ""))]
+    if directions:
+        matrix = _matrix(np.array(directions), _numbers(entries.get("space origin", "0 0 0")))
+    else:
+        spacings = _numbers(entries.get("spacings", "1 1 1"))
+        matrix = _matrix(np.diag(spacings[np.isfinite(spacings)][:3]), np.zeros(3))
+    file = entries.get("data file", entries.get("datafile"))
+    return _Grid(sizes, dtype, world @ matrix, file, int(entries.get("byte skip", 0)), encoding != "raw", notes)
+
+
+def _metaimage(entries: Mapping[str, str]) -> _Grid:
+    def says(name: str) -> bool:
+        return entries.get(name, "").lower() in ("true", "1")
+
+    is_big = says("binarydatabyteordermsb") or says("elementbyteordermsb")
+    dtype = np.dtype((">" if is_big else "<") + _TYPES[entries["elementtype"].lower().removeprefix("met_")])
+    sizes = [int(word) for word in entries["dimsize"].split()]
+    if (channels := int(entries.get("elementnumberofchannels", 1))) > 1:
+        sizes = [channels, *sizes]
+    if entries.get("binarydata", "true").lower() in ("false", "0"):
+        raise ValueError("voxels as text; binary ones are read")
+    axes = min(int(entries["ndims"]), 3)
+    names = ("transformmatrix", "orientation", "rotation")
+    turn = next((_numbers(entries[name]) for name in names if name in entries), np.eye(int(entries["ndims"])).ravel())
+    side = math.isqrt(len(turn))
+    spacing = _numbers(entries.get("elementspacing", entries.get("elementsize", "1 1 1")))[:axes]
+    steps = turn.reshape(side, side)[:axes, :axes] * spacing[:, None]
+    origin = next(
+        (_numbers(entries[name])[:axes] for name in ("offset", "origin", "position") if name in entries), None
+    )
+    file = entries["elementdatafile"]
+    matrix = WORLD_FROM_LPS @ _matrix(steps, np.zeros(axes) if origin is None else origin)
+    skip = int(entries.get("headersize", 0))
+    return _Grid(sizes, dtype, matrix, None if file == "LOCAL" else file, skip, says("compresseddata"), [])
