@@ -41,7 +41,7 @@ def upload(values: NDArray[Any]) -> Array:
     kinds = {"f": (mi.Float, np.float32), "i": (mi.Int32, np.int32), "u": (mi.UInt32, np.uint32)}
     device_type, dtype = kinds[values.dtype.kind]
     filled = np.zeros(-(-values.size // _PACKET) * _PACKET, dtype)
-    filled[: values.size] = values.ravel()
+    filled[: values.size].reshape(values.shape)[...] = values
     table = device_type(filled)
     if values.size:
         # Something is added, as Dr.Jit would hand over the array itself where all of it is asked for.

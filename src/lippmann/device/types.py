@@ -77,6 +77,8 @@ Emitter: TypeAlias = Any
 MitsubaTexture: TypeAlias = Any
 Shape: TypeAlias = Any
 Mesh: TypeAlias = Any
+#: ``mi.Texture2f`` or one of 8 bits: texels, looked up and filtered by Dr.Jit.
+DeviceTexture: TypeAlias = Any
 #: ``mi.Properties``: parameters of a plugin.
 Properties: TypeAlias = Any
 #: ``mi.Scene``: shapes, emitters and their acceleration structure.

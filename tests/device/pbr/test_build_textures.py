@@ -164,9 +164,9 @@ def test_channels_of_a_picture_are_looked_up_together(engine, texels):
         def __init__(self, texture):
             self.texture, self.lookups = texture, 0
 
-        def eval_3(self, si, active):
+        def eval(self, uv, active):
             self.lookups += 1
-            return self.texture.eval_3(si, active)
+            return self.texture.eval(uv, active)
 
     turned = Texture(Image("t", texels), srgb=False, uv_transform=((0, 1, 0), (1, 0, 0), (0, 0, 1)))
     store = TextureStore()
@@ -182,6 +182,34 @@ def test_channels_of_a_picture_are_looked_up_together(engine, texels):
     row = texels[[0, -1], 0].astype(float) / 255  # the first row of v may be either
     assert min(np.abs(values - expected[1:] * (1.0, 0.5)).max() for expected in row) < 1e-6
     assert counted.lookups == 1
+
+
+@pytest.mark.parametrize(("srgb", "kind"), [(True, np.uint8), (False, np.uint8), (False, np.float32)])
+def test_upload_runs_no_kernel_over_the_texels(engine, srgb, kind):
+    import drjit as dr
+
+    from lippmann.device.pbr.textures import TextureStore
+
+    texels = np.random.default_rng(1).integers(0, 256, (40, 50, 3)).astype(np.uint8)
+    picture = texels if kind == np.uint8 else texels.astype(np.float32) / 255
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+        dr.kernel_history_clear()
+        signal = TextureStore().color([Texture(Image("t", picture), srgb=srgb)], np.ones((1, 3)), {})
+        dr.eval(signal.lookup.texture)
+        sizes = [kernel["size"] for kernel in dr.kernel_history() if kernel["type"] == dr.KernelType.JIT]
+    assert max(sizes, default=0) < texels.size // 3
+
+
+def test_one_row_of_texels_is_the_same_at_every_height(engine):
+    import mitsuba as mi
+
+    from lippmann.device.pbr.textures import Place, TextureStore
+
+    texels = np.array([[[10, 20, 30], [40, 50, 60], [70, 80, 90]]], np.uint8)
+    signal = TextureStore().color([Texture(Image("t", texels), srgb=False)], np.ones((1, 3)), {})
+    si = mi.SurfaceInteraction3f()
+    si.uv = mi.Point2f(0.5, mi.Float(0.1, 0.5, 0.9, 1.7))
+    np.testing.assert_allclose(np.array(signal.eval(Place(si, mi.Bool(True)))), [[c / 255] * 4 for c in (40, 50, 60)])
 
 
 def test_picture_is_uploaded_once(engine, texels):

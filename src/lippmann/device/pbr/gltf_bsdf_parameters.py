@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from lippmann.device.pbr.textures import Lookup, Place, Signal
-from lippmann.device.types import Color3f, Float, Frame3f, MitsubaTexture, Point2f, Vector3f
+from lippmann.device.types import Color3f, DeviceTexture, Float, Frame3f, Point2f, Vector3f
 
 
 @dataclass(eq=False)
@@ -93,8 +93,8 @@ class SurfaceModel:
     base_color: Signal
     roughness: Signal
     ior: Signal
-    gloss_albedo: MitsubaTexture | None = None
-    interface_albedo: MitsubaTexture | None = None
+    gloss_albedo: DeviceTexture | None = None
+    interface_albedo: DeviceTexture | None = None
     compensates: bool = True
     metallic: Signal | None = None
     metal: bool = False
@@ -109,7 +109,7 @@ class SurfaceModel:
     clearcoat_normal: NormalMap | None = None
     sheen_color: Signal | None = None
     sheen_roughness: Signal | None = None
-    sheen_albedo: MitsubaTexture | None = None
+    sheen_albedo: DeviceTexture | None = None
     anisotropy: Anisotropy | None = None
     film: ThinFilm | None = None
     opacity: Signal | None = None

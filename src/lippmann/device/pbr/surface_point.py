@@ -136,9 +136,7 @@ def _sheen(model: SurfaceModel, place: Place) -> Sheen:
     roughness = dr.clip(model.sheen_roughness.eval(place), 0, 1)
 
     def albedo(cosine: Float) -> Float:
-        at = dr.zeros(mi.SurfaceInteraction3f)
-        at.uv = mi.Point2f(cosine, roughness)
-        return table.eval_1(at)
+        return table.eval(mi.Point2f(cosine, roughness))[0]
 
     alpha = dr.maximum(dr.square(roughness), microfacet.MIN_ALPHA)
     return Sheen(model.sheen_color.eval(place), alpha, albedo)
@@ -196,10 +194,9 @@ def _chance(share: Float, lobe: Lobe) -> Float:
 def _gloss_albedo(model: SurfaceModel, lobe: Lobe) -> Color3f:
     """Light that the lobe reflects: its share of head-on reflectance, and the rest."""
     assert model.gloss_albedo is not None
-    at = dr.zeros(mi.SurfaceInteraction3f)
     rows = microfacet.GLOSS_ROWS
-    at.uv = mi.Point2f(lobe.wi.z, microfacet.roughness_row(lobe.alpha, rows) / rows)
-    return model.gloss_albedo.eval_3(at)
+    at = mi.Point2f(lobe.wi.z, microfacet.roughness_row(lobe.alpha, rows) / rows)
+    return mi.Color3f(*model.gloss_albedo.eval(at)[:3])
 
 
 def _interface_albedo(model: SurfaceModel, point: Point, outside: Bool) -> Float:
@@ -211,12 +208,10 @@ def _interface_albedo(model: SurfaceModel, point: Point, outside: Bool) -> Float
     place = dr.minimum(dr.sqrt(root / microfacet.INTERFACE_F0[-1]) * (known - 1), known - 1.0001)
     first = dr.floor(place)
     row = microfacet.roughness_row(point.lobe.alpha, rows)
-    at = dr.zeros(mi.SurfaceInteraction3f)
 
     def albedo(block: Float) -> Float:
         start = block * rows + dr.select(outside, mi.Float(0), known * rows)
-        at.uv = mi.Point2f(point.lobe.wi.z, (start + row) / (2 * known * rows))
-        return table.eval_1(at)
+        return table.eval(mi.Point2f(point.lobe.wi.z, (start + row) / (2 * known * rows)))[0]
 
     return dr.lerp(albedo(first), albedo(first + 1), place - first)
 

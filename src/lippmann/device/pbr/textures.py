@@ -18,9 +18,9 @@ from lippmann.device.types import (
     Array,
     Bool,
     Color3f,
+    DeviceTexture,
     Float,
     FloatOrColor,
-    MitsubaTexture,
     Point2f,
     SurfaceInteraction3f,
     UInt32,
@@ -170,13 +170,13 @@ def _fold(x: Float, wrap: Wrap, texels: Float) -> Float:
 
 @dataclass(eq=False)
 class Bitmap:
-    """One picture for all: Mitsuba's own texture, which repeats where the wrap modes of the axes differ.
+    """One picture for all: a texture of :func:`_upload`, which repeats where the wrap modes of the axes differ.
 
     ``channel`` is the one of a texture of three channels that is shown, such as the roughness beside the metalness;
     None for all of the texture.
     """
 
-    texture: MitsubaTexture
+    texture: DeviceTexture
     channels: int
     sampler: Sampler
     size: tuple[int, int]
@@ -191,15 +191,12 @@ class Bitmap:
     def _look_up(self, place: Place) -> FloatOrColor:
         import mitsuba as mi
 
-        si, sampler = place.si, self.sampler
-        mixed = sampler.wraps[0] != sampler.wraps[1]
-        if mixed or sampler.attribute is not None or sampler.transform is not None:
-            uv = sampler.uv(place)
-            if mixed:
-                uv = mi.Point2f(*(_fold(uv[axis], sampler.wraps[axis], self.size[axis]) for axis in range(2)))
-            si = mi.SurfaceInteraction3f(si)
-            si.uv = uv
-        return self.texture.eval_3(si, place.active) if self.channels == 3 else self.texture.eval_1(si, place.active)
+        uv = self.sampler.uv(place)
+        wraps = self.sampler.wraps
+        if wraps[0] != wraps[1]:
+            uv = mi.Point2f(*(_fold(uv[axis], wraps[axis], self.size[axis]) for axis in range(2)))
+        values = self.texture.eval(uv, place.active)
+        return mi.Color3f(*values[:3]) if self.channels == 3 else values[0]
 
 
 @dataclass(eq=False)
@@ -300,9 +297,9 @@ class TextureStore:
     """
 
     def __init__(self) -> None:
-        self._bitmaps: dict[tuple[object, ...], MitsubaTexture] = {}
+        self._bitmaps: dict[tuple[object, ...], DeviceTexture] = {}
         self._samplers: dict[tuple[object, ...], Sampler] = {}
-        self._tables: dict[str, MitsubaTexture] = {}
+        self._tables: dict[str, DeviceTexture] = {}
         self._constants: dict[tuple[object, ...], NDArray[np.float64] | None] = {}
         self._images: dict[int, Image] = {}  # keeps them alive, so that their ids stay theirs
         self._pool = TexelPool(None, None)
@@ -321,7 +318,7 @@ class TextureStore:
         """The lookup of normal maps."""
         return self._lookup(textures, (0, 1, 2), uv)
 
-    def table(self, name: str, make: Callable[[], NDArray[np.float32]]) -> MitsubaTexture:
+    def table(self, name: str, make: Callable[[], NDArray[np.float32]]) -> DeviceTexture:
         """A function over the unit square, sampled at texel centres: ``make`` gives ``(rows, columns, 1 or 3)``."""
         if name not in self._tables:
             self._tables[name] = _upload(make(), coded=False, filtering="linear", wrap="clamp")
@@ -425,23 +422,27 @@ def sampler_key(texture: Texture) -> tuple[object, ...]:
     return (texture.srgb, texture.wrap_u, texture.wrap_v, texture.filter, texture.uv_set)
 
 
-def _upload(texels: NDArray[np.generic], coded: bool, filtering: str, wrap: str) -> MitsubaTexture:
+def _upload(texels: NDArray[np.generic], coded: bool, filtering: str, wrap: str) -> DeviceTexture:
+    """The texture of texels ``(h, w, 1 | 3)``: linear values, or where ``coded`` sRGB codes, decoded when looked up.
+
+    Dr.Jit's own. Mitsuba's ``bitmap`` takes the mean of its texels, decoded, and gives them a fourth channel in a
+    kernel: with two pictures of 2048 x 2048 texels that was a thirtieth of a small render.
+    """
+    import drjit as dr
     import mitsuba as mi
 
     if coded and texels.dtype != np.uint8:
-        texels = decode_srgb(texels).astype(np.float32)
-    for axis in range(2):  # Mitsuba asks for two texels per axis; a repeated one changes no lookup
-        if texels.shape[axis] == 1:
-            texels = np.repeat(texels, 2, axis=axis)
-    return mi.load_dict(
-        {
-            "type": "bitmap",
-            "bitmap": mi.Bitmap(np.require(texels, requirements=["C", "W"])),  # it refuses read-only arrays
-            "raw": not (coded and texels.dtype == np.uint8),
-            "filter_type": "nearest" if filtering == "nearest" else "bilinear",
-            "wrap_mode": wrap,
-        }
-    )
+        texels, coded = decode_srgb(texels).astype(np.float32), False
+    height, width, channels = texels.shape
+    packed = np.zeros((height, width, 4 if channels == 3 else channels), texels.dtype)
+    packed[..., :channels] = texels
+    modes = {
+        "filter_mode": dr.FilterMode.Nearest if filtering == "nearest" else dr.FilterMode.Linear,
+        "wrap_mode": {"repeat": dr.WrapMode.Repeat, "mirror": dr.WrapMode.Mirror}.get(wrap, dr.WrapMode.Clamp),
+    }
+    if packed.dtype == np.uint8:
+        return mi.Texture2f8u(mi.TensorXu8(packed), srgb=coded, **modes)
+    return mi.Texture2f(mi.TensorXf(packed), **modes)
 
 
 def _is_coded(texture: Texture, channels: tuple[int, ...]) -> bool:
