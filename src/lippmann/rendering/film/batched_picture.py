@@ -200,7 +200,7 @@ class BatchedPicture:
             for name, part in sums.items():
                 total, at = kept[name]
                 assert total is not None
-                total[at, pixels] += part[:, place]
+                total[at, pixels] += part[place]
 
 
 def error_of_batches(sums: Floats, taken: Sequence[int], coding: Coding) -> tuple[Floats, Floats]:
@@ -210,7 +210,7 @@ def error_of_batches(sums: Floats, taken: Sequence[int], coding: Coding) -> tupl
     ----------
     sums:
         ``(batches, pixels, 3)``: linear sums of the samples. The first half of the batches comes from one stream of
-        samples, the second half from another.
+        samples, the second half from another. ``batches`` is a power of two.
     taken:
         How many samples each batch has of every pixel; each stream has at least one.
     coding:
@@ -221,17 +221,21 @@ def error_of_batches(sums: Floats, taken: Sequence[int], coding: Coding) -> tupl
     ``(pixels,)`` errors, and the part of each that rests on outliers, at least 0. Errors are unbiased unless bright
     hits are rare; single ones are noisy and may be negative.
     """
-    pixels = sums.shape[1]
+    pixels, of_stream = sums.shape[1], np.reshape(taken, (STREAMS, -1))
+    number = of_stream.shape[1]
+    while number > 1 and not of_stream[:, number // 2 : number].any():
+        number //= 2  # the first batches hold all samples where these are few
+    streams = sums.reshape(*of_stream.shape, pixels, 3)[:, :number]
     # Opaque to the compiler, so that every round runs the same kernel.
-    counts = [dr.opaque(mi.Float, number) for number in taken]
+    counts = [dr.opaque(mi.Float, count) for count in of_stream[:, :number].ravel().tolist()]
     error, outliers = np.empty(pixels, dtype=np.float32), np.empty(pixels, dtype=np.float32)
     step = 1 << 18  # pixels worked on at a time
     for first in range(0, pixels, step):
         part = slice(first, min(first + step, pixels))
         # All at once, and not from a picture turned over, whose size the kernel would hold.
-        table, size = upload(sums[:, part]), part.stop - first
+        table, size = upload(streams[:, :, part]), part.stop - first
         index = dr.arange(mi.UInt32, size)
-        values = [dr.gather(mi.Color3f, table, index + dr.opaque(mi.UInt32, k * size)) for k in range(len(sums))]
+        values = [dr.gather(mi.Color3f, table, index + dr.opaque(mi.UInt32, k * size)) for k in range(len(counts))]
         of_part = _Batches(values, counts, coding)
         jackknife, alone = of_part.jackknife()
         result = jackknife + of_part.evenness()

@@ -36,7 +36,6 @@ from lippmann.rendering.film.wavefront import (
     pixel_at,
     sample_pixels,
     sum_samples,
-    to_rows,
 )
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
@@ -182,8 +181,7 @@ class FullInBatches(BatchedPicture):
         samples = None if self._covered is None else dr.opaque(mi.Float, together)
         traced = sample_pixels(integrator, pixels, stream, samples)
         evaluate(traced, lanes, self.rays)
-        sums = sum_samples(traced, channels, number, run.count)
-        return {name: to_rows(part, window.width) for name, part in sums.items()} if run.in_strips else sums
+        return sum_samples(traced, channels, number, run.count, window.width if run.in_strips else None)
 
 
 def _blur_after(

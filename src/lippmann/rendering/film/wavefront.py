@@ -131,15 +131,14 @@ def trace_frame(
             samples = dr.opaque(mi.Float, plan.samples) if for_denoiser else None
             sample = sample_pixels(integrator, pixels, stream, samples)
             evaluate(sample, lanes, frame.rays)
-            sums = sum_samples(sample, plan.channels, 1, run.count)
+            sums = sum_samples(sample, plan.channels, 1, run.count, plan.width)
             if done == 0:
                 frame.seconds_compile = compile_seconds(started)
         for name, values in sums.items():
-            part = values[:, 0] * np.float32(1 / plan.samples)
+            part = values.reshape(tile.rows, plan.width, -1) * np.float32(1 / plan.samples)
             if name not in parts:
-                parts[name] = np.zeros((plan.height, plan.width, part.shape[1]), dtype=np.float32)
-            in_rows = to_rows(part, plan.width).reshape(tile.rows, plan.width, -1)
-            parts[name][tile.first_row : tile.first_row + tile.rows] += in_rows
+                parts[name] = np.zeros((plan.height, plan.width, part.shape[2]), dtype=np.float32)
+            parts[name][tile.first_row : tile.first_row + tile.rows] += part
         done += lanes
         progress(Progress("trace", done, plan.work))
     frame.specular, frame.excess = parts.get("specular"), parts.get("excess")
@@ -207,20 +206,23 @@ def finite_or_black(radiance: Spectrum) -> tuple[Color3f, Bool]:
     return dr.select(finite, radiance, mi.Color3f(0)), finite
 
 
-def sum_samples(sample: PixelSample, channels: int, batches: int, count: int) -> dict[str, NDArray[np.float32]]:
-    """Sums of evaluated samples ``(pixels, batches, 3)`` by name, and of coverage ``(pixels, batches, channels)``.
+def sum_samples(
+    sample: PixelSample, channels: int, batches: int, count: int, width: int | None
+) -> dict[str, NDArray[np.float32]]:
+    """Sums of evaluated samples ``(batches, pixels, 3)`` by name, and of coverage ``(batches, pixels, channels)``.
 
-    Lanes are ordered pixel, channel, batch, sample.
+    Lanes are ordered pixel, channel, batch, sample; pixels in strips of a picture of that ``width``, or where it is
+    None in rows. The sums are in rows. The rays of a sub-pixel carry all three colours: it keeps the one that it shows.
     """
+    covered = None if sample.covered is None else [sample.covered] * channels
+    lights = {"radiance": sample.radiance, "specular": sample.specular, "excess": sample.excess, "covered": covered}
     sums: dict[str, NDArray[np.float32]] = {}
-    for name in ("radiance", "specular", "excess"):
-        light = getattr(sample, name)
-        if light is not None:
-            parts = [dr.block_sum(component, count) if count > 1 else component for component in light]
-            sums[name] = select_colors(np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, channels, batches, 3))
-    if sample.covered is not None:
-        hits = dr.block_sum(sample.covered, count) if count > 1 else sample.covered
-        sums["covered"] = np.swapaxes(np.array(hits).reshape(-1, channels, batches), 1, 2)
+    for name, components in lights.items():
+        for index, component in enumerate(components if components is not None else []):
+            total = np.asarray(dr.block_sum(component, count) if count > 1 else component)
+            lanes = total.reshape(-1, channels, batches)[:, index % channels]
+            sums.setdefault(name, np.empty((batches, len(lanes), len(components)), dtype=np.float32))
+            to_rows(lanes, width, sums[name][..., index].T)
     return sums
 
 
@@ -276,13 +278,15 @@ def pixel_at(place: UInt32, width: int, strips: UInt32) -> tuple[UInt32, UInt32]
     return dr.select(stands, strip * STRIP_ROWS + strip_row, row), dr.select(stands, strip_column, column)
 
 
-def to_rows(values: NDArray[T], width: int) -> NDArray[T]:
-    """``values (pixels, ...)`` reordered from places, which begin with a strip, to rows."""
-    whole = in_strips(len(values), width)
-    inner = values.shape[1:]
-    ordered = np.empty_like(values)
-    np.swapaxes(ordered[:whole].reshape(-1, STRIP_ROWS, width, *inner), 1, 2)[:] = values[:whole].reshape(
-        -1, width, STRIP_ROWS, *inner
-    )
+def to_rows(values: NDArray[T], width: int | None, ordered: NDArray[T] | None = None) -> NDArray[T]:
+    """``values (pixels, ...)`` reordered from places, which begin with a strip, to rows; as they are without ``width``.
+
+    ``ordered`` is filled with them where it is given, else a new array.
+    """
+    ordered = np.empty_like(values) if ordered is None else ordered
+    whole = 0
+    if width is not None and (whole := in_strips(len(values), width)):
+        rows = ordered[:whole].reshape(-1, STRIP_ROWS, width, *values.shape[1:])
+        np.swapaxes(rows, 1, 2)[:] = values[:whole].reshape(-1, width, STRIP_ROWS, *values.shape[1:])
     ordered[whole:] = values[whole:]
     return ordered
