@@ -60,6 +60,16 @@ def test_large_blocks_that_are_freed_are_kept_for_the_next():
     assert pages[0] < pages[1] / 4
 
 
+def test_memory_that_a_reader_frees_is_kept(monkeypatch):
+    from lippmann.scene.readers import load
+
+    scene, order = load.load_scene("teapot"), []
+    monkeypatch.setattr(load, "keep_freed_memory", lambda: order.append("keep"))
+    monkeypatch.setattr(load, "_from_name", lambda *_: order.append("read") or scene)
+    load.load_scene("teapot")
+    assert order == ["keep", "read"]
+
+
 def test_other_c_libraries_are_left_alone(monkeypatch):
     machine._function.cache_clear()
     monkeypatch.setattr(ctypes, "CDLL", lambda name: object())

@@ -16,6 +16,7 @@ from lippmann.options.option import changed_options, takes
 from lippmann.options.outputs import AccessOptions
 from lippmann.options.scene import LoadKeywords, SceneOptions, Up
 from lippmann.options.texts import settings_of
+from lippmann.runtime.machine import keep_freed_memory
 from lippmann.runtime.plugins import Plugin, function_of
 from lippmann.scene.parsing.dicom_files import HEAD_LENGTH, begins_dicom, holds_dicom
 from lippmann.scene.parsing.far_origin import make_traceable
@@ -172,6 +173,7 @@ def read_scene(
     SceneError, UsageError
         As :func:`load_scene`.
     """
+    keep_freed_memory()  # each texture takes memory several times, and hardly more than the one before it
     sky = _environment(asked.environment)
     color = asked.background
     if isinstance(source, str | Path):
