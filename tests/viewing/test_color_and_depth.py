@@ -19,6 +19,7 @@ from lippmann.scene.readers.depth_layers import split_layers
 from lippmann.scene.readers.depth_map import read_depth_map
 from lippmann.scene.readers.depth_photo import read_depth_photo
 from lippmann.scene.readers.load import load_scene
+from lippmann.viewing import color_and_depth
 from lippmann.viewing.color_and_depth import (
     depth_codes,
     named,
@@ -92,6 +93,17 @@ def test_pictures_are_read_back_within_a_code(tmp_path, monkeypatch, slope, bits
     expected = depth_codes(distance, *range_of(distance), bits, "near")
     expected = np.repeat(expected[:, ::2], 2, axis=1) if form.half else expected
     assert np.abs(shares - expected).max() <= 1.0
+
+
+def test_halved_colours_are_means_of_light_and_halved_depths_are_those_of_surfaces(slope, monkeypatch):
+    """As in pairs of half width: a black and a white column have half the light together, not half the code."""
+    stripes = np.tile(np.float32([0, 1]), (4, 8))
+    monkeypatch.setattr(color_and_depth, "replay", lambda *eye, **options: np.repeat(stripes[..., None], 3, axis=2))
+    monkeypatch.setattr(color_and_depth, "visible_distance", lambda *seen: 500 + 500 * (1 - stripes))
+    codes = rgbd_codes(slope, RgbdForm(half=True), EYE, size=(16, 4))
+    assert codes.shape == (4, 16, 3)
+    assert (codes[:, :8] == 188).all()  # sRGB's code of half the light
+    assert (codes[:, 8:] == 0).all()  # the far columns; no surface lies between near and far
 
 
 @pytest.mark.parametrize("form", [RgbdForm(), RgbdForm(True, "far")])

@@ -23,6 +23,7 @@ from lippmann.image.integral_image import IntegralImage
 from lippmann.image.stored_values import FloatArray
 from lippmann.runtime.atomic_write import check_writable, replacing
 from lippmann.viewing.replay import Eye, default_eye, default_size, replay
+from lippmann.viewing.stereo import half_width
 
 #: Endings of the files that hold colour beside depth, and depth alone.
 RGBD_FILES, DEPTH_FILES = (".png", ".tif", ".tiff"), (".exr", ".tif", ".tiff", ".png", ".pfm")
@@ -90,20 +91,15 @@ def rgbd_codes(
     """
     width, height = default_size(image.display) if size is None else size
     width += width % 2  # so that halves are whole columns
-    color = quantize(replay(image, eye, size=(width, height)), bits, image.provenance.transfer)
+    color = replay(image, eye, size=(width, height))
     distance = visible_distance(image, eye, (width, height))
     near, far = range_of(distance) if between is None else between
     depth = depth_codes(distance, near, far, bits, form.white)
     if form.half:
-        color = _halve(color)
+        color = half_width(color)
         depth = depth[:, ::2]  # a mean of two depths is that of no surface
     gray: NDArray[np.generic] = np.repeat(depth[..., None], 3, axis=2)
-    return np.ascontiguousarray(np.concatenate([color, gray], axis=1))
-
-
-def _halve(codes: Pixels) -> Pixels:
-    pair = codes[:, 0::2].astype(np.uint32) + codes[:, 1::2]
-    return ((pair + 1) // 2).astype(codes.dtype)
+    return np.ascontiguousarray(np.concatenate([quantize(color, bits, image.provenance.transfer), gray], axis=1))
 
 
 def named(path: Path, form: RgbdForm) -> Path:

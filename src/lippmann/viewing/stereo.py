@@ -150,7 +150,7 @@ def side_by_side(left: FloatArray, right: FloatArray, *, half: bool = False) -> 
     of one picture, rounded up to an even number.
     """
     if half:
-        left, right = _half_width(left), _half_width(right)
+        left, right = half_width(left), half_width(right)
     return np.concatenate([left, right], axis=1)
 
 
@@ -203,7 +203,7 @@ def _position(text: str, where: str) -> Eye:
         raise UsageError(error.what, where=where, rule=rule) from None
 
 
-def _half_width(pixels: FloatArray) -> FloatArray:
-    """Half the columns, the last one doubled where their number is odd: each the mean of two."""
+def half_width(pixels: FloatArray) -> FloatArray:
+    """Half the columns of linear light, the last one doubled where their number is odd: each the mean of two."""
     even = np.concatenate([pixels, pixels[:, -1:]], axis=1) if pixels.shape[1] % 2 else pixels
     return ((even[:, 0::2] + even[:, 1::2]) / 2).astype(np.float32)
