@@ -189,9 +189,10 @@ def imports_of(module: str, source: str) -> Iterator[Import]:
                 imported = whole if whole.removeprefix("lippmann.") in modules() else base
                 yield Import(module, imported, node.lineno, in_function, for_annotations)
         is_guard = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        below = in_function or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
         for child in ast.iter_child_nodes(node):
-            below = in_function or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
-            yield from visit(child, below, for_annotations or is_guard)
+            if not isinstance(child, ast.expr):  # no import stands in an expression
+                yield from visit(child, below, for_annotations or is_guard)
 
     return visit(ast.parse(source), False, False)
 
@@ -342,13 +343,22 @@ def loaded_with(module: str) -> set[str]:
             continue
         loaded.add(name)
         waiting += [name.rpartition(".")[0]]  # a package is imported before what lies in it
-        for found in imports():
-            if found.importer == name and not (found.inside_function or found.for_annotations):
-                if found.ours is None:
-                    loaded.add(found.imported.partition(".")[0])
-                else:
-                    waiting.append(found.ours)
+        for found in imports_with().get(name, ()):
+            if found.ours is None:
+                loaded.add(found.imported.partition(".")[0])
+            else:
+                waiting.append(found.ours)
     return loaded
+
+
+@cache
+def imports_with() -> dict[str, list[Import]]:
+    """What importing each module imports itself: imports outside functions."""
+    found: dict[str, list[Import]] = {}
+    for each in imports():
+        if not (each.inside_function or each.for_annotations):
+            found.setdefault(each.importer, []).append(each)
+    return found
 
 
 @pytest.mark.parametrize("module", [name for name in ENTRANCES if name in modules()])
@@ -525,6 +535,7 @@ def test_few_calls_of_a_default_render_climb(default_render):
     assert len(climbing) <= MOST_CLIMBING, sorted(climbing)
 
 
+@cache
 def rendering_trees() -> dict[str, ast.Module]:
     """The syntax trees of ``rendering`` by dotted name below it."""
     sources = {name: path for name, path in modules().items() if inside(name, ("rendering",))}

@@ -62,12 +62,28 @@ def cheaper(words: list[str]) -> list[str]:
     return kept if "--spp" in kept else [*kept, "--spp", "1"]
 
 
+#: Pixels of a display along its longer side, at most, while commands run: its shape and its lenses stay as they are.
+MOST_PIXELS = 384
+
+
 @pytest.fixture
 def workplace(tmp_path, monkeypatch, moving_ball, fake_bridge):
-    """A folder with the files that the pages speak of."""
+    """A folder with the files that the pages speak of; displays that are no prints have fewer pixels."""
     import trimesh
 
+    import lippmann.display
     from lippmann.image.write import write_plain_picture
+
+    load = lippmann.display.load_display
+
+    def load_part(*words):
+        whole = load(*words)
+        panel, share = whole.panel, MOST_PIXELS / max(whole.panel.width, whole.panel.height)
+        if whole.name.startswith("print") or share > 1:
+            return whole
+        return whole.resized(round(share * panel.width), round(share * panel.height))
+
+    monkeypatch.setattr(lippmann.display, "load_display", load_part)
 
     scene = trimesh.Scene(trimesh.creation.icosphere(subdivisions=2))
     (tmp_path / "model.glb").write_bytes(trimesh.exchange.gltf.export_glb(scene))

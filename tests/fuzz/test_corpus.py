@@ -52,7 +52,7 @@ def test_the_corpus_is_that_of_the_targets():
     assert size < 500_000
 
 
-@pytest.mark.long_cases("rendered-obj", "rendered-mitsuba-xml")
+@pytest.mark.long_cases("rendered-gltf", "rendered-obj", "rendered-mitsuba-xml")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TARGETS)
 def test_sound_inputs_are_read(name, tmp_path):

@@ -16,9 +16,12 @@ WHOLE = PixelWindow(0, 0, SIZE, SIZE)
 
 
 class PlaneOfPhotons:
-    """Stands in for photons of passes: spread over a plane, as dense as ``light`` says at their places."""
+    """Stands in for photons of passes: spread over what pixels gather from, as dense as ``light`` says there."""
 
-    def __init__(self, light, radius, count=400_000):
+    #: From the middle of the plane; pixels see 0.5 of it, and gather from 0.2 farther away.
+    EXTENT = 0.8
+
+    def __init__(self, light, radius, count=64_000):
         self._light, self._radius, self._count = light, radius, count
         self.pass_samples = 8
 
@@ -29,9 +32,11 @@ class PlaneOfPhotons:
         halves = []
         for seed in (2 * number, 2 * number + 1):
             random = np.random.default_rng(seed)
-            position = np.float32(np.stack([*random.uniform(-2, 2, (2, self._count)), np.zeros(self._count)], axis=1))
+            places = random.uniform(-self.EXTENT, self.EXTENT, (2, self._count))
+            position = np.float32(np.stack([*places, np.zeros(self._count)], axis=1))
             up = np.tile(np.float32([0, 0, 1]), (self._count, 1))
-            power = np.repeat(self._light(position[:, :1]) * 16 / self._count, 3, axis=1).astype(np.float32)
+            each = self._light(position[:, :1]) * (2 * self.EXTENT) ** 2 / self._count
+            power = np.repeat(each, 3, axis=1).astype(np.float32)
             halves.append(Photons(position, up, up, power, np.ones(self._count, np.uint32)))
         return PhotonMap((halves[0], halves[1]), self._radius * radius_of_pass(number))
 
