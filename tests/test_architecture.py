@@ -90,8 +90,8 @@ ORDER = (
 #: ``IntegralImage.replay``, ``.refocus`` and its widget.
 REACHES_UP = {("image", "viewing"), ("image", "viewer")}
 
-#: The same between modules of one package: ``IntegralImage.save``.
-REACHES_BACK = {("image.integral_image", "image.write")}
+#: The same between modules of one package: ``IntegralImage.save``, ``Quilt.save``.
+REACHES_BACK = {("image.integral_image", "image.write"), ("quilts.quilt", "quilts.files")}
 
 #: Packages whose ``__init__`` offers what packages below it in the tree define: it ranks after those.
 FACADES = {"display": "display.formats"}

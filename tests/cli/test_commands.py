@@ -1,6 +1,7 @@
 """Every command does its work, and says so as text and as JSON."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from PIL import Image
 
 from lippmann.display import load_display
 from lippmann.image import IntegralImage, read_picture
+from lippmann.image.metadata import Provenance
 
 
 def picture_size(path):
@@ -127,6 +129,22 @@ def test_a_sweep_is_an_animation(lippmann, picture, tmp_path, ending):
             assert animation.n_frames == 3
     else:
         assert out.read_bytes()[4:8] == b"ftyp"
+
+
+def test_a_sweep_ends_before_the_views_flip(lippmann, tmp_path):
+    display = load_display("looking-glass-portrait")
+    display = replace(display, panel=replace(display.panel, width=192, height=64))
+    panel_x = (np.arange(192)[None, :, None] + np.array([-1, 0, 1]) / 3 - 95.5) * display.panel.pixel_pitch
+    panel_y = np.broadcast_to((31.5 - np.arange(64))[:, None, None] * display.panel.pixel_pitch, (64, 192, 3))
+    i, j = display.lens_of(np.broadcast_to(panel_x, (64, 192, 3)), panel_y)
+    center = display.lens_center(i, j, panel_x, panel_y)[0] * display.magnification
+    image = IntegralImage((panel_x > center).astype(np.float32), display, provenance=Provenance(subpixels=True))
+    image.save(tmp_path / "sides.exr")
+    words = ("replay", tmp_path / "sides.exr", "--sweep", "--frames", 2, "--size", "192x64", "--json")
+    ends = lippmann(*words, "-o", tmp_path / "s.png").json
+    for eye, level in ((ends["start"], 1.0), (ends["stop"], 0.0)):
+        seen = image.replay(tuple(eye), size=(192, 64))[8:-8, 8:-8]
+        assert np.mean(seen == level) > 0.99
 
 
 def test_a_sweep_says_how_far_it_is(lippmann, picture, tmp_path, monkeypatch):

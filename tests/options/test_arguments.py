@@ -24,6 +24,7 @@ from lippmann.options.option import checked
 from lippmann.quilts.files import read_quilt, write_quilt
 from lippmann.quilts.quilt import Quilt, QuiltLayout
 from lippmann.quilts.weave import weave
+from lippmann.scene.scene import Scene
 from lippmann.sequences.frames import FrameRange, render_sequence
 from lippmann.sequences.motion import open_motion
 from lippmann.viewer.export import export_page
@@ -114,6 +115,7 @@ def test_what_is_given_by_place_is_checked_and_python_counts():
         (lambda: export_image(IMAGE, 5, "views"), "path"),
         (lambda: import_image(5), "path"),
         (lambda: read_quilt(5), "path"),
+        (lambda: QUILT.save(5), "path"),
         (lambda: write_quilt(IMAGE, "a.png"), "quilt"),
         (lambda: weave(IMAGE, SMALL), "quilt"),
         (lambda: open_motion("teapot", fps="a"), "fps"),
@@ -147,6 +149,11 @@ def test_calls_of_the_library_check_theirs(wrong, name):
         (lambda: crosstalk(5, 0.0), "display: 5; it must be a Display; lippmann.load_display gives one"),
         (lambda: independent_directions(5), "display: 5; it must be a Display; lippmann.load_display gives one"),
         (lambda: eye_light(5, (0.0, 0.1), (0.0, 0.0)), "display: 5; it must be a Display; lippmann.load_display gives"),
+        (lambda: eye_light(PRINT, 5, (0.0, 0.0)), "slopes_x: 5; must be two finite numbers"),
+        (lambda: eye_light(PRINT, (0.0, 0.1), ("a", 0.0)), "slopes_y: ('a', 0.0); must be two finite numbers"),
+        (lambda: Scene(5), "name: 5; must be a text"),
+        (lambda: Scene("mine", 5), "description: 5; must be a SceneDescription, a MitsubaSource or None"),
+        (lambda: Scene("mine"), "mine: a scene without any content; lippmann.load_scene gives one"),
         (lambda: light_table(5, 0.0), "lens: 5; it must be a Lens; Lens.of(display) gives one"),
         (lambda: light_table(LENS, "a"), "slopes: 'a'; must be a finite number, or a row of them"),
         (lambda: light_table(LENS, [[0.0]]), "slopes: [[0.0]]; must be a finite number"),

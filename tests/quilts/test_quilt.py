@@ -10,7 +10,8 @@ from PIL import Image
 
 from lippmann.color.transfer import dequantize
 from lippmann.display import load_display
-from lippmann.errors import PictureError, UsageError
+from lippmann.errors import OutputError, PictureError, UsageError
+from lippmann.quilts.files import read_quilt
 from lippmann.quilts.quilt import (
     DEVICE_QUILTS,
     Quilt,
@@ -45,6 +46,35 @@ def test_rows_of_all_views_are_those_of_each():
     for number in range(45):
         np.testing.assert_array_equal(rows[number], quilt.view(number)[7:20])
     np.testing.assert_array_equal(quilt.pixels, dequantize(codes, "srgb"))
+
+
+@pytest.mark.parametrize(
+    ("display", "size", "layout", "name", "written"),
+    [
+        ("portrait", (256, 256), QuiltLayout(4, 2, 0.75), "a.png", "a_qs4x2a0.75.png"),
+        ("portrait", (256, 256), QuiltLayout(4, 2, 0.75), "a_qs4x2a0.75.exr", "a_qs4x2a0.75.exr"),
+        ("odyssey-3d", (7680, 2160), QuiltLayout(2, 1, 1.77778), "a.tif", "a_2x1.tif"),
+        ("odyssey-3d", (3840, 2160), QuiltLayout(2, 1, 1.77778), "a.tif", "a_half_2x1.tif"),
+    ],
+)
+def test_saving_puts_the_layout_into_the_name(display, size, layout, name, written, tmp_path):
+    codes = np.zeros((size[1], size[0], 3), np.uint8)
+    codes[:, -1] = 200
+    quilt = Quilt(codes, layout, "float32", display=load_display(display))
+    assert quilt.save(tmp_path / name) == tmp_path / written
+    assert [path.name for path in tmp_path.iterdir()] == [written]
+    again = read_quilt(tmp_path / written)
+    np.testing.assert_allclose(again.pixels[0, -2:], quilt.pixels[0, -2:], atol=1e-3)
+    assert (again.layout[:2], again.display) == (layout[:2], quilt.display)
+
+
+def test_a_name_that_says_another_layout_is_not_saved_to(tmp_path):
+    quilt = Quilt(np.zeros((256, 256, 3), np.uint8), QuiltLayout(4, 2, 0.75))
+    with pytest.raises(OutputError) as caught:
+        quilt.save(tmp_path / "a_qs8x6a0.75.png")
+    assert str(caught.value).endswith(
+        "the name says another quilt; the quilt's ends in _qs4x2a0.75.png; leave the layout out"
+    )
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from lippmann.display.display import Display
 from lippmann.display.pixel_aperture import PixelAperture
+from lippmann.errors import UsageError
 from lippmann.optics.lens import Lens, Real
 from lippmann.optics.light_table import light_table
 from lippmann.optics.pixel_profile import Trapezoid, kernel, pixel_trapezoid
+from lippmann.printable import shorten
 
 #: Rows and columns of directions whose point spread is known: of cylinders, and of micro-lenses.
 _DIRECTIONS, _ROUND_DIRECTIONS = (5, 33), (9, 9)
@@ -103,6 +105,10 @@ def eye_light(
 
     Parameters
     ----------
+    display:
+        A display that gives its lens.
+    slopes_x, slopes_y:
+        Least and greatest slope of the directions to the right and up: tangents of angles.
     pupil:
         Diameter of the pupil over its distance.
 
@@ -110,6 +116,8 @@ def eye_light(
     ------
     DisplayError
         The display gives no lens.
+    UsageError
+        The display is none, or slopes are no two finite numbers.
 
     Examples
     --------
@@ -121,7 +129,8 @@ def eye_light(
     """
     lens = Lens.of(display)
     rows, columns = _DIRECTIONS if lens.is_cylinder else _ROUND_DIRECTIONS
-    across, along = np.linspace(*slopes_x, columns), np.linspace(*slopes_y, rows)
+    across = np.linspace(*_checked_slopes("slopes_x", slopes_x), columns)
+    along = np.linspace(*_checked_slopes("slopes_y", slopes_y), rows)
     lit = (display.pixel or PixelAperture()).lit_size(display.panel)
     needed = 2 * math.ceil(0.5 * _PER_SUBPIXEL * lens.pitch / min(lit)) + 1
     per_lens = _PLACES if lens.is_cylinder else min(_ROUND_PLACES, needed)
@@ -137,6 +146,16 @@ def eye_light(
         wide, high = (np.convolve(kernel(Trapezoid(side, side), blur, step), eye) for side in lit)
         weights = _convolve(_convolve(spreads, wide, axis=3), high, axis=2) * (pixel / step) ** 2
     return EyeLight(across, along, places, _trim(weights), step)
+
+
+def _checked_slopes(name: str, slopes: tuple[float, float]) -> Real:
+    try:
+        pair = np.asarray(slopes, dtype=np.float64)
+    except (TypeError, ValueError):
+        pair = np.empty(0)
+    if pair.shape != (2,) or not np.isfinite(pair).all():
+        raise UsageError(shorten(slopes), where=name, rule="must be two finite numbers: tangents of angles")
+    return pair
 
 
 def _spreads(lens: Lens, across: Real, along: Real, per_lens: int) -> tuple[Real, Real]:

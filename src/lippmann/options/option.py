@@ -374,8 +374,8 @@ _KINDS: dict[str, tuple[str, Callable[[Any], Any]]] = {
     **{
         name: (f"a {name}", _instance(name))
         for name in (
-            "Display", "LargePicture", "Monitor", "Motion", "Pattern", "Picture",
-            "Provenance", "Quilt", "QuiltLayout", "TransferFunction",
+            "Display", "LargePicture", "MitsubaSource", "Monitor", "Motion", "Pattern", "Picture",
+            "Provenance", "Quilt", "QuiltLayout", "SceneDescription", "TransferFunction",
         )
     },
     **{name: (f"an {name}", _instance(name)) for name in ("Environment", "IntegralImage")},

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.display.stereo import PairWidth, StereoPair
-from lippmann.errors import PictureError, UsageError
+from lippmann.errors import OutputError, PictureError, UsageError
 from lippmann.image.encoding import display_codes, linear_values
 from lippmann.image.metadata import Provenance
 from lippmann.image.stored_values import FloatArray, Stored, Values
@@ -175,6 +175,37 @@ class Quilt:
     def pixels(self) -> FloatArray:
         """``(height, width, 3)`` float32 linear RGB, row 0 on top."""
         return linear_values(self.values, self.provenance.transfer)
+
+    @checked
+    def save(self, path: str | Path, bits: int | None = None) -> Path:
+        """Write a PNG, OpenEXR or TIFF file, whose name says the layout: ``x.png`` becomes ``x_qs8x6a0.75.png``.
+
+        Parameters
+        ----------
+        path:
+            The file, with or without the layout in its name.
+        bits:
+            Bits per value: 8 or 16 for PNG, 16 or 32 for OpenEXR, 8, 16 or 32 for TIFF. None: as the quilt is stored.
+
+        Returns
+        -------
+        The file that was written.
+
+        Raises
+        ------
+        PictureError
+            A value is not finite.
+        OutputError
+            The name says another layout, the format is unknown or has no such bits, or the file cannot be written.
+        """
+        from lippmann.quilts.files import write_quilt
+
+        ending = self.layout.ending
+        if self.display is not None and self.display.stereo is not None:
+            ending = quilt_of_display(self.display, self.layout[:2], self.size).ending
+        named = named_with_layout(Path(path), ending)
+        write_quilt(self, named, bits=bits)
+        return named
 
     def srgb(self, bits: int = 8) -> NDArray[np.uint8] | NDArray[np.uint16]:
         """Display codes ``(height, width, 3)``: uint8, or uint16 for 16 ``bits``; errors as of an integral image."""
@@ -333,6 +364,23 @@ def ending_of_name(path: Path) -> str:
     """
     pair = _PAIR.search(path.stem)
     return pair[0] if pair else layout_of_name(path).ending if names_layout(path) else ""
+
+
+def named_with_layout(path: Path, ending: str) -> Path:
+    """The path with the ending of a quilt's layout in its name; as it is, to be refused, without a format's ending.
+
+    Raises
+    ------
+    OutputError
+        The name says another layout.
+    """
+    named = ending_of_name(path)
+    if not named:
+        return path.with_name(f"{path.stem}{ending}{path.suffix}") if path.suffix else path
+    if named != ending:
+        rule = f"the quilt's ends in {ending}{path.suffix}"
+        raise OutputError("the name says another quilt", where=str(path), rule=rule, fix="leave the layout out")
+    return path
 
 
 def layout_of_name(path: Path, *, to_write: bool = False) -> QuiltLayout:

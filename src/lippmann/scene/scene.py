@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
 from lippmann.options.light import LightOptions
+from lippmann.options.option import checked
 from lippmann.runtime.engine_lock import cached_property
 from lippmann.scene.extent import bounds_of, box, box_corners, extreme_points_of, thin_axis
 from lippmann.scene.matrices import rotation, rotation_of
@@ -49,6 +50,7 @@ _FILL = 0.25
 _FRAMING_FOV = np.radians(30.0)
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Scene:
     """A scene ready to be placed and built.
@@ -89,7 +91,9 @@ class Scene:
 
     def __post_init__(self) -> None:
         if self.description is None and self.classic_form is None:
-            raise SceneError("a scene without any content", where=self.name)
+            raise SceneError(
+                "a scene without any content", where=self.name, fix="lippmann.load_scene gives one with it"
+            )
 
     @cached_property
     def classic(self) -> ClassicScene | None:

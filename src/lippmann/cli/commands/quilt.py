@@ -106,7 +106,7 @@ def render(
     from lippmann.display import load_display
     from lippmann.image.write import check_output
     from lippmann.quilts.files import write_quilt
-    from lippmann.quilts.quilt import Quilt, quilt_of_display
+    from lippmann.quilts.quilt import Quilt, named_with_layout, quilt_of_display
     from lippmann.rendering.quilt import render_quilt
     from lippmann.rendering.request.render_request import RenderRequest
 
@@ -118,9 +118,9 @@ def render(
     moving, file = moving.with_film(path)
     shows_all = moving.eye is None and moving.shows == "eye"
     if moving.video is not None and shows_all and (file != path or quilt.pair):
-        moving = replace(moving, video=_name(moving.video, quilt.ending))
+        moving = replace(moving, video=named_with_layout(moving.video, quilt.ending))
     if file == path and (not moving or (path.suffix and not path.is_dir())):
-        file = _name(path, quilt.ending)
+        file = named_with_layout(path, quilt.ending)
     if not moving:
         if resume:
             raise UsageError("a quilt is rendered in one piece", where="--resume", fix="leave it out")
@@ -308,20 +308,6 @@ def weave(
         "correct": correct,
     }
     console.result(result, f"{output}: {views.layout.views} views on {width}x{height} pixels of {target.name}")
-
-
-def _name(path: Path, ending: str) -> Path:
-    """``path`` with the ending of its quilt's layout; as it is, to be refused, without an ending of its format."""
-    from lippmann.errors import OutputError
-    from lippmann.quilts.quilt import ending_of_name
-
-    named = ending_of_name(path)
-    if not named:
-        return path.with_name(f"{path.stem}{ending}{path.suffix}") if path.suffix else path
-    if named != ending:
-        rule = f"the quilt's ends in {ending}{path.suffix}"
-        raise OutputError("the name says another quilt", where=str(path), rule=rule, fix="leave --output out")
-    return path
 
 
 def _sentence(path: Path, made: Quilt, seconds: float) -> str:

@@ -53,7 +53,10 @@ def replay(
     ] = False,
     frames: Annotated[int | None, typer.Option("--frames", help="Number of frames of the sweep; 48.")] = None,
     width: Annotated[
-        float | None, typer.Option("--sweep-width", help="Width of the sweep in mm. Default: the field of view.")
+        float | None,
+        typer.Option(
+            "--sweep-width", help="Width of the sweep in mm. Default: from the leftmost view to the rightmost."
+        ),
     ] = None,
     path: Annotated[
         Path | None,
@@ -185,10 +188,16 @@ def _write_eye_views(
 
 
 def _sweep_before(display: Display, middle: Place, width: float | None, frames: int | None) -> list[Place]:
-    """Places of an eye that sweeps ``width`` mm from left to right about ``middle``; by default the field of view."""
+    """Places of an eye that sweeps ``width`` mm from left to right about ``middle``; by default over all views.
+
+    That is from the middle of the outermost pixel under a lens to that of the other one: at the edges of the field of
+    view, half a pixel farther, the views flip, and an eye sees those of both sides at once.
+    """
     from lippmann.viewing.replay import path_of_eye
 
-    reach = _field_width(display, middle[2]) if width is None else width
+    reach = width
+    if reach is None:
+        reach = _field_width(display, middle[2]) * (1 - 1 / display.pixels_per_lens[0])
     start, stop = ((middle[0] + side * reach / 2, *middle[1:]) for side in (-1, 1))
     return path_of_eye(start, stop, 48 if frames is None else frames)
 
