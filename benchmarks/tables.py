@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import statistics
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +60,7 @@ def main() -> None:
                 _into_page(LIGHT_VERTICES_PAGE, name, light_vertices_tables.rows(result))
             if name in QUILTS_PAGE_TABLES:
                 _into_page(QUILTS_PAGE, name, QUILTS_PAGE_TABLES[name](result))
-    PAGE.write_text("\n".join(sections))
+    PAGE.write_text("\n".join(_broken("\n".join(sections).split("\n"))))
     _into_page(MATERIALS_PAGE, "furnace", _furnace(saved("furnace")))
 
 
@@ -142,7 +143,17 @@ def _into_page(page: Path, name: str, rows: list[str]) -> None:
     begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
     before, _, rest = page.read_text().partition(begin)
     _, _, after = rest.partition(end)
-    page.write_text("\n".join([before + begin, *rows, end]) + after)
+    page.write_text("\n".join([before + begin, *_broken(rows), end]) + after)
+
+
+def _broken(lines: list[str]) -> list[str]:
+    """Lines of text of at most 120 columns; those of tables, pictures and headings stay as they are."""
+    return [part for line in lines for part in ([line] if line[:1] in "|!#" else _parts(line))]
+
+
+def _parts(line: str) -> list[str]:
+    indent = "  " if line.startswith("- ") else ""
+    return textwrap.wrap(line, 120, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False) or [line]
 
 
 def _weave(result: dict[str, Any]) -> str:

@@ -192,7 +192,7 @@ def test_a_folder_a_display_and_what_is_said(lippmann, frames, tmp_path):
     result = lippmann("interlace", frames[0].parent, "-d", "lkg-portrait", "-o", tmp_path / "lkg.png", "--json")
     assert result.json["size"] == [1536, 2048]
     assert [path.rpartition("frame")[2] for path in result.json["photos"]] == ["2.png", "9.png", "10.png", "11.png"]
-    assert "cover: 50% of the width of the pictures is cut off" in result.err
+    assert "cover: 50 % of the width of the pictures is cut off" in result.err
 
 
 @pytest.mark.parametrize(

@@ -82,8 +82,8 @@ def disc(width, height):
 @pytest.mark.parametrize(
     ("fit", "diameter", "said"),
     [
-        ((), 100, "cover: 62% of the width of the pictures is cut off"),
-        (("--fit", "cover"), 100, "cover: 62% of the width"),
+        ((), 100, "cover: 62 % of the width of the pictures is cut off"),
+        (("--fit", "cover"), 100, "cover: 62 % of the width"),
         (("--fit", "contain"), 38, ""),
         (("--fit", "stretch"), None, "stretched"),
     ],

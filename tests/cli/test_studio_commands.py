@@ -149,4 +149,6 @@ def test_a_quilt_goes_through_bridge(lippmann, tmp_path, fake_bridge):
         assert f"{words[0]}: a quilt goes through Bridge" in done.err
     pair = quilt.rename(tmp_path / "seen_2x1.png")
     assert "this is a stereo pair" in lippmann("show", pair).err
-    assert "this is a stereo pair" in lippmann("show", pair, "--no-browser").err
+    odd = pair.rename(tmp_path / "seen_qs7x2a0.75.png")
+    assert "7x2 views" in lippmann("show", odd).err
+    assert "--port: a quilt goes through Bridge" in lippmann("show", odd, "--port", 8000).err  # before it is read

@@ -27,7 +27,7 @@ def test_rays_bound_the_share_where_the_background_varies():
 def test_the_warning_names_the_way_out():
     assert warn_of_emptiness(0.01) == ()
     (line,) = warn_of_emptiness(0.004)
-    assert "0.4% of it shows anything" in line
+    assert "0.4 % of it shows anything" in line
     assert "camera" in line
     assert "(nothing)" in warn_of_emptiness(0)[0]
 

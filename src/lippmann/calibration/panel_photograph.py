@@ -271,7 +271,7 @@ def _judge(phasor: NDArray[Any], display: Display, distance: float) -> str:
     lenses = covered * (math.cos(angle), math.sin(angle)) / (display.lens_array.pitch * display.magnification)
     bands, modulation, middle = _largest_component(phasor)
     if modulation < _GREY:
-        return f"No hue is to be seen ({modulation:.0%} of it): pixels are mixed on the way to the panel."
+        return f"No hue is to be seen ({100 * modulation:.0f} % of it): pixels are mixed on the way to the panel."
     count, total = math.hypot(*bands), float(lenses @ lenses)
     grown = -float(bands @ lenses) / total
     parallax = display.gap / distance / display.magnification
@@ -285,7 +285,7 @@ def _judge(phasor: NDArray[Any], display: Display, distance: float) -> str:
     if is_size and round(scale) == 0:  # the bands are the lenses' own pitch
         return f"{what}: the photograph shows the pixels without lenses."
     if is_size:
-        return f"{what}: the picture is scaled to {scale:.1%} of its size."
+        return f"{what}: the picture is scaled to {100 * scale:.1f} % of its size."
     return f"{what}: the picture is turned or stretched, or the lenses are others."
 
 

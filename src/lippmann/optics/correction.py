@@ -97,8 +97,8 @@ class CorrectionStep:
         worst = min(("radius", "thickness", "index"), key=lambda name: self.gains[name])
         return options, (
             f"corrected for its lens: up to {self.gains['exact']:+.1f} dB in the directions solved for, "
-            f"{self.gains[worst]:+.1f} dB where the lens's {worst} is {TOLERANCE:.0%} off; "
-            f"{limited:.0%} of the values at black or white with a headroom of {self.headroom:g}"
+            f"{self.gains[worst]:+.1f} dB where the lens's {worst} is {100 * TOLERANCE:.0f} % off; "
+            f"{100 * limited:.0f} % of the values at black or white with a headroom of {self.headroom:g}"
         )
 
 

@@ -193,6 +193,6 @@ def warn_of_emptiness(share: float) -> tuple[str, ...]:
     """Warning of a picture in which hardly any pixel shows the scene; else empty."""
     if share >= LEAST_SHARE:
         return ()
-    content = "nothing" if share == 0 else f"{share:.1%} of it shows anything"
+    content = "nothing" if share == 0 else f"{100 * share:.1f} % of it shows anything"
     fix = 'place the scene by camera, turn, scale or shift, or light it by environment="studio"'
     return (f"the picture is nearly empty ({content}): {fix}",)

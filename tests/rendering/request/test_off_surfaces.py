@@ -65,6 +65,8 @@ def test_surfaces_beside_splats_have_noise():
         (ALONE, {"caustics": "paths"}, "alone: caustics: no light makes any on it"),
         (ALONE, {"depth": 3}, "alone: depth: 3: no path goes on from it"),
         (UNLIT, {"depth": 3}, "unlit: depth: 3: no path goes on from it"),
+        (ALONE, {"integrator": "direct"}, "alone: integrator: no light falls on it"),
+        (UNLIT, {"integrator": "direct"}, "unlit: integrator: no light falls on it"),
     ],
 )
 def test_what_splats_do_not_have_is_refused(description, options, said):

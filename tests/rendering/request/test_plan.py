@@ -306,3 +306,24 @@ def test_classic_models_refuse_other_light_and_materials_than_the_files(asked, n
     with pytest.raises(UsageError, match=f"integrator: {named} beside classic; .* of the file alone"):
         resolve(RenderRequest(integrator="classic"), scene)
     assert resolve(RenderRequest(integrator="path"), scene).integrator == "path"
+
+
+@pytest.mark.parametrize(
+    ("options", "light", "request_options", "said"),
+    [
+        ({"background": (1, 1, 1)}, {}, {}, "background beside normal; normal is a property .*; leave it out"),
+        ({}, {"light_turn": (20, 0)}, {}, "light_turn beside normal"),
+        ({}, {}, {"depth": 3}, "depth beside normal"),
+        ({"single_scattering": True}, {}, {"depth": 3}, "depth and single_scattering beside normal; .* leave them out"),
+    ],
+)
+def test_a_property_of_surfaces_has_no_light(options, light, request_options, said):
+    scene = load_scene("teapot", light=light, **options)
+    with pytest.raises(UsageError, match=f"integrator: {said}"):
+        resolve(RenderRequest(integrator="normal", **request_options), scene)
+    assert resolve(RenderRequest(integrator="path", **request_options), scene).integrator == "path"
+
+
+def test_a_plan_of_a_property_may_be_planned_again():
+    planned = resolve(RenderRequest(integrator="normal"), SCENE)
+    assert resolve(planned, SCENE).integrator == "normal"

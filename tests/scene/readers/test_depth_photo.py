@@ -376,7 +376,7 @@ def test_unknown_depth_is_filled_from_beside(tmp_path):
     depth[:, 10:] = 4.0
     depth[5:8, 2:5] = np.nan
     scene = scene_of(tmp_path, depth)
-    assert scene.notes == ["2.2% of the depth map have no depth and are filled from beside"]
+    assert scene.notes == ["2.2 % of the depth map have no depth and are filled from beside"]
     left = scene.meshes[0].positions[scene.meshes[0].positions[:, 0] < -0.1]
     assert left[:, 2] == pytest.approx(0.5)
 

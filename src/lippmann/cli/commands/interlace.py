@@ -185,6 +185,8 @@ def fit_note(cropped: tuple[float, float], fit: str | None) -> list[str]:
     if fit == "stretch":
         return ["the pictures are stretched to the panel's proportions"]
     parts = [
-        f"{part:.0%} of the {side}" for part, side in zip(cropped, ("width", "height"), strict=True) if part >= 0.005
+        f"{100 * part:.0f} % of the {side}"
+        for part, side in zip(cropped, ("width", "height"), strict=True)
+        if part >= 0.005
     ]
     return [f"{fit or 'cover'}: {' and '.join(parts)} of the pictures is cut off"] if parts else []

@@ -91,13 +91,13 @@ def show(
     from lippmann.quilts.files import is_quilt, read_quilt
 
     if is_quilt(picture):
+        given = {"--display": display is not None, "--host": host != "127.0.0.1", "--port": port != 0}
+        for name in (name for name, is_given in {**given, "--no-browser": no_browser}.items() if is_given):
+            raise UsageError("a quilt goes through Bridge, which knows its panels", where=name, fix="leave it out")
         quilt = read_quilt(picture)
         if quilt.layout.views == 2:
             rule = "the player of an eye-tracked monitor shows stereo pairs"
             raise UsageError("this is a stereo pair", where=str(picture), rule=rule, fix="open it there")
-        given = {"--display": display is not None, "--host": host != "127.0.0.1", "--port": port != 0}
-        for name in (name for name, is_given in {**given, "--no-browser": no_browser}.items() if is_given):
-            raise UsageError("a quilt goes through Bridge, which knows its panels", where=name, fix="leave it out")
         panels = cast_quilt(quilt, picture)
         line = f"{picture}: shown by Bridge on {', '.join(panels)}"
         Console(quiet, as_json).result({"picture": str(picture), "panels": panels}, line)

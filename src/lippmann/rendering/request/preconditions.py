@@ -58,8 +58,8 @@ def check_scene(request: RenderRequest, scene: Scene) -> None:
     Raises
     ------
     UsageError
-        The request asks for caustics, depth or less indirect light where nothing is lit; or, of Gaussian splats or a
-        volume, whose light lies on no surface, for a surface property, for pooling or denoising, or for an exposure.
+        The request asks for direct light, caustics, depth or less indirect light where nothing is lit; or, of Gaussian
+        splats or a volume, for a surface property, for pooling or denoising, or for an exposure.
     """
     is_own, own = scene.keeps_its_colors, "all in this scene has a colour of its own, whatever light is given"
     refusals = _of_surfaces(request, scene) if scene.lies_off_surfaces else []
@@ -68,6 +68,7 @@ def check_scene(request: RenderRequest, scene: Scene) -> None:
     _refuse(
         [
             *refusals,
+            (is_own and request.integrator == "direct", "no light falls on it", "integrator", own, _LEAVE),
             (is_own and caustics, "no light makes any on it", "caustics", own, _LEAVE),
             (is_own and goes_on, f"{request.depth}: no path goes on from it", "depth", own, _LEAVE),
             (is_own and request.clamp_indirect is not None, "it has no indirect light", "clamp_indirect", own, _LEAVE),

@@ -54,7 +54,7 @@ def width_of(diagonal: float, count: int, *, lines: bool) -> Width:
     most = LINE_RADIUS if lines else POINT_RADIUS
     share = min(most, 50.0 * most / max(count, 1) ** 0.5)
     what = "lines are drawn as rods" if lines else POINTS_NOTE
-    return Width(share * (diagonal or 1.0), f"{what} of a radius of {share:.2%} of the scene's diagonal")
+    return Width(share * (diagonal or 1.0), f"{what} of a radius of {100 * share:.2f} % of the scene's diagonal")
 
 
 def as_material(material: Material) -> Material:

@@ -184,7 +184,7 @@ def _description(
         meshes.append(mesh("behind", layers.behind, layers.behind_faces, 1))
     notes = []
     if layers.filled:
-        notes.append(f"{layers.filled:.1%} of the depth map have no depth and are filled from beside")
+        notes.append(f"{100 * layers.filled:.1f} % of the depth map have no depth and are filled from beside")
     instances = [Instance(number, np.eye(4)) for number in range(len(meshes))]
     return SceneDescription(name, meshes, materials[: len(meshes)], instances, notes=notes, fills_panel=True)
 
