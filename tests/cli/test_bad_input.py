@@ -35,6 +35,10 @@ def kept(tmp_path):
     assert {entry.name for entry in tmp_path.iterdir() if "part" in entry.name} == set()
 
 
+def test_an_output_without_its_option_is_told_of_it(lippmann, kept):
+    refuse(lippmann("render", "teapot", kept.name), f"{kept.name}; outputs are named by -o: -o {kept.name}. See")
+
+
 @pytest.mark.parametrize("words", [("quilt",), ("quilt", "model.glb"), ("calibrate",)])
 def test_a_group_of_commands_names_them(lippmann, words):
     known = {"quilt": "render, pack, unpack, sizes", "calibrate": "pattern, page"}[words[0]]

@@ -53,10 +53,14 @@ def interlace(lippmann, frames, path, *options):
 
 def test_an_empty_folder_and_a_pattern_without_files_are_named(lippmann, tmp_path):
     (tmp_path / "frames").mkdir()
-    for given in (tmp_path / "frames", tmp_path / "none*.jpg"):
-        outcome = lippmann("interlace", given, *SHEET, "--size", "30x20mm", "-o", tmp_path / "print.tif")
+    for given, said in (
+        ("frames", "no photographs are given; at least 2 are interlaced"),
+        ("none*.jpg", "none*.jpg: no such file"),
+        ("frame", "frame: no such file"),
+    ):
+        outcome = lippmann("interlace", tmp_path / given, *SHEET, "--size", "30x20mm", "-o", tmp_path / "print.tif")
         assert outcome.code == 2
-        assert "no photographs are given; at least 2 are interlaced" in outcome.err
+        assert said in outcome.err
 
 
 def test_one_photograph_may_be_a_pair_and_monitors_weave_by_themselves(lippmann, tmp_path):

@@ -2,6 +2,7 @@
 
 import os
 import socket
+from pathlib import Path
 
 import pytest
 
@@ -56,3 +57,9 @@ def test_a_missing_file_is_told_in_one_way(tmp_path, name, said):
         path.open()
     line = str(unreadable(path, caught.value, PictureError, "a picture"))
     assert line == f"{path}: {said.format(folder=tmp_path, sep=os.sep)}"
+
+
+@pytest.mark.parametrize("address", ["https://example.com/a/model.glb", "http://example.com/model.glb"])
+def test_an_address_is_told_from_a_missing_file(address):
+    error = unreadable(Path(address), FileNotFoundError(), SceneError)
+    assert str(error) == f"{address}: is an address; files are read; download it first"

@@ -274,6 +274,8 @@ _NOT_LISTED = re.compile(r"Invalid value for '(--[\w-]+)'.*: (?:Value error, )?(
 _NO_NUMBER = re.compile(r"Invalid value for '(--[\w-]+)'.*: ('.*') is not a valid (int|float)\.")
 #: How typer refuses a group of commands without one of them, and a word that is like none.
 _NO_COMMAND = re.compile(r"Missing command\.|No such command '[^']*'\.")
+#: How it refuses one argument too many, here a file to write.
+_EXTRA = re.compile(r"Got unexpected extra argument(?:\(s\))? \((\S+\.\w+)\)")
 _NO_SUCH = re.compile(r"No such option: (--[\w-]+)")
 #: Options by the names that other programs give them.
 _OTHER_NAMES = {
@@ -297,6 +299,9 @@ def _usage(error: BaseException) -> str:
     if listed is not None:
         option, word, known = listed[1], listed[2].strip("'"), listed[3].replace("'", "").split(", ")
         return str(UsageError.unknown("value", word, known, where=option))
+    extra = _EXTRA.fullmatch(message)
+    if extra is not None:
+        message = f"Got unexpected extra argument {extra[1]}; outputs are named by -o: -o {extra[1]}."
     context: Any = getattr(error, "ctx", None)
     command = getattr(context, "command_path", "lippmann")
     if " " in command and _NO_COMMAND.fullmatch(message):

@@ -211,6 +211,8 @@ class _Source(NamedTuple):
 def _views_in(path: Path) -> list[_Source]:
     """The photograph of a file; of a stereo pair both views, the left one first."""
     check_kind(path, PictureError)
+    if not path.exists():
+        raise unreadable(path, FileNotFoundError(), PictureError)
     with _report_errors(path):
         if path.suffix.lower() in HEIF:
             from lippmann.scene.readers.heif import read_heif_pair

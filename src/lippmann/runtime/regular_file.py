@@ -45,8 +45,13 @@ def check_kind(path: Path, error: type[LippmannError]) -> None:
 
 def unreadable(path: Path, reason: OSError, error: type[LippmannError], rule: str = "") -> LippmannError:
     """The ``error`` of a file that ``reason`` kept from being opened; of a missing one, with the likely one."""
+    if path.parts[:1] in (("http:",), ("https:",)):  # one of the two slashes is gone
+        address = "//".join(path.as_posix().split("/", 1))
+        return error("is an address", where=address, rule=rule or "files are read", fix="download it first")
     if isinstance(reason, (FileNotFoundError, NotADirectoryError)):
         return error("no such file", where=str(path), rule=rule, fix=near_miss(path))
+    if isinstance(reason, IsADirectoryError):
+        return error("is a folder, no file", where=str(path), rule=rule)
     return error(f"cannot be read ({reason.strerror or reason})", where=str(path), rule=rule)
 
 

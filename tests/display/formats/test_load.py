@@ -199,7 +199,7 @@ def test_values_that_are_no_display(nothing):
 def test_unreadable_places(tmp_path):
     with pytest.raises(DisplayError, match="no such file"):
         load_display(tmp_path / "absent.toml")
-    with pytest.raises(DisplayError, match=r"cannot be read \(Is a directory\)"):
+    with pytest.raises(DisplayError, match="is a folder, no file"):
         load_display(tmp_path)
 
 

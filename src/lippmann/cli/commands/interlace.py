@@ -162,7 +162,7 @@ def _pictures(photos: list[Path]) -> list[Path]:
         if path.is_dir():
             paths += [file for file in path.iterdir() if file.suffix.lower() in ENDINGS and file.name[0] != "."]
         elif "*" in path.name and not path.exists():
-            paths += [Path(name) for name in glob(str(path))]
+            paths += [Path(name) for name in glob(str(path))] or [path]
         else:
             paths.append(path)
     return paths
