@@ -148,14 +148,14 @@ def eye_light(
     return EyeLight(across, along, places, _trim(weights), step)
 
 
-def _checked_slopes(name: str, slopes: tuple[float, float]) -> Real:
+def _checked_slopes(name: str, slopes: tuple[float, float]) -> tuple[float, float]:
     try:
         pair = np.asarray(slopes, dtype=np.float64)
     except (TypeError, ValueError):
         pair = np.empty(0)
     if pair.shape != (2,) or not np.isfinite(pair).all():
         raise UsageError(shorten(slopes), where=name, rule="must be two finite numbers: tangents of angles")
-    return pair
+    return float(pair[0]), float(pair[1])
 
 
 def _spreads(lens: Lens, across: Real, along: Real, per_lens: int) -> tuple[Real, Real]:
