@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from lippmann.display import load_display
+from lippmann.image.metadata import Provenance
 from lippmann.quilts.files import read_quilt, write_quilt
 from lippmann.quilts.quilt import Quilt, QuiltLayout
 
@@ -53,6 +54,16 @@ def test_of_another_program_s_quilt_no_provenance_is_said(lippmann, tmp_path):
         f"{path}: quilt, 384x384, uint8",
         "views       8x6 of 48x64 pixels, aspect 0.75",
     ]
+
+
+def test_what_a_quilt_says_is_to_be_read(lippmann, tmp_path):
+    bounds = {"psnr_low": 30.9, "psnr_high": 36.3, "worst_low": 25.8, "worst_high": 33.2}
+    estimate = {"psnr": 33.1, "worst": 28.8, "worst_lens": [0, 0], **bounds}
+    made = Provenance(estimate=estimate, options={"depth_range": [-23.669759999999997, 11.8], "denoise": "oidn"})
+    quilt = Quilt(np.zeros((256, 256, 3), np.uint8), QuiltLayout(4, 2, 0.75), provenance=made)
+    said = lippmann("info", quilt.save(tmp_path / "a.png")).out
+    assert "worst view 28.8 dB" in said
+    assert "depth_range -23.6698, 11.8\ndenoise     oidn\n" in said
 
 
 @pytest.mark.long

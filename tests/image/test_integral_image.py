@@ -126,6 +126,13 @@ def test_worker_processes_get_the_same_picture(display, picture):
     assert back.display == image.display
 
 
+def test_numpy_takes_the_pixels(display):
+    image = IntegralImage(np.full((4, 4, 3), 0.25, np.float32), display("square", lenses=(2, 2), pixels=2))
+    assert np.shares_memory(np.asarray(image), image.pixels)
+    assert np.asarray(image, np.float64).dtype == np.float64
+    assert np.mean(image) == 0.25
+
+
 def test_notebooks_show_what_an_eye_sees(tmp_path, display):
     array = display("square", lenses=(300, 100), pixels=3)
     colors = np.broadcast_to(np.float32([1, 0.5, 0]), (300, 900, 3))

@@ -46,6 +46,7 @@ def test_rows_of_all_views_are_those_of_each():
     for number in range(45):
         np.testing.assert_array_equal(rows[number], quilt.view(number)[7:20])
     np.testing.assert_array_equal(quilt.pixels, dequantize(codes, "srgb"))
+    np.testing.assert_array_equal(quilt, quilt.pixels)  # as NumPy takes it
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, get_args
+from typing import TYPE_CHECKING, Any, TypedDict, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from lippmann.display import Display
 from lippmann.display.panel import PixelWindow
@@ -320,6 +320,10 @@ class IntegralImage(Picture):
         grid, panel = self.display.lens_grid, self.display.panel
         lenses = f"{grid.columns} x {grid.rows} lenses"
         return f"<IntegralImage {panel.width} x {panel.height} pixels, {lenses}, display {self.display.name}>"
+
+    def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> NDArray[Any]:
+        """:attr:`pixels`, for ``np.asarray`` and NumPy's functions."""
+        return np.array(self.pixels, dtype=dtype, copy=copy)
 
     def _repr_mimebundle_(self, **_: object) -> object:
         """The viewer's page as a widget, where it can be shown; see :mod:`lippmann.viewer.notebook`."""

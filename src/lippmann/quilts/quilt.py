@@ -14,10 +14,10 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from lippmann.display import Display
 from lippmann.display.stereo import PairWidth, StereoPair
@@ -214,6 +214,10 @@ class Quilt:
     def __repr__(self) -> str:
         (width, height), layout = self.size, self.layout
         return f"<Quilt {width} x {height} pixels, {layout.columns} x {layout.rows} views, aspect {layout.aspect:g}>"
+
+    def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> NDArray[Any]:
+        """:attr:`pixels`, for ``np.asarray`` and NumPy's functions."""
+        return np.array(self.pixels, dtype=dtype, copy=copy)
 
     def _repr_png_(self) -> bytes:
         """A PNG of all views for notebooks, at most 768 pixels wide."""

@@ -124,7 +124,7 @@ def _quilt_lines(path: Path, quilt: Quilt) -> list[str]:
     lines.append(f"views       {quilt.layout.columns}x{quilt.layout.rows} of {view_width}x{view_height} pixels{aspect}")
     if quilt.display is not None:
         lines.append(f"display     {quilt.display.name}")
-    return lines + (_provenance_lines(quilt.provenance) if quilt.provenance != Provenance() else [])
+    return lines + (_provenance_lines(quilt.provenance, "view") if quilt.provenance != Provenance() else [])
 
 
 def _info_values(path: Path, file: PictureFile) -> dict[str, Any]:
@@ -168,7 +168,7 @@ def _info_lines(path: Path, file: PictureFile) -> list[str]:
     return lines + _provenance_lines(provenance)
 
 
-def _provenance_lines(provenance: Provenance) -> list[str]:
+def _provenance_lines(provenance: Provenance, part: str = "micro-image") -> list[str]:
     lines = [
         f"scene       {provenance.scene or 'unknown'}",
         f"method      {_method(provenance)}",
@@ -176,14 +176,21 @@ def _provenance_lines(provenance: Provenance) -> list[str]:
         f"on {provenance.device or 'an unknown device'}",
     ]
     if provenance.estimate is not None:
-        lines.append(f"estimated   {estimate_in_words(provenance.estimate)}")
+        lines.append(f"estimated   {estimate_in_words(provenance.estimate, part)}")
     if provenance.rays:
         lines.append("rays        " + ", ".join(f"{count:,} {kind}" for kind, count in provenance.rays.items()))
     if provenance.seconds:
         lines.append("seconds     " + ", ".join(f"{stage} {spent:.2f}" for stage, spent in provenance.seconds.items()))
     lists = {name: provenance.options.get(name) for name in ("settings", "plan")}
-    lines += [f"{name:<11} {value}" for name, value in provenance.options.items() if name not in lists]
+    lines += [f"{name:<11} {_plain(value)}" for name, value in provenance.options.items() if name not in lists]
     for name, each in lists.items():
         if isinstance(each, list):
             lines += [f"{name if place == 0 else '':<11} {line}" for place, line in enumerate(each)]
     return lines + [f"note        {note}" for note in provenance.notes]
+
+
+def _plain(value: object) -> str:
+    """A value of a picture's metadata to be read: numbers of six digits, lists without brackets."""
+    if isinstance(value, (list, tuple)):
+        return ", ".join(_plain(each) for each in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)
