@@ -40,6 +40,8 @@ def test_options_change_what_is_seen(lippmann, engine, scan, tmp_path):
         *("--window=-500,100", "-o", out),
     )
     assert done.code == 0, done.err
+    assert "shown by the transfer function 'grey', values -500 to 100" in done.err
+    assert "ct-bone" not in done.err
     soft = pixels(out)
     assert soft[256, 256].std() == 0  # grey
     done = lippmann("preview", scan, "--display", "seed-lenticular", "--crop=-99,-99,-99,99,-14,99", "-o", out)

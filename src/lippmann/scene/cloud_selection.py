@@ -17,6 +17,7 @@ from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import Splats
 from lippmann.scene.values.volume import TransferFunction, Volume
 from lippmann.scene.volumes import grid
+from lippmann.scene.volumes.description import transfer_note
 from lippmann.scene.volumes.presets import PRESETS, preset, sample
 from lippmann.scene.volumes.transfer_file import SUFFIXES, read_transfer_function
 
@@ -179,8 +180,10 @@ class VolumeSelection:
             if part is None:
                 raise UsageError("leaves no voxel", where=scene.name, parameter="crop", fix="ask for less")
             volume = part
-        transfer = self._transfer(volume)
-        return replace(scene, description=replace(description, volume=replace(volume, transfer=transfer)))
+        transfer, before = self._transfer(volume), transfer_note(volume.transfer)
+        notes = [transfer_note(transfer) if note == before else note for note in description.notes]
+        shown = replace(description, volume=replace(volume, transfer=transfer), notes=notes)
+        return replace(scene, description=shown)
 
     def _transfer(self, volume: Volume) -> TransferFunction:
         transfer, asked = volume.transfer, self.transfer_function

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
 from lippmann.scene.values.description import SceneDescription
-from lippmann.scene.values.volume import Numbers, Volume
+from lippmann.scene.values.volume import Numbers, TransferFunction, Volume
 from lippmann.scene.volumes.grid import check_values, storable
 from lippmann.scene.volumes.presets import Kind, automatic, sample
 
@@ -46,9 +46,15 @@ def describe_volume(
     stored, remark = storable(grid)
     check_values(stored, slope, intercept, name)
     transfer = automatic(sample(stored, slope, intercept), kind)
-    first, last = transfer.values[[0, -1]]
-    note = f"shown by the transfer function '{transfer.name}', values {first:.5g} to {last:.5g} (transfer_function)"
     depth, height, width = stored.shape
     volume = Volume(stored, np.asarray(world_from_voxel, np.float64), transfer, slope, intercept)
     size = f"{width} x {height} x {depth} voxels of {' x '.join(f'{side:.3g}' for side in volume.spacing)}"
-    return SceneDescription(name, notes=[size, *notes, *([remark] if remark else []), note], volume=volume)
+    return SceneDescription(
+        name, notes=[size, *notes, *([remark] if remark else []), transfer_note(transfer)], volume=volume
+    )
+
+
+def transfer_note(transfer: TransferFunction) -> str:
+    """Note on the transfer function that shows a volume."""
+    name, (first, last) = f" '{transfer.name}'" if transfer.name else "", transfer.values[[0, -1]]
+    return f"shown by the transfer function{name}, values {first:.5g} to {last:.5g} (transfer_function)"
