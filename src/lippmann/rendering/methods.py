@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
+from lippmann.display.panel import PixelWindow
 from lippmann.options.choices import Method
 from lippmann.progress import ProgressCallback
 from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
@@ -187,18 +188,12 @@ def _samples_of_pixels(traced: Traced) -> NDArray[np.uint32]:
 
 def _trace_fixed(job: Job) -> Traced:
     """A fixed number of samples, in bands of rows."""
+    size, samples = (job.source.width, job.source.height), job.request.samples
     frame, errors = trace_in_batches(
-        job.integrator,
-        job.source,
-        job.request.samples,
-        seed=job.request.seed,
-        box_filter=job.request.box_filter,
-        coding=job.request.coding,
-        memory=job.session.memory,
-        progress=job.progress,
+        lambda memory, window: _make_batches(job, memory, window), size, samples, job.session.memory, job.progress
     )
     frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
-    return Traced(frame, job.request.samples, _make_estimator(job).estimate(errors, job.request.samples))
+    return Traced(frame, samples, _make_estimator(job).estimate(errors, samples))
 
 
 def _trace_in_rounds(job: Job) -> Traced:
@@ -253,15 +248,16 @@ def _assemble(
     return traced if denoiser is None else _with_denoiser(traced, denoiser)
 
 
-def _make_batches(job: Job) -> FullInBatches:
-    source = job.sample_source
+def _make_batches(job: Job, memory: int | None = None, window: PixelWindow | None = None) -> FullInBatches:
+    """The picture in batches, or a window of it within ``memory`` bytes."""
     return FullInBatches(
         job.integrator,
-        source,
+        job.sample_source,
         seed=job.request.seed,
         box_filter=job.request.box_filter,
         coding=job.request.coding,
-        memory=job.session.memory,
+        memory=memory or job.session.memory,
+        window=window,
         for_denoiser=job.request.denoise != "none",
     )
 

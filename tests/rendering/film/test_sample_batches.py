@@ -86,7 +86,11 @@ def test_bands_of_rows_are_the_picture_in_one_piece(integrator):
     reports = []
     for memory in (2**30, SIZE * SIZE * 32 + 2 * (1 << 13) * 96):
         frame, found = trace_in_batches(
-            integrator, rays(), 16, seed=1, memory=memory, progress=lambda report: reports.append(report)
+            lambda memory, window: batches(integrator, memory=memory, window=window),
+            (SIZE, SIZE),
+            16,
+            memory,
+            reports.append,
         )
         assert np.array_equal(frame.pixels, whole.picture())
         assert np.allclose(found.values, expected.values, atol=1e-7)

@@ -29,11 +29,13 @@ class Case:
 
     def full(self, samples=1):
         from lippmann.rendering.film.memory_model import cut_wavefronts
-        from lippmann.rendering.film.sample_batches import trace_in_batches
-        from lippmann.rendering.film.wavefront import trace_frame
+        from lippmann.rendering.film.sample_batches import FullInBatches
+        from lippmann.rendering.film.wavefront import Frame, trace_frame
 
         if samples > 1:
-            return trace_in_batches(self.integrator, self.source, samples, memory=1 << 30)[0]
+            batches = FullInBatches(self.integrator, self.source, memory=1 << 30)
+            batches.add(samples)
+            return Frame(batches.picture())
         plan = cut_wavefronts(self.source.width, self.source.height, samples, memory=1 << 30)
         return trace_frame(self.integrator, self.source, plan, box_filter=False)
 

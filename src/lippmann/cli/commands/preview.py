@@ -23,10 +23,7 @@ from lippmann.options.scene import SceneOptions
 from lippmann.options.texts import triple
 
 if TYPE_CHECKING:
-    from lippmann.progress import ProgressCallback
-    from lippmann.rendering.preview import Preview
-    from lippmann.rendering.request.render_request import RenderRequest
-    from lippmann.scene.scene import Scene
+    pass
 
 
 #: The display of a picture for which none is given.
@@ -91,7 +88,9 @@ def preview(
         loaded = source.load()
         load_seconds = time.perf_counter() - started
         if plain:
-            image = _plain(loaded, placement.camera, size, request, progress)
+            from lippmann.rendering.preview import render_preview
+
+            image = render_preview(loaded, placement.camera, size, request, progress)
         else:
             from lippmann.rendering.live.eye_preview import render_eye_preview
 
@@ -120,15 +119,3 @@ def _check_plain(eye: str | None, display: str, placement: PlacementOptions, *, 
     if given:
         rule = "--plain shows the scene without a display"
         raise UsageError("is for a display", where=flag_of(given[0]), rule=rule, fix="leave one of them out")
-
-
-def _plain(
-    scene: Scene,
-    camera: str | None,
-    size: tuple[int, int],
-    request: RenderRequest,
-    progress: ProgressCallback,
-) -> Preview:
-    from lippmann.rendering.preview import render_preview
-
-    return render_preview(scene, camera, size, request, progress)

@@ -134,7 +134,9 @@ def render(
             source, target, request, rendered, output, console, bits=bits, stored=stored, maps=maps, finish=finish
         )
     if opens:
-        _open(output, quiet=quiet, as_json=as_json)
+        from lippmann.cli.commands.view import view
+
+        view(output, quiet=quiet, as_json=as_json)
 
 
 def _check_tiled(correct: str, maps: Path | None) -> None:
@@ -189,13 +191,6 @@ def _render_whole(
             console.remark(line)
     height, width = image.pixels.shape[:2]
     console.result(report(output, (width, height), written.provenance), _sentence(output, written))
-
-
-def _open(output: Path, *, quiet: bool, as_json: bool) -> None:
-    """Show a picture in the browser."""
-    from lippmann.cli.commands import view
-
-    view.view(output, quiet=quiet, as_json=as_json)
 
 
 def _readable(image: IntegralImage, stored: str, output: Path) -> tuple[IntegralImage, str]:

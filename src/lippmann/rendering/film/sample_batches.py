@@ -208,19 +208,16 @@ def _stretches(integrator: Integrator, first: int, samples: int) -> Iterator[tup
 
 
 def trace_in_batches(
-    integrator: Integrator,
-    source: RaySource,
+    make_batches: Callable[[int, PixelWindow], FullInBatches],
+    size: tuple[int, int],
     samples: int,
-    *,
-    seed: int = 0,
-    box_filter: bool = True,
-    coding: Coding = "srgb",
     memory: int,
     progress: ProgressCallback = silent,
 ) -> tuple[Frame, PixelErrors]:
     """The picture of ``samples`` (two or more) samples per pixel and its errors, in bands of rows.
 
     Only one band's batches are kept at a time, so that memory follows ``memory`` for pictures of any size.
+    ``make_batches`` makes those of a window of the picture, whose width and height are ``size``, within so many bytes.
 
     Raises
     ------
@@ -229,7 +226,7 @@ def trace_in_batches(
     MemoryLimitError
         If ``memory`` is too small for the picture and one row.
     """
-    width, height = source.width, source.height
+    width, height = size
     whole = np.zeros((height, width, 3), dtype=np.float32)
     error, outliers, blur = np.zeros((3, height, width), dtype=np.float32)
     frame = Frame(whole)
@@ -240,15 +237,7 @@ def trace_in_batches(
     rows = -(-height // bands)
     for first in range(0, height, rows):
         last = min(first + rows, height)
-        band = FullInBatches(
-            integrator,
-            source,
-            seed=seed,
-            box_filter=box_filter,
-            coding=coding,
-            memory=left,
-            window=PixelWindow(0, first, width, last - first),
-        )
+        band = make_batches(left, PixelWindow(0, first, width, last - first))
         band.add(samples, of_part(progress, first / height, (last - first) / height, samples * height * width))
         whole[first:last] = band.picture()
         band_errors = band.squared_error()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TypedDict
 
 import numpy as np
 
@@ -19,65 +18,6 @@ _BLACK: Color = (0.0, 0.0, 0.0)
 # KHR_materials_ior writes 0 for what reflects all light at normal incidence, the limit of an endless index of
 # refraction; this one reflects 99.6 %.
 _ENDLESS_IOR = 1000.0
-
-
-class _Base(TypedDict, total=False):
-    base_color: Color
-    base_color_texture: Texture | None
-    alpha: float
-    metallic: float
-    roughness: float
-    metallic_roughness_texture: Texture | None
-
-
-class _Surface(TypedDict, total=False):
-    normal_texture: Texture | None
-    normal_scale: float
-    emission: Color
-    emission_texture: Texture | None
-    alpha_mode: AlphaMode
-    alpha_cutoff: float
-    double_sided: bool
-    unlit: bool
-
-
-class _Interior(TypedDict, total=False):
-    ior: float
-    transmission: float
-    transmission_texture: Texture | None
-    thickness: float
-    thickness_texture: Texture | None
-    attenuation_color: Color
-    attenuation_distance: float
-
-
-class _Layers(TypedDict, total=False):
-    specular: float
-    specular_texture: Texture | None
-    specular_color: Color
-    specular_color_texture: Texture | None
-    clearcoat: float
-    clearcoat_texture: Texture | None
-    clearcoat_roughness: float
-    clearcoat_roughness_texture: Texture | None
-    clearcoat_normal_texture: Texture | None
-    clearcoat_normal_scale: float
-    sheen_color: Color
-    sheen_color_texture: Texture | None
-    sheen_roughness: float
-    sheen_roughness_texture: Texture | None
-
-
-class _Gloss(TypedDict, total=False):
-    anisotropy: float
-    anisotropy_rotation: float
-    anisotropy_texture: Texture | None
-    iridescence: float
-    iridescence_texture: Texture | None
-    iridescence_ior: float
-    iridescence_thickness_minimum: float
-    iridescence_thickness_maximum: float
-    iridescence_thickness_texture: Texture | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,31 +47,28 @@ class Materials:
             return Material(name="default", metallic=1.0)
         fields = self.document.all("materials")[index]
         archived = fields.extension("KHR_materials_pbrSpecularGlossiness")
-        material = Material(
-            name=fields.text("name") or fields.place,
-            **(self._base(fields) if archived is None else {}),
-            **self._surface(fields),
-            **self._interior(fields),
-            **self._layers(fields),
-            **self._gloss(fields),
-        )
+        material = Material(name=fields.text("name") or fields.place)
+        if archived is None:
+            material = self._with_base(material, fields)
+        for add in (self._with_surface, self._with_interior, self._with_layers, self._with_gloss):
+            material = add(material, fields)
         return material if archived is None else self._as_specular_glossiness(material, archived)
 
-    def _base(self, fields: Fields) -> _Base:
+    def _with_base(self, material: Material, fields: Fields) -> Material:
         base = fields.child("pbrMetallicRoughness") or Fields({}, fields.place, fields.file)
         red, green, blue, alpha = self._fractions(base, "baseColorFactor", (1.0, 1.0, 1.0, 1.0))
         texture = self.textures.read(base, "metallicRoughnessTexture")
-        is_lost = texture is None and base.has(
-            "metallicRoughnessTexture"
-        )  # the factor alone would make all of it metal
-        return {
-            "base_color": (red, green, blue),
-            "base_color_texture": self.textures.read(base, "baseColorTexture", srgb=True),
-            "alpha": alpha,
-            "metallic": 0.0 if is_lost else self._fraction(base, "metallicFactor", 1.0),
-            "roughness": self._fraction(base, "roughnessFactor", 1.0),
-            "metallic_roughness_texture": texture,
-        }
+        # The factor alone would make all of it metal.
+        is_lost = texture is None and base.has("metallicRoughnessTexture")
+        return replace(
+            material,
+            base_color=(red, green, blue),
+            base_color_texture=self.textures.read(base, "baseColorTexture", srgb=True),
+            alpha=alpha,
+            metallic=0.0 if is_lost else self._fraction(base, "metallicFactor", 1.0),
+            roughness=self._fraction(base, "roughnessFactor", 1.0),
+            metallic_roughness_texture=texture,
+        )
 
     def _as_specular_glossiness(self, material: Material, fields: Fields) -> Material:
         red, green, blue, alpha = self._fractions(fields, "diffuseFactor", (1.0, 1.0, 1.0, 1.0))
@@ -144,7 +81,7 @@ class Materials:
             specular_glossiness_texture=self.textures.read(fields, "specularGlossinessTexture", srgb=True),
         )
 
-    def _surface(self, fields: Fields) -> _Surface:
+    def _with_surface(self, material: Material, fields: Fields) -> Material:
         mode = fields.text("alphaMode") or "OPAQUE"
         if mode not in _ALPHA_MODES:
             raise fields.error("alphaMode", f"one of {', '.join(_ALPHA_MODES)} belongs here")
@@ -158,82 +95,101 @@ class Materials:
         emission = _BLACK if is_lost else self._fractions(fields, "emissiveFactor", _BLACK)
         if fields.has("occlusionTexture"):
             self.document.notes.add("occlusion textures are left out: light is traced into corners", fields.place)
-        return {
-            "normal_texture": self.textures.read(fields, "normalTexture"),
-            "normal_scale": 1.0 if normal is None else normal.number("scale", 1.0),
-            "emission": (emission[0] * strength, emission[1] * strength, emission[2] * strength),
-            "emission_texture": emission_texture,
-            "alpha_mode": _ALPHA_MODES[mode],
-            "alpha_cutoff": fields.number("alphaCutoff", 0.5, minimum=0.0),
-            "double_sided": fields.flag("doubleSided"),
-            "unlit": fields.extension("KHR_materials_unlit") is not None,
-        }
+        return replace(
+            material,
+            normal_texture=self.textures.read(fields, "normalTexture"),
+            normal_scale=1.0 if normal is None else normal.number("scale", 1.0),
+            emission=(emission[0] * strength, emission[1] * strength, emission[2] * strength),
+            emission_texture=emission_texture,
+            alpha_mode=_ALPHA_MODES[mode],
+            alpha_cutoff=fields.number("alphaCutoff", 0.5, minimum=0.0),
+            double_sided=fields.flag("doubleSided"),
+            unlit=fields.extension("KHR_materials_unlit") is not None,
+        )
 
-    def _interior(self, fields: Fields) -> _Interior:
-        interior: _Interior = {}
+    def _with_interior(self, material: Material, fields: Fields) -> Material:
         ior = fields.extension("KHR_materials_ior")
         if ior is not None:
             value = ior.number("ior", 1.5)
             if value != 0.0 and value < 1.0:
                 raise ior.error("ior", "it must be 1 or more, or 0")
-            interior["ior"] = min(value, _ENDLESS_IOR) or _ENDLESS_IOR
+            material = replace(material, ior=min(value, _ENDLESS_IOR) or _ENDLESS_IOR)
         transmission = fields.extension("KHR_materials_transmission")
         if transmission is not None:
-            interior["transmission"] = self._fraction(transmission, "transmissionFactor", 0.0)
-            interior["transmission_texture"] = self.textures.read(transmission, "transmissionTexture")
+            material = replace(
+                material,
+                transmission=self._fraction(transmission, "transmissionFactor", 0.0),
+                transmission_texture=self.textures.read(transmission, "transmissionTexture"),
+            )
         volume = fields.extension("KHR_materials_volume")
         if volume is not None:
-            interior["thickness"] = volume.number("thicknessFactor", 0.0, minimum=0.0)
-            interior["thickness_texture"] = self.textures.read(volume, "thicknessTexture")
-            interior["attenuation_color"] = self._color(volume, "attenuationColor", _WHITE)
+            material = replace(
+                material,
+                thickness=volume.number("thicknessFactor", 0.0, minimum=0.0),
+                thickness_texture=self.textures.read(volume, "thicknessTexture"),
+                attenuation_color=self._color(volume, "attenuationColor", _WHITE),
+            )
             distance = volume.optional_number("attenuationDistance")
             if distance is not None:
                 if distance <= 0.0:
                     raise volume.error("attenuationDistance", "it must be above 0")
-                interior["attenuation_distance"] = distance
-        return interior
+                material = replace(material, attenuation_distance=distance)
+        return material
 
-    def _layers(self, fields: Fields) -> _Layers:
-        layers: _Layers = {}
+    def _with_layers(self, material: Material, fields: Fields) -> Material:
         specular = fields.extension("KHR_materials_specular")
         if specular is not None:
-            layers["specular"] = self._fraction(specular, "specularFactor", 1.0)
-            layers["specular_texture"] = self.textures.read(specular, "specularTexture")
-            layers["specular_color"] = self._color(specular, "specularColorFactor", _WHITE, most=LARGEST_NUMBER)
-            layers["specular_color_texture"] = self.textures.read(specular, "specularColorTexture", srgb=True)
+            material = replace(
+                material,
+                specular=self._fraction(specular, "specularFactor", 1.0),
+                specular_texture=self.textures.read(specular, "specularTexture"),
+                specular_color=self._color(specular, "specularColorFactor", _WHITE, most=LARGEST_NUMBER),
+                specular_color_texture=self.textures.read(specular, "specularColorTexture", srgb=True),
+            )
         coat = fields.extension("KHR_materials_clearcoat")
         if coat is not None:
-            layers["clearcoat"] = self._fraction(coat, "clearcoatFactor", 0.0)
-            layers["clearcoat_texture"] = self.textures.read(coat, "clearcoatTexture")
-            layers["clearcoat_roughness"] = self._fraction(coat, "clearcoatRoughnessFactor", 0.0)
-            layers["clearcoat_roughness_texture"] = self.textures.read(coat, "clearcoatRoughnessTexture")
-            layers["clearcoat_normal_texture"] = self.textures.read(coat, "clearcoatNormalTexture")
             normal = coat.child("clearcoatNormalTexture")
-            layers["clearcoat_normal_scale"] = 1.0 if normal is None else normal.number("scale", 1.0)
+            material = replace(
+                material,
+                clearcoat=self._fraction(coat, "clearcoatFactor", 0.0),
+                clearcoat_texture=self.textures.read(coat, "clearcoatTexture"),
+                clearcoat_roughness=self._fraction(coat, "clearcoatRoughnessFactor", 0.0),
+                clearcoat_roughness_texture=self.textures.read(coat, "clearcoatRoughnessTexture"),
+                clearcoat_normal_texture=self.textures.read(coat, "clearcoatNormalTexture"),
+                clearcoat_normal_scale=1.0 if normal is None else normal.number("scale", 1.0),
+            )
         sheen = fields.extension("KHR_materials_sheen")
         if sheen is not None:
-            layers["sheen_color"] = self._color(sheen, "sheenColorFactor", _BLACK)
-            layers["sheen_color_texture"] = self.textures.read(sheen, "sheenColorTexture", srgb=True)
-            layers["sheen_roughness"] = self._fraction(sheen, "sheenRoughnessFactor", 0.0)
-            layers["sheen_roughness_texture"] = self.textures.read(sheen, "sheenRoughnessTexture")
-        return layers
+            material = replace(
+                material,
+                sheen_color=self._color(sheen, "sheenColorFactor", _BLACK),
+                sheen_color_texture=self.textures.read(sheen, "sheenColorTexture", srgb=True),
+                sheen_roughness=self._fraction(sheen, "sheenRoughnessFactor", 0.0),
+                sheen_roughness_texture=self.textures.read(sheen, "sheenRoughnessTexture"),
+            )
+        return material
 
-    def _gloss(self, fields: Fields) -> _Gloss:
-        gloss: _Gloss = {}
+    def _with_gloss(self, material: Material, fields: Fields) -> Material:
         anisotropy = fields.extension("KHR_materials_anisotropy")
         if anisotropy is not None:
-            gloss["anisotropy"] = self._fraction(anisotropy, "anisotropyStrength", 0.0)
-            gloss["anisotropy_rotation"] = anisotropy.number("anisotropyRotation", 0.0)
-            gloss["anisotropy_texture"] = self.textures.read(anisotropy, "anisotropyTexture")
+            material = replace(
+                material,
+                anisotropy=self._fraction(anisotropy, "anisotropyStrength", 0.0),
+                anisotropy_rotation=anisotropy.number("anisotropyRotation", 0.0),
+                anisotropy_texture=self.textures.read(anisotropy, "anisotropyTexture"),
+            )
         film = fields.extension("KHR_materials_iridescence")
         if film is not None:
-            gloss["iridescence"] = self._fraction(film, "iridescenceFactor", 0.0)
-            gloss["iridescence_texture"] = self.textures.read(film, "iridescenceTexture")
-            gloss["iridescence_ior"] = film.number("iridescenceIor", 1.3, minimum=1.0)
-            gloss["iridescence_thickness_minimum"] = film.number("iridescenceThicknessMinimum", 100.0, minimum=0.0)
-            gloss["iridescence_thickness_maximum"] = film.number("iridescenceThicknessMaximum", 400.0, minimum=0.0)
-            gloss["iridescence_thickness_texture"] = self.textures.read(film, "iridescenceThicknessTexture")
-        return gloss
+            material = replace(
+                material,
+                iridescence=self._fraction(film, "iridescenceFactor", 0.0),
+                iridescence_texture=self.textures.read(film, "iridescenceTexture"),
+                iridescence_ior=film.number("iridescenceIor", 1.3, minimum=1.0),
+                iridescence_thickness_minimum=film.number("iridescenceThicknessMinimum", 100.0, minimum=0.0),
+                iridescence_thickness_maximum=film.number("iridescenceThicknessMaximum", 400.0, minimum=0.0),
+                iridescence_thickness_texture=self.textures.read(film, "iridescenceThicknessTexture"),
+            )
+        return material
 
     def _color(self, fields: Fields, key: str, default: Color, *, most: float = 1.0) -> Color:
         red, green, blue = self._fractions(fields, key, default, most=most)
