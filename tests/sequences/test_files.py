@@ -40,7 +40,7 @@ def display():
 def unbroken(engine, moving_ball, display, tmp_path_factory):
     """The frames of a run that nothing interrupted."""
     folder = tmp_path_factory.mktemp("unbroken")
-    assert [frame.found for frame in run(moving_ball, display, folder)] == [False] * 4
+    assert [frame.resumed for frame in run(moving_ball, display, folder)] == [False] * 4
     return contents(folder)
 
 
@@ -116,7 +116,7 @@ def test_finished_frames_are_kept_and_the_rest_is_the_same(unbroken, moving_ball
     assert (tmp_path / "f_%02d.png.journal").exists()
     written = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.png")}
     frames = run(moving_ball, display, tmp_path, resume=True)
-    assert [(frame.number, frame.found) for frame in frames] == [(0, True), (3, True), (6, False), (9, False)]
+    assert [(frame.number, frame.resumed) for frame in frames] == [(0, True), (3, True), (6, False), (9, False)]
     assert frames[0].provenance.spp == 1
     assert contents(tmp_path) == unbroken
     assert {name: (tmp_path / name).stat().st_mtime_ns for name in written} == written
@@ -128,7 +128,7 @@ def test_damaged_and_absent_frames_are_rendered_again(unbroken, moving_ball, dis
     (tmp_path / "f_00.png").unlink()
     (tmp_path / "f_03.png").write_bytes(unbroken["f_06.png"])
     frames = run(moving_ball, display, tmp_path, resume=True)
-    assert [frame.found for frame in frames] == [False, False, True, False]
+    assert [frame.resumed for frame in frames] == [False, False, True, False]
     assert contents(tmp_path) == unbroken
 
 
@@ -169,7 +169,7 @@ def test_other_scenes_and_displays_are_refused(engine, moving_ball, display, tmp
     run(moving_ball, display, out, most=1)
     scene = tmp_path / "scene"
     shutil.copytree(moving_ball.parent, scene)
-    assert run(scene / moving_ball.name, display, out, most=1, resume=True)[0].found
+    assert run(scene / moving_ball.name, display, out, most=1, resume=True)[0].resumed
     tree = json.loads((scene / moving_ball.name).read_text())
     tree["materials"] = [{"pbrMetallicRoughness": {"roughnessFactor": 0.31}}]
     (scene / moving_ball.name).write_text(json.dumps(tree))
@@ -185,7 +185,7 @@ def test_other_scenes_and_displays_are_refused(engine, moving_ball, display, tmp
 def test_more_or_fewer_frames_may_be_asked_for(unbroken, moving_ball, display, tmp_path):
     run(moving_ball, display, tmp_path, most=2)
     frames = run(moving_ball, display, tmp_path, frames=range(7), most=5, resume=True)
-    assert [frame.found for frame in frames] == [True, False, False, True, False]
+    assert [frame.resumed for frame in frames] == [True, False, False, True, False]
     assert all(contents(tmp_path)[name] == unbroken[name] for name in ("f_00.png", "f_03.png"))
 
 
@@ -201,7 +201,7 @@ def test_frames_that_are_rendered_in_tiles_are_kept_too(engine, moving_ball, dis
     run(moving_ball, display, broken, most=1, **tiles)
     with pytest.raises(PictureError, match="frames are rendered"):
         run(moving_ball, display, broken, resume=True, **tiles | {"runner": None})
-    assert [frame.found for frame in run(moving_ball, display, broken, resume=True, **tiles)] == [True, False]
+    assert [frame.resumed for frame in run(moving_ball, display, broken, resume=True, **tiles)] == [True, False]
     assert contents(broken) == contents(whole)
 
 

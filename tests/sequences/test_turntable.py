@@ -184,7 +184,7 @@ def test_unfinished_quilts_are_gone_on_with(engine, display, tmp_path):
             motion, output, lambda k: folder / f"q_{k}{ending}.png", display, range(3), request, form=form, **options
         ) as saved:
             for frame in saved:
-                came.append(frame.found)
+                came.append(frame.resumed)
                 if len(came) == most:
                     break
         return came

@@ -139,7 +139,7 @@ class LensCorrection:
 
     @property
     def margin(self) -> int:
-        """Rows beyond which others have no say in a row."""
+        """How many rows away a meant row still influences a corrected one."""
         return self._rows.margin
 
     def rows(self, parts: Sequence[Floats], first: int = 0, share: float = 1.0) -> Floats:
@@ -269,7 +269,7 @@ class _UprightRows:
         return solved
 
     def eyes(self, there: Display) -> Eyes:
-        """The light to eyes through the lenses that are there, in the order of :meth:`light_meant`."""
+        """The function from pictures to the light that eyes get through real lenses, ordered as :meth:`light_meant`."""
         is_own = there == self.display
         shares = [self._systems[c][0] if is_own else self._shares(there, c) for c in range(3)]
 

@@ -180,7 +180,7 @@ def _spreads(lens: Lens, across: Real, along: Real, per_lens: int) -> tuple[Real
 
 
 def _about(lines: Real, middle: float, reach: int) -> Real:
-    """``2 reach + 1`` lines of ``lines`` about a place between them, interpolated; 0 where there are none."""
+    """``2 reach + 1`` rows of ``lines`` around a fractional row, linearly interpolated; 0 beyond the first and last."""
     first = math.floor(middle)
     index = first + np.arange(-reach, reach + 2)
     is_there = (index >= 0) & (index < len(lines))

@@ -90,7 +90,7 @@ class SlantedRows:
 
     @property
     def margin(self) -> int:
-        """Rows beyond which others have no say in a row."""
+        """How many rows away a meant row still influences a corrected one."""
         return 2 * math.ceil(self.window)
 
     def solve(self, meant: Floats, channel: int, first: int) -> Floats:
@@ -115,9 +115,9 @@ class SlantedRows:
         return solved[self.margin : -self.margin]
 
     def eyes(self, there: Display) -> Eyes:
-        """The light to eyes through the lenses that are there, in the order of :meth:`light_meant`.
+        """The function from pictures to the light that eyes get of them, in the order of :meth:`light_meant`.
 
-        Light is that over the light of a white panel, whose unevenness no picture can take away.
+        ``display`` has the real lenses. Light is divided by that of a white panel, whose unevenness stays.
         """
         from lippmann.optics.eye_light_kernel import gather_light
 

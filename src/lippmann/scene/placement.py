@@ -204,7 +204,7 @@ def place(
     if mode == "camera" and display.stereo is not None:
         share, visible_range = find_eye_share(where, bounds, display, bounds_in, probe, is_unbounded=is_unbounded)
         share = share if options.depth_scale is None else 1.0
-    placement = stand(
+    placement = place_at(
         where,
         bounds,
         display,
@@ -218,7 +218,7 @@ def place(
     return replace(placement, exposure=exposure, may_cut=None if is_whole else options)
 
 
-def stand(
+def place_at(
     world_from_display: Matrix,
     bounds: Bounds,
     display: Display,

@@ -74,7 +74,7 @@ def _in_world(points: Bounds, moment: Moment) -> Bounds:
 
 
 def _content(description: SceneDescription) -> object:
-    """What smooth motion leaves as it is."""
+    """Properties that smooth motion does not change; a difference is a cut."""
     return (
         {mesh: len(places) for mesh, places in description.placements.items()},
         [

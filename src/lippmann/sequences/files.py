@@ -39,8 +39,8 @@ class SavedFrame:
     number, path:
         Of the frame and its file.
     provenance:
-        How it was made; without seconds where it was ``found``.
-    found:
+        How it was made; without seconds where it was ``resumed``.
+    resumed:
         Whether an earlier run had rendered it.
     quilt:
         A quilt with the values of its file; None where they have to be read.
@@ -49,7 +49,7 @@ class SavedFrame:
     number: int
     path: Path
     provenance: Provenance
-    found: bool = False
+    resumed: bool = False
     quilt: Quilt | None = None
 
 
@@ -157,7 +157,7 @@ def _in_order(
     for number in frames:
         path = path_of(number)
         if number not in absent:
-            yield SavedFrame(number, path, form.provenance(path), found=True)
+            yield SavedFrame(number, path, form.provenance(path), resumed=True)
             continue
         frame = next(made)
         journal.add(number, path)

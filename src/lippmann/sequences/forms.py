@@ -20,10 +20,10 @@ from lippmann.rendering.session import Build
 from lippmann.scene.scene import Scene
 
 #: An integral image, or a quilt.
-Shown = TypeVar("Shown", IntegralImage, Quilt)
+Output = TypeVar("Output", IntegralImage, Quilt)
 
 
-class Form(ABC, Generic[Shown]):
+class Form(ABC, Generic[Output]):
     """How a frame is rendered and written."""
 
     @property
@@ -34,11 +34,11 @@ class Form(ABC, Generic[Shown]):
     @abstractmethod
     def render(
         self, scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback, build: Build
-    ) -> Shown:
+    ) -> Output:
         """Render a frame of a scene that ``build`` builds; errors as of the renderer."""
 
     @abstractmethod
-    def write(self, frame: Shown, path: Path, bits: int | None) -> Shown | None:
+    def write(self, frame: Output, path: Path, bits: int | None) -> Output | None:
         """Write a frame with so many bits per value; the frame with the file's values, None where they are read."""
 
     @abstractmethod

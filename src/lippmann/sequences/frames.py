@@ -22,11 +22,11 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Build
 from lippmann.runtime.machine import return_freed_memory
-from lippmann.scene.placement import Placement, find_eye_share, options_of_sequence, place, stand
+from lippmann.scene.placement import Placement, find_eye_share, options_of_sequence, place, place_at
 from lippmann.scene.values.description import Camera, Matrix
 from lippmann.sequences.cuts import Moment
 from lippmann.sequences.flicker import with_flicker
-from lippmann.sequences.forms import INTEGRAL, Form, QuiltForm, Shown
+from lippmann.sequences.forms import INTEGRAL, Form, Output, QuiltForm
 from lippmann.sequences.kept_scene import KeptScene
 from lippmann.sequences.key_frames import KeyFrames, estimate_of_next
 from lippmann.sequences.key_light import KeyLight, LightOfSurfaces
@@ -118,9 +118,9 @@ class Stand:
         scene = self.motion.scene(frame)
         where, exposure = self.where(frame)
         bounds, box = scene.bounds, scene.bounds_in
-        found = stand(where, bounds, self.display, mode=self.mode, bounds_in=box, eye_share=self.eye_share)
-        found = replace(found, exposure=exposure, may_cut=self.may_cut)
-        return found if self.warnings is None else replace(found, warnings=self.warnings)
+        placement = place_at(where, bounds, self.display, mode=self.mode, bounds_in=box, eye_share=self.eye_share)
+        placement = replace(placement, exposure=exposure, may_cut=self.may_cut)
+        return placement if self.warnings is None else replace(placement, warnings=self.warnings)
 
 
 def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> Stand:
@@ -327,9 +327,9 @@ def render_frames(
     frames: Sequence[int],
     where: Stand,
     request: RenderRequest,
-    form: Form[Shown],
+    form: Form[Output],
     progress: ProgressCallback,
-) -> Iterator[tuple[int, Shown]]:
+) -> Iterator[tuple[int, Output]]:
     """The frames of :func:`render_sequence`, in any form, once it is known where the display stands."""
     kept = KeptScene()
     request = hold_exposure(request, motion, display, where, kept.build)
@@ -337,7 +337,7 @@ def render_frames(
     def moment(frame: int) -> Moment:
         return Moment(frame, kept.known(motion.scene(frame)), where(frame))
 
-    def trace(now: Moment, request: RenderRequest, report: ProgressCallback) -> Shown:
+    def trace(now: Moment, request: RenderRequest, report: ProgressCallback) -> Output:
         return form.render(now.scene, display, replace(request, placement=now.placement), report, kept.build)
 
     def render_key(key: Moment, own: RenderRequest, noise_of: int) -> Provenance:
@@ -346,7 +346,7 @@ def render_frames(
     shared = _shared_light(motion, where)
     keys = KeyFrames(display, moment, render_key, shared)
 
-    def render(position: int, frame: int) -> Shown:
+    def render(position: int, frame: int) -> Output:
         now = moment(frame)
         key = keys.before(now, request)
         own = keys.request_of(of_frame(request, keys.noise_of(frame, request)), now, key)

@@ -78,9 +78,9 @@ class KeyFrames:
             assert key.made.spp is not None
             assert self._last is not None
             of_key = f"the estimate of the error follows from frame {key.moment.number}'s"
-            told = f"{of_key}, with three quarters of its samples"
+            estimate_source = f"{of_key}, with three quarters of its samples"
             samples = math.ceil(_SAMPLES_KEPT * key.made.spp)
-            own = replace(request, spp=samples, judged_by=told, keep_light=self._light.of_next)
+            own = replace(request, spp=samples, judged_by=estimate_source, keep_light=self._light.of_next)
             if self._shared is None or not self._shared.holds(self._last[0], moment):
                 return own
             return replace(own, trace_through=self._shared.pass_on if has_next else self._shared.trace_next)
@@ -124,8 +124,8 @@ class KeyFrames:
             key = self.add(last, made, before)
         else:
             key = kept[1]
-        is_told = key.made.estimate is not None and "by_chance" in key.made.estimate
-        return key if is_told and not is_cut(key.moment, moment, self._display) else None
+        has_estimate = key.made.estimate is not None and "by_chance" in key.made.estimate
+        return key if has_estimate and not is_cut(key.moment, moment, self._display) else None
 
 
 def frame_before(frame: int, passes_light_on: bool) -> int | None:

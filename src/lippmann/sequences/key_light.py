@@ -128,7 +128,7 @@ def columns_of(job: Job) -> int:
 
 
 def _each_column(job: Job, pixels: Floats) -> Floats:
-    """What each column that is traced shows of ``pixels`` ``(H, W, 3)``: all colours, or ``(H, 3 W, 1)`` one alone."""
+    """``pixels (H, W, 3)`` in traced columns: as they are, or ``(H, 3 W, 1)`` one colour for each sub-pixel."""
     from lippmann.rendering.transport.ray_source import SubpixelRays
 
     if not isinstance(job.sample_source, SubpixelRays):
@@ -190,14 +190,14 @@ def trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
     from lippmann.rendering.transport.ray_source import SubpixelRays
 
     source = job.sample_source
-    shown = source.own_colors(pixels) if isinstance(source, SubpixelRays) else pixels
+    colors = source.own_colors(pixels) if isinstance(source, SubpixelRays) else pixels
     share = float(is_known.mean())
     shares = {"traced": 1 - share, "reprojected": share, "interpolated": 0.0}
     # Few noisy pixels among clean ones keep more of their noise in the denoiser: up to twice as many samples.
     request = replace(job.request, spp=round((1 + share) * job.request.samples))
     note = f"{100 * share:.0f} % of the pixels have the key frame's light, the others {request.samples} samples"
     if is_known.all():
-        frame = Frame(shown, shares=shares)
+        frame = Frame(colors, shares=shares)
         frame.maps[SAMPLES_LAYER] = np.zeros(is_known.shape, np.uint32)
         return Traced(frame, request.samples, notes=(request.judged_by, note))
     few, places = rays_of(source, ~np.repeat(is_known, columns_of(job), axis=1))
@@ -222,7 +222,7 @@ def trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
     frame.shares = shares
     job.denoiser.restrict_to(~np.repeat(is_known, columns_of(job), axis=1))
     traced = denoise_whole(job, traced)
-    traced.frame.pixels[is_known] = shown[is_known]
+    traced.frame.pixels[is_known] = colors[is_known]
     return traced
 
 

@@ -58,7 +58,7 @@ class _Picture:
     features: NDArray[np.float64]
     probes: Floats
 
-    def seen_in(self, window: PixelWindow, columns: int) -> _Picture:
+    def crop(self, window: PixelWindow, columns: int) -> _Picture:
         """The part that another window of the panel shows; NaN where it shows more."""
         if window == self.window:
             return self
@@ -93,7 +93,7 @@ class StillPixels(KeyLight):
         window, columns = _window_of(job), columns_of(job)
         if self._key is None or window is None:
             return trace(job)
-        key = self._key.seen_in(window, columns)
+        key = self._key.crop(window, columns)
         probes, rays = _trace_probes(job, window)
         self._own = own = _Picture(window, key.pixels, _features_of(job), probes)
         is_known = _find_still(key, own, job)

@@ -129,7 +129,7 @@ class _Account:
                 "output": str(frame.path),
                 "seconds": made.seconds.get("total", 0.0),
                 "spp": made.spp,
-                "found": frame.found,
+                "found": frame.resumed,
                 "estimate": None if made.estimate is None else dict(made.estimate),
             }
         )

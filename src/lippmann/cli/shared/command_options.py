@@ -264,7 +264,7 @@ def _value(each: Field[Any], its: Option, words: Any) -> Any:
 
 
 def _limit_inputs(made: Iterable[Options]) -> AbstractContextManager[None]:
-    """Hold what the command reads from files to its limit of memory, where it has one."""
+    """Limit the memory that input files may take to ``--memory``, where it is given."""
     memory = next((each.memory for each in made if isinstance(each, MachineOptions)), None)
     if memory is None:
         return nullcontext()

@@ -25,7 +25,7 @@ from lippmann.scene.values.whitted_surfaces import ClassicLight
 SIDES = (256, 128, 64, 32, 16)
 #: Cells and entries of all grids together that the finest affordable side may have: 16 MB each.
 MOST_CELLS, MOST_ENTRIES = 1 << 22, 1 << 21
-#: Grids that are worth their building.
+#: Limit on the number of grids; a scene that needs more has none.
 MOST_GRIDS = 64
 #: Entries that a ray's cell may have on the average: with more, walking is as fast.
 MOST_IN_CELL = 48

@@ -38,7 +38,7 @@ _CASTS_SHADOW = 0.99999
 
 
 class Kind(IntEnum):
-    """How a row is to be read."""
+    """Kind of the shape in a row of the table, which says what its columns mean."""
 
     SPHERE = 0
     QUADRIC = 1

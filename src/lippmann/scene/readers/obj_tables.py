@@ -32,7 +32,7 @@ def read_table(lines: Lines, what: str, least: int, where: str, *, colored: bool
     """Numbers ``(n, k)`` of ``v``, ``vt`` or ``vn`` lines; k is the smallest count on any line.
 
     ``colored``: the last three of six numbers are a colour. If some lines have one, the others are white.
-    Where they count to 255, they come divided by it.
+    Colours of up to 255 are divided by 255.
 
     Raises
     ------

@@ -295,7 +295,10 @@ def _octahedral(values: NDArray[np.signedinteger]) -> NDArray[np.signedinteger]:
 
 
 def _quaternions(values: NDArray[np.signedinteger]) -> NDArray[np.signedinteger]:
-    """Unit quaternions without their largest component, which the last two bits name; the rest of that number is 1."""
+    """Unit quaternions from three components each, without the largest.
+
+    The two lowest bits of the fourth number name the largest; with them set, that number is the scale of 1.
+    """
     whole = values.astype(np.int64)
     one = (whole[:, 3] | 3).astype(np.float64)
     parts = whole[:, :3] / one[:, None] * 0.5**0.5

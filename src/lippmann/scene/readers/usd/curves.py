@@ -98,7 +98,7 @@ class Curves:
     def _by_length(
         self, values: Floats, needed: Integers, points: Integers, pieces: int, at: Callable[[Floats, int], Floats]
     ) -> Floats:
-        """What ``at`` makes of the values of curves, of all that have the same number of them at once."""
+        """Sample all curves by ``at``, in one call for those that have the same number of vertices."""
         sampled = np.empty((int(points.sum()), values.shape[1]))
         first, begin = np.cumsum(needed) - needed, np.cumsum(points) - points
         for count in np.unique(self.counts[points > 0]):

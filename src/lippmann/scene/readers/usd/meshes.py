@@ -375,7 +375,7 @@ class _Sampler:
     stage_corners: int
 
     def at_corners(self, values: FloatArray, interpolation: str) -> FloatArray | None:
-        """Values ``(c, k)``; None where there are not as many as the mesh needs."""
+        """A primvar's values at the corners of faces, ``(c, k)``; None where their number does not fit the mesh."""
         refined = self.polygons.refined
         if interpolation == "constant":
             return np.broadcast_to(values[:1], (len(self.corners), values.shape[1])) if len(values) else None
