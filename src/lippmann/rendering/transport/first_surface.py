@@ -175,7 +175,7 @@ class PhysicalSurfaces:
             emission = si.emitter(self._scene).eval(si, active & ~shows_backdrop)
             if dr.hint(self._background is not None, mode="scalar"):
                 emission = dr.select(shows_backdrop, mi.Color3f(self._background), emission)
-            # In a branch, so that the processor skips it for a vector of lanes that have met rough surfaces alone.
+            # In branches, so that the processor skips them for a vector of lanes that have met rough surfaces alone.
             lobe, weight, wo = mi.UInt32(0), mi.Color3f(0), mi.Vector3f(0)
             if hit & (_has_specular_lobe(bsdf.flags()) | ~_has_reflectance(bsdf)):
                 bs, sampled = _central_sample(si, bsdf, hit)
@@ -188,10 +188,11 @@ class PhysicalSurfaces:
             distance += dr.select(active, dr.select(hit, si.t, ENVIRONMENT_DISTANCE), 0)
             tint *= weight
             steps += 1
-            onward = si.spawn_ray(si.to_world(wo))
-            o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
             active &= continues
-            pi = self._scene.ray_intersect_preliminary(onward, coherent=False, active=active)
+            if active:
+                onward = si.spawn_ray(si.to_world(wo))
+                o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
+                pi = self._scene.ray_intersect_preliminary(onward, coherent=False, active=active)
         return albedo, normal, distance, covered
 
 
