@@ -341,3 +341,28 @@ def test_faces_choose_their_texture_by_texnumber(read, tmp_path, numbered):
     else:
         assert set(looks.values()) == {(255, 0, 0)}
         assert "only the first of 2 textures is used: no face says its texnumber" in scene.notes
+
+
+@pytest.mark.parametrize("is_named", [True, False])
+def test_textures_of_artec_s_programs(read, tmp_path, is_named):
+    comments = "comment TextureFile model_0.png\ncomment TextureFile model_1.png\n" if is_named else ""
+    for number, color in enumerate([(255, 0, 0), (0, 0, 255)]):
+        Pillow.new("RGB", (1, 1), color).save(tmp_path / f"model_{number}.png")
+    head = header("ascii", faces=2, comment=comments).replace(
+        "end_header",
+        "element multi_texture_vertex 4\nproperty uchar tx\nproperty float u\nproperty float v\n"
+        "element multi_texture_face 2\nproperty uchar tx\nproperty uint tn\n"
+        "property list uchar int texture_vertex_indices\nend_header",
+    )
+    rows = [" ".join(map(str, vertex)) for vertex in VERTICES] + ["3 0 1 2", "3 1 4 2"]
+    rows += ["0 0 0", "0 0.25 0", "0 0.25 0.5", "0 0 0.5"]
+    rows += ["1 1 3 0 1 2", "0 0 3 3 2 1"]  # the second face first
+    scene = read((head + "\n".join(rows) + "\n").encode())
+    color = {}
+    for mesh in scene.meshes[:2]:
+        texture = scene.materials[mesh.material].base_color_texture
+        for corner, uv in zip(mesh.positions[mesh.faces[0]], mesh.uvs[0][mesh.faces[0]], strict=True):
+            color[tuple(corner)] = (*texture.image.pixels[0, 0].tolist(), *uv.tolist())
+    assert color[0, 0, 0] == (255, 0, 0, 0.0, 0.5)
+    assert color[2, 0.5, 0] == (0, 0, 255, 0.25, 1.0)
+    assert scene.notes == []

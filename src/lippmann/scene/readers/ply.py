@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.far_origin import near_origin
-from lippmann.scene.parsing.files import MissingFileError, NamedFiles, read_bytes, read_image
+from lippmann.scene.parsing.files import MissingFileError, NamedFiles, is_file, read_bytes, read_image
 from lippmann.scene.parsing.normals import unit_normals
 from lippmann.scene.parsing.ply_body import Columns, Integers, Lists, Numbers, read_body
 from lippmann.scene.parsing.ply_header import Element, Header, read_header
@@ -44,8 +44,11 @@ _COLOR_NAMES = (
 #: Properties of vertices that are shown.
 _KNOWN = {"x", "y", "z", "nx", "ny", "nz"}.union(*_UV_NAMES, *_COLOR_NAMES)
 
-#: Elements that are shown.
-_ELEMENTS = ("vertex", "face", "tristrips")
+#: Elements that are shown; those of Artec's programs have the texture coordinates of corners, and their textures.
+_UV_VERTICES, _UV_FACES = "multi_texture_vertex", "multi_texture_face"
+_ELEMENTS = ("vertex", "face", "tristrips", _UV_VERTICES, _UV_FACES)
+#: Endings of the pictures that these programs write beside a file that names none.
+_BESIDE = (".png", ".jpg", ".jpeg", ".bmp")
 
 #: More vertices than any file has.
 _MOST_VERTICES = 1 << 53
@@ -91,6 +94,8 @@ def describe_polygons(
     stepped_over = [each.name[:40] for each in header.elements if each.count and each.name not in _ELEMENTS]
     if stepped_over:
         notes.append(f"elements not shown: {', '.join(stepped_over[:20])}")
+    if _UV_FACES in columns:
+        columns = _with_corner_uvs(columns)
     outline = _outline(columns, where)
     if not len(outline.sizes):
         return replace(_cloud(columns["vertex"], elements["vertex"], path.stem, notes, where), up=header.up)
@@ -98,7 +103,7 @@ def describe_polygons(
     if "face" in elements and all(_color_names(elements[name]) for name in ("vertex", "face")):
         notes.append("colours of faces are not shown: vertices have their own")
     textures: list[Texture | None] = []
-    for name in header.textures:
+    for name in header.textures or (_beside(path) if _UV_FACES in columns else []):
         try:
             image = NamedFiles.of(path, files).find(name, where=where, what="texture")
         except MissingFileError as error:
@@ -121,6 +126,41 @@ def describe_polygons(
     meshes = [without_doubled_colors(each, materials[each.material], notes) for each in meshes]
     instances = [Instance(number, np.eye(4)) for number, mesh in enumerate(meshes) if len(mesh.faces)]
     return SceneDescription(path.stem, meshes, materials, instances, notes=notes, up=header.up)
+
+
+def _with_corner_uvs(columns: Mapping[str, Columns]) -> Mapping[str, Columns]:
+    """Artec's texture coordinates, and numbers of textures, as those of the faces, which ``tn`` names."""
+    face, own, vertices = (columns.get(name, {}) for name in ("face", _UV_FACES, _UV_VERTICES))
+    outline = next((face[name] for name in ("vertex_indices", "vertex_index") if name in face), None)
+    indices, u, v = own.get("texture_vertex_indices"), vertices.get("u"), vertices.get("v")
+    if not isinstance(indices, Lists) or not isinstance(outline, Lists) or len(indices.sizes) != len(outline.sizes):
+        return columns
+    if not isinstance(u, np.ndarray) or not isinstance(v, np.ndarray):
+        return columns
+    entry_of_face = np.argsort(np.asarray(own.get("tn", np.arange(len(indices.sizes)))), kind="stable")
+    starts = (np.cumsum(indices.sizes) - indices.sizes)[entry_of_face]
+    sizes = indices.sizes[entry_of_face]
+    if not np.array_equal(sizes, outline.sizes):
+        return columns
+    within = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    places = indices.values[np.repeat(starts, sizes) + within].astype(np.int64)
+    if not ((places >= 0) & (places < len(u))).all():
+        return columns
+    more: dict[str, Numbers | Lists] = {"texcoord": Lists(np.stack([u[places], v[places]], axis=1).ravel(), 2 * sizes)}
+    if isinstance(numbers := own.get("tx"), np.ndarray):
+        more["texnumber"] = numbers[entry_of_face]
+    return {**columns, "face": {**more, **face}}
+
+
+def _beside(path: Path) -> list[str]:
+    """Pictures called as the file, and counted from 0: ``scan_0.jpg``."""
+    names: list[str] = []
+    while True:
+        nearest = [f"{path.stem}_{len(names)}{ending}" for ending in _BESIDE]
+        present = [name for name in nearest if is_file(path.parent / name)]
+        if not present:
+            return names
+        names.append(present[0])
 
 
 def _material(name: str, texture: Texture | None, mesh: Mesh) -> Material:

@@ -269,6 +269,57 @@ def test_prototypes_below_an_over_are_placed_and_not_shown_by_themselves(read, h
     assert scene.notes == ([] if copies else [lost])
 
 
+def test_copies_have_the_display_colours_that_they_inherit(read):
+    copies = "".join(
+        f'def Xform "{name}" (instanceable = true\n prepend references = </kept>) {{\n'
+        f'color3f[] primvars:displayColor = [{color}] (interpolation = "constant")\n}}\n'
+        for name, color in (("red", "(1, 0, 0)"), ("blue", "(0, 0, 1)"))
+    )
+    scene = read('class "kept" {' + triangle() + "}\n" + copies)
+    assert [mesh.colors[0].tolist() for mesh in scene.meshes] == [[1, 0, 0], [0, 0, 1]]
+
+
+INSTANCER = """
+def PointInstancer "many" {{
+    point3f[] positions = [{positions}]
+    int[] protoIndices = [{kinds}]
+    color3f[] primvars:displayColor = [{colors}] (interpolation = "vertex")
+    rel prototypes = [</many/a>, </many/b>]
+"""
+
+
+def test_colours_of_copies_are_those_of_prototypes_without_their_own(read):
+    head = INSTANCER.format(
+        positions="(1, 0, 0), (2, 0, 0), (3, 0, 0), (4, 0, 0)",
+        kinds="0, 0, 0, 1",
+        colors="(1, 0, 0), (0, 0, 1), (1, 0, 0), (1, 0, 0)",
+    )
+    scene = read(head + triangle("a") + triangle("b", "color3f[] primvars:displayColor = [(0, 1, 0)]") + "}")
+    shown = {
+        tuple(scene.meshes[each.mesh].colors[0].tolist()): np.reshape(each.world_from_mesh, (-1, 4, 4))[
+            :, 0, 3
+        ].tolist()
+        for each in scene.instances
+    }
+    assert shown == {(1, 0, 0): [1, 3], (0, 0, 1): [2], (0, 1, 0): [4]}
+    assert scene.notes == []
+
+
+def test_many_colours_of_copies_are_rounded(read):
+    count = 300
+    places = ", ".join(f"({n}, 0, 0)" for n in range(count))
+    colors = ", ".join(f"({n / count}, 0.5, 1)" for n in range(count))
+    head = INSTANCER.format(positions=places, kinds=", ".join(["0"] * count), colors=colors)
+    scene = read(head + triangle("a") + triangle("b") + "}")
+    red = {
+        round(float(mesh.colors[0, 0]), 1): instance
+        for mesh, instance in zip(scene.meshes, scene.instances, strict=True)
+    }
+    assert sorted(red) == [0.0, 0.2, 0.4, 0.6, 0.8, 1.0]
+    assert sum(len(each.world_from_mesh) for each in red.values()) == count
+    assert scene.notes == ["/many: colours of copies are rounded to those of six steps a channel"]
+
+
 def test_instancers_that_hold_themselves_end(read):
     body = (
         'def PointInstancer "a" {\npoint3f[] positions = [(1, 0, 0)]\nint[] protoIndices = [0]\n'

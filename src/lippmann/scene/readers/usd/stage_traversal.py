@@ -20,6 +20,8 @@ Matrices = NDArray[np.float64]
 
 #: Copies of all meshes together.
 _MOST_COPIES = 1 << 21
+#: Colours of the copies of one prototype, each of which has meshes of its own.
+_MOST_COLORS = 256
 #: Point instancers within the prototypes of others.
 _DEEPEST = 16
 
@@ -53,6 +55,7 @@ class Traversal:
         self._lights: list[Record] = []
         self._cameras: list[Record] = []
         self._splats: list[Record] = []
+        self._copy_color: tuple[float, ...] | None = None
         self._copies = 0
         self._unread: dict[str, int] = {}
 
@@ -152,7 +155,8 @@ class Traversal:
         own = prim.GetPrimInPrototype() if prim.IsInstanceProxy() and skin is None else prim
         inherited = {name: inherited_color(prim, name) for name in self._materials.color_names}
         colors = {name: color for name, color in inherited.items() if color is not None}
-        key = (own.GetPath(), material, str(colors))
+        copy_color = self._copy_color if self._shows_color(prim, material) else None
+        key = (own.GetPath(), material, str(colors), copy_color)
         worlds = base @ place
         self._count(len(worlds))
         if key not in self._meshes:
@@ -162,8 +166,19 @@ class Traversal:
                 record = mesh_record(UsdGeom.Mesh(prim), self._time, self._arrays, self._materials, skin)
             else:
                 record = primitive_record(prim, self._time, self._arrays, self._materials)
+            if copy_color is not None:
+                values = self._arrays.add(np.array([copy_color], np.float32))
+                record["colors"]["displayColor"] = {"values": values, "interpolation": "constant"}
             self._meshes[key] = {**record, "name": str(prim.GetPath()), "material": material}
         self._worlds.setdefault(key, []).append(worlds)
+
+    def _shows_color(self, prim: Usd.Prim, material: int) -> bool:
+        """Whether a prim has no display colour of its own, and would show one that its copy has."""
+        if _has_own(prim, "displayColor"):
+            return False
+        if material < 0:
+            return True
+        return self._materials.records[material]["inputs"].get("diffuseColor", {}).get("primvar") == "displayColor"
 
     def _add_instancer(self, instancer: UsdGeom.PointInstancer, worlds: Matrices, depth: int) -> None:
         name = str(instancer.GetPath())
@@ -177,10 +192,10 @@ class Traversal:
             raise StageError(f"{name} has {len(places)} places for {len(kinds)} copies", rule="one each")
         if len(kinds) and not 0 <= kinds.min() <= kinds.max() < len(targets):
             raise StageError(f"{name} has {len(targets)} prototypes, counted from 0, and names {kinds.max()}")
-        if UsdGeom.PrimvarsAPI(instancer.GetPrim()).HasPrimvar("displayColor"):
-            self.notes["colours of a point instancer's copies are not read: they have those of its prototypes"] = None
+        colors = self._colors_of_copies(instancer, len(kinds))
         for number, target in enumerate(targets):
-            own = places[(kinds == number) & visible]
+            chosen = (kinds == number) & visible
+            own = places[chosen]
             prim = self._stage.GetPrimAtPath(target)
             if not len(own):
                 continue
@@ -194,8 +209,28 @@ class Traversal:
             if not np.linalg.det(parent):
                 self.notes[f"{target}: lies under a transformation that is flat, and is left out"] = None
                 continue
-            copies = (worlds[:, None] @ own[None]).reshape(-1, 4, 4)
-            self._visit(prim, copies, np.asarray(np.linalg.inv(parent), np.float64), depth + 1)
+            base_from_world = np.asarray(np.linalg.inv(parent), np.float64)
+            outer = self._copy_color
+            for color in [None] if colors is None else np.unique(colors[chosen], axis=0):
+                of_color = own if color is None else places[chosen & (colors == color).all(axis=1)]
+                self._copy_color = outer if color is None else tuple(color.tolist())
+                self._visit(prim, (worlds[:, None] @ of_color[None]).reshape(-1, 4, 4), base_from_world, depth + 1)
+            self._copy_color = outer
+
+    def _colors_of_copies(self, instancer: UsdGeom.PointInstancer, count: int) -> NDArray[np.float32] | None:
+        """Display colours ``(count, 3)``; of more than are kept apart, the nearest of six steps a channel."""
+        primvar = UsdGeom.PrimvarsAPI(instancer.GetPrim()).GetPrimvar("displayColor")
+        values = primvar.ComputeFlattened(self._time) if primvar and primvar.HasValue() else None
+        if not values:
+            return None
+        colors = np.asarray(values, np.float32)
+        if colors.shape not in ((1, 3), (count, 3)):
+            self.notes[f"{instancer.GetPath()}: {len(colors)} colours for {count} copies are not read"] = None
+            return None
+        if len(np.unique(colors, axis=0)) > _MOST_COLORS:
+            self.notes[f"{instancer.GetPath()}: colours of copies are rounded to those of six steps a channel"] = None
+            colors = np.rint(np.clip(colors, 0.0, 1.0) * 5.0) / np.float32(5.0)
+        return np.broadcast_to(colors, (count, 3))
 
     def _count(self, copies: int) -> None:
         self._copies += copies
@@ -205,11 +240,16 @@ class Traversal:
 
 def inherited_color(prim: Usd.Prim, name: str) -> Any:
     """The primvar that a prim inherits, such as the display colour of a prototype's copy; None for its own or none."""
-    primvars = UsdGeom.PrimvarsAPI(prim)
-    if primvars.HasPrimvar(name):
+    if _has_own(prim, name):
         return None
-    inherited = primvars.FindPrimvarWithInheritance(name)
+    inherited = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
     return inherited.Get() if inherited else None
+
+
+def _has_own(prim: Usd.Prim, name: str) -> bool:
+    """Whether a prim has values of a primvar, whose attribute may come with its type."""
+    primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar(name)
+    return bool(primvar) and bool(primvar.HasAuthoredValue())
 
 
 def _instance_matrices(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode) -> Matrices:
