@@ -269,6 +269,13 @@ def test_prototypes_below_an_over_are_placed_and_not_shown_by_themselves(read, h
     assert scene.notes == ([] if copies else [lost])
 
 
+def test_colours_at_the_points_of_shapes_by_numbers_are_told_of(read):
+    colors = 'color3f[] primvars:displayColor = [(1, 0, 0), (0, 0, 1)] (interpolation = "vertex")'
+    scene = read(f'def Cube "c" {{\n{colors}\n}}')
+    assert scene.meshes[0].colors[0].tolist() == [1, 0, 0]
+    assert scene.notes == ["/c: of its 2 display colours the first is shown"]
+
+
 def test_copies_have_the_display_colours_that_they_inherit(read):
     copies = "".join(
         f'def Xform "{name}" (instanceable = true\n prepend references = </kept>) {{\n'

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,10 +123,17 @@ class MeshReader:
         for uv_name in self._surface(record["material"]).uv_names:
             self._note_no_uvs(record, uv_name)
             mesh = replace(mesh, uvs=(*mesh.uvs, np.zeros((len(mesh.positions), 2), np.float32)))
-        colors = self._colors(record, record["material"], lambda primvar, _: self._array(primvar, "values")[:1])
+        colors = self._colors(record, record["material"], partial(self._first, record["name"]))
         if colors is not None:
             mesh = replace(mesh, colors=np.broadcast_to(colors, (len(mesh.positions), colors.shape[1])))
         return [Part(record["material"], mesh, scale)]
+
+    def _first(self, name: str, primvar: Record, what: str) -> NDArray[np.generic]:
+        """The first value of a primvar: shapes by numbers have no points that others could belong to."""
+        values = self._array(primvar, "values")
+        if len(values) > 1:
+            self.notes[f"{name}: of its {len(values)} {what} the first is shown"] = None
+        return values[:1]
 
     def _thin(self, record: Record) -> list[Part]:
         """Balls about points, rods along curves: of the widths that the stage gives, else as other formats have them.

@@ -178,7 +178,9 @@ class Traversal:
             return False
         if material < 0:
             return True
-        return self._materials.records[material]["inputs"].get("diffuseColor", {}).get("primvar") == "displayColor"
+        return bool(
+            self._materials.records[material]["inputs"].get("diffuseColor", {}).get("primvar") == "displayColor"
+        )
 
     def _add_instancer(self, instancer: UsdGeom.PointInstancer, worlds: Matrices, depth: int) -> None:
         name = str(instancer.GetPath())
