@@ -39,7 +39,7 @@ def with_flicker(estimate: Figures | None, traced: float = 1.0, *, stays: bool =
     by_chance, psnr, low, high = (
         cast("float", estimate[name]) for name in ("by_chance", "psnr", "psnr_low", "psnr_high")
     )
-    fewer = -10 * math.log10(max(traced, 0.01))
+    fewer = -10 * math.log10(max(traced, 0.01))  # finite where no pixel was traced: 20 dB
     middle = mean_psnr((by_chance, psnr)) + (fewer if stays else 0.0)
     most = max(by_chance, high) + fewer
     return {**estimate, "flicker": round(middle, 2), "flicker_low": low, "flicker_high": round(most, 2)}
