@@ -99,6 +99,45 @@ def test_images_repeat_and_are_decoded_by_their_colour_space(read):
     assert scene.notes == []
 
 
+@pytest.mark.parametrize(
+    ("kind", "factor", "scale"),
+    [("color3", "color3f inputs:in2 = (1, 0.5, 0)", (1, 0.5, 0)), ("color3FA", "float inputs:in2 = 0.5", (0.5,) * 3)],
+)
+def test_an_image_times_a_value_at_coordinates_that_are_placed(read, kind, factor, scale):
+    nodes = f"""
+    def Shader "m" {{
+        uniform token info:id = "ND_multiply_{kind}"
+        color3f inputs:in1.connect = </mat/t.outputs:out>
+        {factor}
+        color3f outputs:out
+    }}
+    def Shader "t" {{
+        uniform token info:id = "ND_image_color3"
+        asset inputs:file = @t.png@
+        float2 inputs:texcoord.connect = </mat/p.outputs:out>
+        color3f outputs:out
+    }}
+    def Shader "p" {{
+        uniform token info:id = "ND_place2d_vector2"
+        float2 inputs:scale = (0.5, 0.25)
+        float2 inputs:offset = (0.125, 0)
+        float inputs:rotate = 90
+        float2 inputs:pivot = (0.5, 0.5)
+        float2 outputs:out
+    }}
+"""
+    scene = read(
+        material_x(STANDARD, "color3f inputs:base_color.connect = </mat/m.outputs:out>", nodes),
+        files={"t.png": png(PICTURE)},
+    )
+    material = scene.materials[0]
+    assert material.base_color == pytest.approx(scale)
+    # Scaled to (2 u, 4 v) about the middle, (x, y) turned to (y, -x), then moved by the offset.
+    u, v, _ = material.base_color_texture.uv_transform @ (0.75, 1.0 - 0.625, 1.0)
+    assert (u, 1.0 - v) == pytest.approx((0.5 + 4 * 0.125 - 0.125, 0.5 - 2 * 0.25))
+    assert scene.notes == []
+
+
 def test_the_surface_for_all_wins_over_those_of_one_renderer(read):
     body = material_x(STANDARD, "color3f inputs:base_color = (1, 0, 0)")
     preview = """

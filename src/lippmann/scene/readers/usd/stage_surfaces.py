@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 from pxr import Usd, UsdShade
 
 from lippmann.scene.readers.usd.records import Record
@@ -205,7 +206,9 @@ def _mix(below: Record, above: Record, share: float) -> Record:
 def _scale(source: Record, factors: list[float]) -> Record:
     """A colour times a factor of each channel."""
     if "texture" in source:
-        return {**source, "texture": {**source["texture"], "scale": {"value": [*factors, 1.0]}}}
+        own = source["texture"].get("scale", {}).get("value", [1.0] * 4)
+        scale = [a * b for a, b in zip(own, [*factors, 1.0], strict=True)]
+        return {**source, "texture": {**source["texture"], "scale": {"value": scale}}}
     value = source.get("value")
     return {"value": [a * b for a, b in zip(value, factors, strict=True)]} if isinstance(value, list) else source
 
@@ -263,6 +266,36 @@ def _separate(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record 
     return {**source, "channel": index} if "texture" in source else None
 
 
+def _multiply(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+    """An image, or a value, times a value; None of two images."""
+    one, other = given.get("in1", {}), given.get("in2", {"value": 1.0})
+    if "value" not in other:
+        one, other = other, one
+    factor = other.get("value")
+    if isinstance(factor, float) and isinstance(one.get("value"), float):
+        return {"value": factor * one["value"]}
+    factors = [factor] * 3 if isinstance(factor, float) else factor
+    return _scale(one, factors) if one and isinstance(factors, list) and len(factors) == 3 else None
+
+
+def _place(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record:
+    """Texture coordinates that are divided by a scale, turned clockwise and moved back, all about a pivot."""
+    pivot, offset = (np.array(given.get(name, {}).get("value", [0.0, 0.0])) for name in ("pivot", "offset"))
+    scale = np.array(given.get("scale", {}).get("value", [1.0, 1.0]))
+    angle = _number(given, "rotate", 0.0)
+    scale = 1.0 / np.where(scale == 0.0, 1.0, scale)
+    cos, sin = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    shift = pivot - offset - np.array([[cos, sin], [-sin, cos]]) @ (scale * pivot)
+    return {
+        "transform": {
+            "in": given.get("texcoord", {"primvar": "st"}),
+            "scale": {"value": scale.tolist()},
+            "rotation": {"value": -angle},
+            "translation": {"value": shift.tolist()},
+        }
+    }
+
+
 def _coordinates(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record:
     name = (given.get("geomprop") or given.get("varname") or {}).get("value", "st")
     return {"primvar": name, "fallback": given.get("default")}
@@ -275,6 +308,8 @@ _NODES: dict[str, Callable[[str, str, Record, Usd.Prim], Record | None]] = {
     "ND_convert_": _passed_on,
     "ND_dot_": _passed_on,
     "ND_constant_": _passed_on,
+    "ND_multiply_": _multiply,
+    "ND_place2d_": _place,
     "ND_extract_": _separate,
     "ND_separate": _separate,
     "ND_texcoord_": _coordinates,
