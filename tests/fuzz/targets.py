@@ -571,6 +571,8 @@ _READERS: dict[str, Target] = {
     "ply": Target(_scene("s.ply")),
     "ply-splats": Target(_scene("s.ply")),
     "spz": Target(_spz),
+    "splat": Target(_scene("s.splat")),
+    "pcd": Target(_scene("s.pcd")),
     "sog": Target(_sog, tree=part_tree(b"meta.json")),
     "stl": Target(_scene("s.stl")),
     "off": Target(_scene("s.off")),

@@ -75,7 +75,7 @@ def test_up_of_what_says_it_itself_is_refused():
         ("cup.zae", "unzip it"),
         ("cup.obj.gz", "unpack it"),
         ("water.cube", "obabel in.cube"),
-        ("room.splat", "SuperSplat"),
+        ("room.ksplat", "SuperSplat"),
         ("tower.laz", "CloudCompare"),
         ("points3D.txt", "COLMAP.s by its model_converter"),
         ("scan.xyzrgb", "CloudCompare"),

@@ -99,8 +99,8 @@ _ELSEWHERE = {
     ".amf": "save it as .stl in the slicer",
     **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar"), "unpack it, and name the scene file inside"),
     ".zae": "unzip it, open the .dae in Blender, then File > Export > glTF 2.0 (.glb)",
-    **dict.fromkeys((".splat", ".ksplat", ".lcc"), "open it in SuperSplat (superspl.at/editor), export it as .ply"),
-    **dict.fromkeys((".las", ".laz", ".e57", ".pcd", ".pts", ".ptx", ".xyzrgb"), _CLOUD_COMPARE),
+    **dict.fromkeys((".ksplat", ".lcc"), "open it in SuperSplat (superspl.at/editor), export it as .ply"),
+    **dict.fromkeys((".las", ".laz", ".e57", ".pts", ".ptx", ".xyzrgb"), _CLOUD_COMPARE),
     ".txt": "save clouds of points as .ply, in CloudCompare for instance, COLMAP's by its model_converter",
     **dict.fromkeys((".mrc", ".map", ".ccp4"), "save it as .npy: numpy.save('a.npy', mrcfile.read('a.mrc'))"),
     **{kind: _OPEN_BABEL.format(kind) for kind in (".cube", ".gro", ".mae", ".pqr")},
@@ -129,11 +129,11 @@ def load_scene(
     Parameters
     ----------
     source:
-        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.spz``, ``.sog``, ``.stl``, ``.off``, ``.blend``, ``.usd``
-        (``.usda``, ``.usdc``, ``.usdz``), Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff`` file; of a volume (``.nii``,
-        ``.nii.gz``, ``.nrrd``, ``.mha``, ``.mhd``, ``.vdb``, ``.npy``, ``.npz``, Mitsuba ``.vol``, ``.dcm`` or a folder
-        of such) or of VTK (``.vtp``, ``.vtu``, ``.vtk``, ``.vti``); name of a bundled scene; a ``mi.Scene`` or Mitsuba
-        dict; a trimesh scene or mesh; a PyVista data set or plotter; a
+        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.pcd``, ``.spz``, ``.splat``, ``.sog``, ``.stl``, ``.off``,
+        ``.blend``, ``.usd`` (``.usda``, ``.usdc``, ``.usdz``), Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff`` file; of
+        a volume (``.nii``, ``.nii.gz``, ``.nrrd``, ``.mha``, ``.mhd``, ``.vdb``, ``.npy``, ``.npz``, Mitsuba ``.vol``,
+        ``.dcm`` or a folder of such) or of VTK (``.vtp``, ``.vtu``, ``.vtk``, ``.vti``); name of a bundled scene; a
+        ``mi.Scene`` or Mitsuba dict; a trimesh scene or mesh; a PyVista data set or plotter; a
         :class:`~lippmann.scene.values.description.SceneDescription`.
     light:
         A :class:`~lippmann.options.light.LightOptions`, or a dict of them: turns and scales the scene's light.
@@ -417,8 +417,9 @@ def _upright(description: SceneDescription, suffix: str, reader: Reader, up: Up 
         notes.append("up is taken as -y, as trainers of splats have it, for nothing in the file says it (else up=y)")
     if is_guessed and suffix == ".spz":
         notes.append("up is taken as +y, as SPZ has it, but some programs leave it at -y (then up=-y)")
-    if is_guessed and suffix in (".ply", ".off") and usual == "y":
-        notes.insert(0, "up is taken as +y, for nothing in the data says it (else up=z)")
+    if is_guessed and suffix in (".ply", ".off", ".pcd") and usual == "y":
+        others = "z, or -y of depth cameras" if suffix == ".pcd" else "z"
+        notes.insert(0, f"up is taken as +y, for nothing in the data says it (else up={others})")
     if is_guessed and suffix in VTK:
         notes.append(f"up is taken as +y, for nothing in {suffix} files says it (else up=z)")
     matrix = _turn_up(_DIRECTIONS[up or usual] if up is not None or description.up is None else description.up)

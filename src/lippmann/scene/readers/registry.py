@@ -166,9 +166,11 @@ _OWN = {
     "nff": Reader((".nff",), f"{_HERE}.nff:read_nff"),
     "obj": Reader((".obj",), f"{_HERE}.obj:read_obj", options=("files",), up="y"),
     "ply": Reader((".ply",), f"{_HERE}.ply:read_ply", {b"ply\n": ".ply", b"ply\r": ".ply"}, ("files",), "y"),
+    "pcd": Reader((".pcd",), f"{_HERE}.pcd:read_pcd", {b"# .PCD": ".pcd"}, up="y"),
     "off": Reader((".off",), f"{_HERE}.off:read_off", up="y"),
     "sog": Reader((".sog",), f"{_HERE}.splats.sog:read_sog", options=("files",), up="-y"),
     "spz": Reader((".spz",), f"{_HERE}.splats.spz:read_spz", up="y"),
+    "splat": Reader((".splat",), f"{_HERE}.splats.splat:read_splat", up="-y"),
     "stl": Reader((".stl",), f"{_HERE}.stl:read_stl", up="z"),
     "3mf": Reader((".3mf",), f"{_HERE}.three_mf.reader:read_three_mf", up="z"),
     "usd": Reader(
