@@ -311,15 +311,15 @@ def test_classic_models_refuse_other_light_and_materials_than_the_files(asked, n
 @pytest.mark.parametrize(
     ("options", "light", "request_options", "said"),
     [
-        ({"background": (1, 1, 1)}, {}, {}, "background beside normal; normal is a property .*; leave it out"),
-        ({}, {"light_turn": (20, 0)}, {}, "light_turn beside normal"),
-        ({}, {}, {"depth": 3}, "depth beside normal"),
-        ({"single_scattering": True}, {}, {"depth": 3}, "depth and single_scattering beside normal; .* leave them out"),
+        ({"background": (1, 1, 1)}, {}, {}, "integrator: background beside normal; .*; leave out background"),
+        ({}, {"light_turn": (20, 0)}, {}, "integrator: light_turn beside normal"),
+        ({}, {}, {"depth": 3}, "depth: 3: normal follows no path"),
+        ({"single_scattering": True}, {"light_strength": 2.0}, {}, "leave out light_strength and single_scattering"),
     ],
 )
 def test_a_property_of_surfaces_has_no_light(options, light, request_options, said):
     scene = load_scene("teapot", light=light, **options)
-    with pytest.raises(UsageError, match=f"integrator: {said}"):
+    with pytest.raises(UsageError, match=said):
         resolve(RenderRequest(integrator="normal", **request_options), scene)
     assert resolve(RenderRequest(integrator="path", **request_options), scene).integrator == "path"
 

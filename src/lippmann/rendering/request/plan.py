@@ -212,19 +212,13 @@ def _integrator(request: RenderRequest, scene: Scene) -> Choice[Integrator]:
 
 
 def _depth(request: RenderRequest, scene: Scene, integrator: Integrator) -> Choice[int]:
-    lit = integrator not in PROPERTIES
-    names = {"environment", "single_scattering"} if lit else {"environment", "single_scattering", "background"}
-    asked = {line.partition(" ")[0] for line in scene.settings} & names | {*changed_options(scene.light)}
-    if not lit and request.depth is not None and request.plan is None:
-        asked.add("depth")
-    if asked and (integrator == "classic" or not lit):
+    asked = {line.partition(" ")[0] for line in scene.settings} & {"environment", "single_scattering"}
+    if integrator == "classic" and (asked := {*asked, *changed_options(scene.light)}):
         raise UsageError(
-            f"{' and '.join(sorted(asked))} beside {integrator}",
+            f"{' and '.join(sorted(asked))} beside classic",
             parameter="integrator",
-            rule="classic light models know the light and the materials of the file alone"
-            if lit
-            else f"{integrator} is a property of the first surface, whatever lights it",
-            fix='use integrator="path"' if lit else f"leave {'it' if len(asked) == 1 else 'them'} out",
+            rule="classic light models know the light and the materials of the file alone",
+            fix='use integrator="path"',
         )
     if request.depth is not None:
         return Choice(request.depth)

@@ -6,6 +6,7 @@ from lippmann.display import Display
 from lippmann.errors import PictureError, UsageError
 from lippmann.options.choices import LIGHT, POOLED_LIGHT, PROPERTIES, REUSING
 from lippmann.options.forms import LEFT_OUT, REUSES_NOTHING, Form
+from lippmann.options.option import changed_options
 from lippmann.rendering.request.render_request import RenderRequest, format_value
 from lippmann.scene.scene import Scene
 
@@ -58,16 +59,22 @@ def check_scene(request: RenderRequest, scene: Scene) -> None:
     Raises
     ------
     UsageError
-        The request asks for direct light, caustics, depth or less indirect light where nothing is lit; or, of Gaussian
+        The request asks for direct light, caustics, depth or less indirect light where nothing is lit; for a surface
+        property beside light, a background or depth; or, of Gaussian
         splats or a volume, for a surface property, for pooling or denoising, or for an exposure.
     """
     is_own, own = scene.keeps_its_colors, "all in this scene has a colour of its own, whatever light is given"
     refusals = _of_surfaces(request, scene) if scene.lies_off_surfaces else []
     goes_on = request.depth is not None and request.plan is None  # frames of a sequence are planned again
     caustics = request.caustics != "auto" and request.plan is None
+    name, is_property = request.integrator, request.integrator in PROPERTIES
+    names = {line.partition(" ")[0] for line in scene.settings} & {"environment", "single_scattering", "background"}
+    light, rule = " and ".join(sorted(names | {*changed_options(scene.light)})), "it is told of the first surface alone"
     _refuse(
         [
             *refusals,
+            (is_property and bool(light), f"{light} beside {name}", "integrator", rule, f"leave out {light}"),
+            (is_property and goes_on, f"{request.depth}: {name} follows no path", "depth", rule, _LEAVE),
             (is_own and request.integrator == "direct", "no light falls on it", "integrator", own, _LEAVE),
             (is_own and caustics, "no light makes any on it", "caustics", own, _LEAVE),
             (is_own and goes_on, f"{request.depth}: no path goes on from it", "depth", own, _LEAVE),
