@@ -182,8 +182,7 @@ class VolumeSelection:
             volume = part
         transfer, before = self._transfer(volume), transfer_note(volume.transfer)
         notes = [transfer_note(transfer) if note == before else note for note in description.notes]
-        shown = replace(description, volume=replace(volume, transfer=transfer), notes=notes)
-        return replace(scene, description=shown)
+        return replace(scene, description=replace(description, volume=replace(volume, transfer=transfer), notes=notes))
 
     def _transfer(self, volume: Volume) -> TransferFunction:
         transfer, asked = volume.transfer, self.transfer_function

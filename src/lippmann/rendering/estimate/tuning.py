@@ -15,9 +15,9 @@ class EstimateTuning:
     Attributes
     ----------
     outlier_share, outlier_step:
-        A hit is an outlier if it makes up this part of the largest share of what the batches differ by that one can
-        have, ``(batches - 1) / batches``, and moves the code by as much as the step: below it the curve is nearly
-        straight, and what is missing elsewhere is small as well.
+        A sample is an outlier if it makes up this part of the batches' differences, relative to the most that a single
+        sample can make up, ``(batches - 1) / batches``, and moves the code by at least the step. Below the step the
+        transfer curve is nearly straight, and what samples of that size miss elsewhere is small as well.
     outlier_doubt:
         Relative increase of the upper end of the error where all of it rests on outliers.
     doubt_among_mirrors:

@@ -54,7 +54,7 @@ def check(request: RenderRequest, form: Form, display: Display | None) -> None:
 
 
 def check_scene(request: RenderRequest, scene: Scene) -> None:
-    """Refuse options that have no meaning in the scene: that of lights, where none changes it, and those of surfaces.
+    """Refuse options without effect in the scene: of light where nothing is lit, of surfaces where there are none.
 
     Raises
     ------
