@@ -81,6 +81,17 @@ def test_plain_values_and_those_that_a_stage_sets(read, more, color):
     assert material.roughness == 0.25
 
 
+def test_layers_that_stages_share_name_the_document_each_time(read, tmp_path):
+    part = HEAD + looks("plain").replace("@look/x", "@x")
+    files = {**FILES, "look/part.usda": part}
+    layered = HEAD.replace("(\n", "(\n    subLayers = [@look/part.usda@]\n", 1)
+    for _ in range(2):
+        scene = read("", head=layered, files=files)
+        assert scene.materials[0].base_color == pytest.approx((0.2, 0.4, 0.6))
+        layered += "\n"  # another stage of the same layers
+    assert (tmp_path / "look/part.usda").read_text() == part
+
+
 def test_a_document_in_a_package(tmp_path):
     with zipfile.ZipFile(tmp_path / "s.usdz", "w") as package:
         package.writestr("stage.usda", HEAD + looks("pictures"))
