@@ -61,7 +61,8 @@ def coding_slope(linear: NDArray[np.floating], coding: Coding = "srgb") -> NDArr
     A tone map mixes colours. Its slope is that along the pixel's own colour, ``(..., 3)``: most noise is of brightness.
     """
     if coding == "pbr-neutral":
-        return coding_chord((1 - _SLOPE_STEP) * linear, linear, coding)
+        along, _, mapped = _tone_chord((1 - _SLOPE_STEP) * linear, linear)
+        return np.asarray(along * coding_slope(mapped), np.float32)
     inside = (linear >= 0) & (linear <= 1)
     if coding == "linear":
         return inside.astype(np.float32)
@@ -74,15 +75,23 @@ def coding_slope(linear: NDArray[np.floating], coding: Coding = "srgb") -> NDArr
 def coding_chord(low: NDArray[np.floating], high: NDArray[np.floating], coding: Coding) -> NDArray[np.float32]:
     """Slope of the coding between two values, ``low`` at most ``high``; that at ``high`` where they are the same."""
     if coding == "pbr-neutral":
-        mapped_low, mapped = pbr_neutral(low), pbr_neutral(high)
-        # A channel moves its own value by 1 at most: what a bright colour's white adds to dark ones is not theirs.
-        along = np.clip((mapped - mapped_low) / np.maximum(high - low, np.float32(_LEAST_STEP)), 0, 1)
+        along, mapped_low, mapped = _tone_chord(low, high)
         return np.asarray(along * coding_chord(mapped_low, mapped, "srgb"), np.float32)
     step = np.asarray(high - low)
     same = step <= _LEAST_STEP
     chord = np.asarray((encode(high, coding) - encode(low, coding)) / np.where(same, 1, step), np.float32)
     chord[same] = coding_slope(high[same], coding)
     return chord
+
+
+def _tone_chord(
+    low: NDArray[np.floating], high: NDArray[np.floating]
+) -> tuple[NDArray[np.floating], NDArray[np.floating], NDArray[np.floating]]:
+    """Slope of the tone map between two values ``(..., 3)``, ``low`` at most ``high``, and what it makes of both."""
+    mapped_low, mapped = pbr_neutral(low), pbr_neutral(high)
+    # A channel moves its own value by 1 at most: what a bright colour's white adds to dark ones is not theirs.
+    along = np.clip((mapped - mapped_low) / np.maximum(high - low, np.float32(_LEAST_STEP)), 0, 1)
+    return along, mapped_low, mapped
 
 
 def quantize(linear: FloatArray, bits: int, transfer: Transfer) -> NDArray[np.uint8] | NDArray[np.uint16]:

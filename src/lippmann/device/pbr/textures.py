@@ -435,7 +435,8 @@ def _upload(texels: NDArray[np.generic], coded: bool, filtering: str, wrap: str)
         texels, coded = decode_srgb(texels).astype(np.float32), False
     height, width, channels = texels.shape
     packed = np.zeros((height, width, 4 if channels == 3 else channels), texels.dtype)
-    packed[..., :channels] = texels
+    for channel in range(channels):  # NumPy is slow over an axis of three
+        packed[..., channel] = texels[..., channel]
     modes = {
         "filter_mode": dr.FilterMode.Nearest if filtering == "nearest" else dr.FilterMode.Linear,
         "wrap_mode": {"repeat": dr.WrapMode.Repeat, "mirror": dr.WrapMode.Mirror}.get(wrap, dr.WrapMode.Clamp),
