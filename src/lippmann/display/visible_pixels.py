@@ -113,6 +113,10 @@ class EyeMap:
         dx, dy = self.display.panel_offset((self._center_x - eye[0]) * scale, (self._center_y - eye[1]) * scale)
         u = (self._center_x + dx) / panel.pixel_pitch + 0.5 * panel.width
         v = 0.5 * panel.height - (self._center_y + dy) / panel.pixel_pitch
+        if self.display.stereo is not None:
+            # Such a monitor shows each eye a whole picture: past the last pair of columns that pair is seen.
+            past = np.where(u < 0.0, 0.0, panel.width - 2.0)
+            u = np.where((u < 0.0) | (u >= panel.width), past + (u - past) % 2.0, u)
         u, v = (np.clip(part, -_FAR, _FAR)[..., None] for part in (u, v))
         if len(self._cells) * len(self._cells[0]) > 1:
             column, row = self._nearest(u, v)
