@@ -60,8 +60,8 @@ def check_scene(request: RenderRequest, scene: Scene) -> None:
     ------
     UsageError
         The request asks for direct light, caustics, depth or less indirect light where nothing is lit; for a surface
-        property beside light, a background or depth; or, of Gaussian
-        splats or a volume, for a surface property, for pooling or denoising, or for an exposure.
+        property beside light, a background or depth; or, of Gaussian splats or a volume, for a surface property, for
+        pooling or denoising, or for an exposure.
     """
     is_own, own = scene.keeps_its_colors, "all in this scene has a colour of its own, whatever light is given"
     refusals = _of_surfaces(request, scene) if scene.lies_off_surfaces else []
