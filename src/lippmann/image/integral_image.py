@@ -321,7 +321,7 @@ class IntegralImage(Picture):
         lenses = f"{grid.columns} x {grid.rows} lenses"
         return f"<IntegralImage {panel.width} x {panel.height} pixels, {lenses}, display {self.display.name}>"
 
-    def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> NDArray[Any]:
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """:attr:`pixels`, for ``np.asarray`` and NumPy's functions."""
         return np.array(self.pixels, dtype=dtype, copy=copy)
 

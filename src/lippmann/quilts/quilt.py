@@ -215,7 +215,7 @@ class Quilt:
         (width, height), layout = self.size, self.layout
         return f"<Quilt {width} x {height} pixels, {layout.columns} x {layout.rows} views, aspect {layout.aspect:g}>"
 
-    def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> NDArray[Any]:
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """:attr:`pixels`, for ``np.asarray`` and NumPy's functions."""
         return np.array(self.pixels, dtype=dtype, copy=copy)
 
