@@ -47,10 +47,10 @@ def read_pcd(path: Path) -> SceneDescription:
         names = entries["FIELDS"]
         counts = [int(word) for word in entries.get("COUNT", ["1"] * len(names))]
         kinds = [f"<{kind.lower()}{size}" for kind, size in zip(entries["TYPE"], entries["SIZE"], strict=True)]
-        columns = zip(names, kinds, counts, strict=True)
+        listed = zip(names, kinds, counts, strict=True)
         # Padding has the name _, several times.
         fields = [
-            (f"_{place}" if name == "_" else name, kind, (count,)) for place, (name, kind, count) in enumerate(columns)
+            (f"_{place}" if name == "_" else name, kind, (count,)) for place, (name, kind, count) in enumerate(listed)
         ]
         number, dtype = int(entries["POINTS"][0]), np.dtype(fields)
         check_input(2 * number * dtype.itemsize, f"{number} points", where=where)
@@ -62,12 +62,13 @@ def read_pcd(path: Path) -> SceneDescription:
         codes = np.ascontiguousarray(vertex.pop(name)).view(np.uint32)
         vertex |= {color: (codes >> shift & 255).astype(np.uint8) for color, shift in _SHIFTS.items()}
     properties = [Property(name, column.dtype.str[1:], None) for name, column in vertex.items()]
-    return describe_polygons(Header([Element("vertex", number, properties)]), {"vertex": vertex}, path)
+    columns = {name: column.astype(np.float64) for name, column in vertex.items()}
+    return describe_polygons(Header([Element("vertex", number, properties)]), {"vertex": columns}, path)
 
 
 def _columns(body: bytes, form: str, dtype: np.dtype[np.void], number: int) -> dict[str, NDArray[np.generic]]:
     """Values ``(number,)`` of each field, the first of those that have several."""
-    kinds = [(name, *(dtype.fields or {})[name][:1]) for name in dtype.names or ()]
+    kinds = [(name, dtype[name]) for name in dtype.names or ()]
     if form == "binary":
         table = np.frombuffer(body, dtype, number)
         return {name: np.ascontiguousarray(table[name][:, 0]) for name, _ in kinds}
