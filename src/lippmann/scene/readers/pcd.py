@@ -1,7 +1,6 @@
 """Clouds of points in files of the Point Cloud Library (``.pcd``), text, binary and packed.
 
-Read from "The PCD (Point Cloud Data) file format" (pointclouds.org); packed ones are LZF (LibLZF by M. Lehmann), field
-after field.
+Read from "The PCD (Point Cloud Data) file format" (pointclouds.org); packed ones are LZF, field after field.
 """
 
 from __future__ import annotations
@@ -79,38 +78,20 @@ def _columns(body: bytes, form: str, dtype: np.dtype[np.void], number: int) -> d
             columns[name] = words[:, place].astype(kind.base)
             place += kind.shape[0]
     elif form == "binary_compressed":
+        from imagecodecs import LzfError, lzf_decode
+
         packed, size = struct.unpack_from("<II", body)
         if size < number * dtype.itemsize:
             raise ValueError(f"{size} bytes for {number} points")
-        body = _unpack(body[8 : 8 + packed], size)
+        try:
+            body = lzf_decode(body[8 : 8 + packed], out=size)
+        except LzfError as error:
+            raise ValueError(str(error)) from None
+        if len(body) != size:
+            raise ValueError(f"{len(body)} of {size} bytes")
         for name, kind in kinds:
             columns[name] = np.frombuffer(body, kind, number, place)[:, 0]
             place += number * kind.itemsize
     else:
         raise ValueError(f"its data are {form}")
     return columns
-
-
-def _unpack(data: bytes, size: int) -> bytes:
-    """``size`` bytes packed by LZF: runs of bytes, and references to what stands before."""
-    out, place = bytearray(), 0
-    while place < len(data) and len(out) < size:
-        control = data[place]
-        place += 1
-        if control < 32:
-            out += data[place : place + control + 1]
-            place += control + 1
-            continue
-        length = (control >> 5) + 2
-        if length == 9:
-            length += data[place]
-            place += 1
-        start = len(out) - ((control & 31) << 8) - data[place] - 1
-        place += 1
-        if start < 0:
-            raise ValueError("it refers to bytes before its first")
-        run = bytes(out[start : start + length])
-        out += (run * (-(-length // len(run))))[:length]
-    if len(out) != size:
-        raise ValueError(f"{len(out)} of {size} bytes")
-    return bytes(out)

@@ -84,6 +84,7 @@ def test_rows_of_a_metaimage_s_matrix_are_directions(tmp_path):
         (("short", "block"), "has a header without sense"),
         (("encoding: raw", "encoding: bzip2"), "encoding bzip2; raw and gzip are read"),
         (("sizes: 2 3 4", "sizes: 3 2 2 2"), "one number a voxel on three axes"),
+        (("kinds: domain", "kinds: vector"), "2 values a voxel, vector; one is read"),
         (("sizes: 2 3 4", "sizes: 2 3 5"), "holds 48 of 60 bytes of voxels"),
         (("(0,0,3)", "(0,2,0)"), "its voxels have no extent"),
         (("key:=value", "data file: LIST"), "names a file for each slice"),

@@ -41,6 +41,8 @@ _TYPES = {
 }
 #: Without a word on how a patient lies: slice 0 in front, row 0 on top.
 _WORLD_FROM_SLICES = np.diag([1.0, -1.0, -1.0, 1.0])
+#: Kinds of axes along which places, and not the numbers of one voxel, lie.
+_PLACES = ("domain", "space", "time", "none", "???")
 _LINE = re.compile(r"\s*([^:=#]+?)\s*[:=]\s*(.*?)\s*")
 
 
@@ -122,6 +124,9 @@ def _nrrd(entries: Mapping[str, str]) -> _Grid:
     order = ">" if entries.get("endian", "little").lower() == "big" else "<"
     dtype = np.dtype(order + _TYPES[entries["type"].lower().removeprefix("signed ")])
     sizes = [int(word) for word in entries["sizes"].split()]
+    for kind, size in zip(entries.get("kinds", "").lower().split(), sizes, strict=False):
+        if size > 1 and kind not in _PLACES:
+            raise ValueError(f"{size} values a voxel, {kind}; one is read")
     space = entries.get("space", "").lower().replace("-", " ").split()
     letters = space[0] if len(space) == 1 else "".join(word[:1] for word in space)
     to_lps = [{"l": 1.0, "r": -1.0}.get(letters[:1]), {"p": 1.0, "a": -1.0}.get(letters[1:2])]
