@@ -38,33 +38,35 @@ def closed(monkeypatch):
     return filters
 
 
-def run(device, picture):
+def run(device, picture, is_hdr=True):
     clean = np.empty_like(picture)
-    with library.open_filter(device) as work:
+    with library.open_filter(device, ["color"], {"hdr": is_hdr}) as work:
         work.set_image("color", picture)
         work.set_image("output", clean)
-        work.set_option("hdr", True)
         work.run()
     assert not device.error()
     return clean
 
 
-def test_filters_close_after_their_run_or_with_the_block_that_keeps_memory(device, closed):
-    picture = np.random.default_rng(3).random(SIZE, dtype=np.float32)
-    alone = run(device, picture)
-    assert len(closed) == 1
-    with library.keep_memory():
-        runs = [run(device, picture) for _ in range(2)]
-        assert len(closed) == 1
-    assert len(closed) == 3
-    assert all(np.array_equal(each, alone) for each in runs)
-    run(device, picture)
+def test_filters_close_after_their_run_or_with_the_block_that_keeps_them(device, closed):
+    pictures = np.random.default_rng(3).random((3, *SIZE), dtype=np.float32)
+    alone = [run(device, picture) for picture in pictures]
+    plain = run(device, pictures[0], is_hdr=False)
     assert len(closed) == 4
+    with library.keep_filters():
+        # One for three pictures, of which none is mistaken for another, and one for other options.
+        assert np.array_equal([run(device, picture) for picture in pictures], alone)
+        assert np.array_equal(run(device, pictures[0], is_hdr=False), plain)
+        assert not np.array_equal(plain, alone[0])
+        assert len(closed) == 4
+    assert len(closed) == 6
+    run(device, pictures[0])
+    assert len(closed) == 7
 
 
 def test_filters_close_after_an_error_too(device, closed):
     def fails():
-        with library.keep_memory(), library.open_filter(device):
+        with library.keep_filters(), library.open_filter(device, ["color"], {}):
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
@@ -73,7 +75,7 @@ def test_filters_close_after_an_error_too(device, closed):
 
 
 def test_errors_are_told_once(device):
-    with library.open_filter(device) as work:
+    with library.open_filter(device, ["color"], {}) as work:
         work.run()  # without any picture
     assert "image" in device.error()
     assert device.error() == ""

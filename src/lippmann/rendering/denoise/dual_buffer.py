@@ -39,7 +39,7 @@ from lippmann.rendering.estimate.psnr import PixelErrors
 from lippmann.rendering.estimate.tuning import TUNING as ESTIMATE
 from lippmann.rendering.film.wavefront import Coverage
 from lippmann.rendering.request.tuning import TUNING as REQUEST
-from lippmann.runtime.open_image_denoise import keep_memory
+from lippmann.runtime.open_image_denoise import keep_filters
 from lippmann.runtime.row_threads import Bands
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ class Denoised:
         if self._halves is None or self._samples_of_halves != self._renderer.samples:
             self._samples_of_halves = self._renderer.samples
             traced, specular = self._noisy_halves(), self._renderer.specular_halves() or (None, None)
-            with keep_memory():
+            with keep_filters():
                 first, second = (
                     self._renderer.to_display(
                         clean_light(traced[k], specular[k], self._denoise, self._renderer.samples, turned=k == 1)

@@ -180,10 +180,11 @@ def _on_cpu(images: dict[str, FloatArray], options: Mapping[str, float], threads
     output = np.empty_like(next(iter(images.values())))
     # Dr.Jit's threads share the cores: pinned ones would wait for each other.
     device = _device(threads, library.DEVICE_TYPE_CPU, numThreads=threads, setAffinity=False)
-    with library.open_filter(device) as work:
+    with library.open_filter(device, images, options) as work:
         for name, image in (*images.items(), ("output", output)):
             work.set_image(name, image)
-        _run(device, work, options)
+        work.run()
+        _check(device)
     return output
 
 
@@ -192,24 +193,18 @@ def _on_gpu(images: dict[str, FloatArray], options: Mapping[str, float]) -> Floa
     output = np.empty_like(next(iter(images.values())))
     device = _device(None, library.DEVICE_TYPE_CUDA)
     with ExitStack() as stack:
-        work = stack.enter_context(library.open_filter(device))
+        work = stack.enter_context(library.open_filter(device, images, options))
         for name, image in (*images.items(), ("output", output)):
             buffer = stack.enter_context(closing(library.Buffer(device, image.nbytes)))
             _check(device)
             if image is not output:
                 buffer.write(image)
             work.set_image(name, image, buffer)
-        _run(device, work, options)
+        work.run()
+        _check(device)
         buffer.read(output)
         _check(device)
     return output
-
-
-def _run(device: library.Device, work: library.Filter, options: Mapping[str, float]) -> None:
-    for name, value in options.items():
-        work.set_option(name, value)
-    work.run()
-    _check(device)
 
 
 def _device(threads: int | None, kind: int, **options: int) -> library.Device:
