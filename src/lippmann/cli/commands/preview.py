@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -21,10 +21,6 @@ from lippmann.options.prints import PrintOptions
 from lippmann.options.quality import MachineOptions, QualityOptions
 from lippmann.options.scene import SceneOptions
 from lippmann.options.texts import triple
-
-if TYPE_CHECKING:
-    pass
-
 
 #: The display of a picture for which none is given.
 _DISPLAY = "seed-lenticular"

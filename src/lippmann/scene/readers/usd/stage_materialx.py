@@ -30,7 +30,7 @@ _NUMBERS = {
 }
 _OTHERS = {"boolean": _TYPES.Bool, "filename": _TYPES.Asset, "surfaceshader": _TYPES.Token}
 #: Of files, packages, numbers and names; USD's own errors are of runtime.
-_FAULTS = (OSError, KeyError, ValueError, TypeError, RuntimeError)
+_FAULTS = (OSError, zipfile.BadZipFile, ElementTree.ParseError, KeyError, ValueError, TypeError, RuntimeError)
 #: Attributes that hold for all that stands in an element.
 _INHERITED = ("colorspace", "fileprefix")
 
@@ -45,15 +45,7 @@ def materialx_layer(path: str) -> Sdf.Layer:
     """
     try:
         return _read(path)
-    except (
-        OSError,
-        zipfile.BadZipFile,
-        KeyError,
-        ElementTree.ParseError,
-        ValueError,
-        TypeError,
-        RuntimeError,
-    ) as error:
+    except _FAULTS as error:
         raise ValueError(str(error)) from None
 
 
