@@ -60,7 +60,7 @@ def moved(codes, *, right=1.0, down=1.0, degrees=0.0):
 
 
 def scale_in(line):
-    native, percent = re.search(r"scale ([\d.]+) within|scaled to ([\d.]+)%", line).groups()
+    native, percent = re.search(r"scale ([\d.]+) within|scaled to ([\d.]+) %", line).groups()
     return float(native) if native else float(percent) / 100
 
 
