@@ -66,6 +66,12 @@ def test_what_a_quilt_says_is_to_be_read(lippmann, tmp_path):
     assert "depth_range -23.6698, 11.8\ndenoise     oidn\n" in said
 
 
+def test_an_estimate_of_other_figures_is_told_as_it_is(lippmann, tmp_path):
+    made = Provenance(estimate={"psnr": 31.25, "judged_by": "hand"})
+    quilt = Quilt(np.zeros((256, 256, 3), np.uint8), QuiltLayout(4, 2, 0.75), provenance=made)
+    assert "estimated   psnr 31.25, judged_by hand\n" in lippmann("info", quilt.save(tmp_path / "a.png")).out
+
+
 @pytest.mark.long
 def test_a_lost_layout_is_given_back(lippmann, tmp_path):
     path = tmp_path / "quilt.jpg"

@@ -14,6 +14,8 @@ from lippmann.cli.shared.scene_source import output_of
 from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from lippmann.image import PictureFile
     from lippmann.image.metadata import Provenance
     from lippmann.quilts.quilt import Quilt
@@ -176,7 +178,7 @@ def _provenance_lines(provenance: Provenance, part: str = "micro-image") -> list
         f"on {provenance.device or 'an unknown device'}",
     ]
     if provenance.estimate is not None:
-        lines.append(f"estimated   {estimate_in_words(provenance.estimate, part)}")
+        lines.append(f"estimated   {_estimate(provenance.estimate, part)}")
     if provenance.rays:
         lines.append("rays        " + ", ".join(f"{count:,} {kind}" for kind, count in provenance.rays.items()))
     if provenance.seconds:
@@ -187,6 +189,14 @@ def _provenance_lines(provenance: Provenance, part: str = "micro-image") -> list
         if isinstance(each, list):
             lines += [f"{name if place == 0 else '':<11} {line}" for place, line in enumerate(each)]
     return lines + [f"note        {note}" for note in provenance.notes]
+
+
+def _estimate(estimate: Mapping[str, object], part: str) -> str:
+    """An estimate in words; of another program's picture, its figures by name."""
+    try:
+        return estimate_in_words(estimate, part)
+    except (KeyError, TypeError, ValueError):
+        return ", ".join(f"{name} {_plain(value)}" for name, value in estimate.items())
 
 
 def _plain(value: object) -> str:
