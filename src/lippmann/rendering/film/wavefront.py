@@ -206,6 +206,11 @@ def finite_or_black(radiance: Spectrum) -> tuple[Color3f, Bool]:
     return dr.select(finite, radiance, mi.Color3f(0)), finite
 
 
+def _total(values: Float, count: int) -> NDArray[np.float32]:
+    """Sums of ``count`` lanes each."""
+    return np.asarray(dr.block_sum(values, count) if count > 1 else values)
+
+
 def sum_samples(
     sample: PixelSample, channels: int, batches: int, count: int, width: int | None
 ) -> dict[str, NDArray[np.float32]]:
@@ -214,14 +219,15 @@ def sum_samples(
     Lanes are ordered pixel, channel, batch, sample; pixels in strips of a picture of that ``width``, or where it is
     None in rows. The sums are in rows. The rays of a sub-pixel carry all three colours: it keeps the one that it shows.
     """
-    covered = None if sample.covered is None else [sample.covered] * channels
-    lights = {"radiance": sample.radiance, "specular": sample.specular, "excess": sample.excess, "covered": covered}
+    lights = {"radiance": sample.radiance, "specular": sample.specular, "excess": sample.excess}
+    totals = {name: [_total(part, count) for part in light] for name, light in lights.items() if light is not None}
+    if sample.covered is not None:
+        totals["covered"] = [_total(sample.covered, count)] * channels
     sums: dict[str, NDArray[np.float32]] = {}
-    for name, components in lights.items():
-        for index, component in enumerate(components if components is not None else []):
-            total = np.asarray(dr.block_sum(component, count) if count > 1 else component)
+    for name, components in totals.items():
+        sums[name] = np.empty((batches, components[0].size // (channels * batches), len(components)), dtype=np.float32)
+        for index, total in enumerate(components):
             lanes = total.reshape(-1, channels, batches)[:, index % channels]
-            sums.setdefault(name, np.empty((batches, len(lanes), len(components)), dtype=np.float32))
             to_rows(lanes, width, sums[name][..., index].T)
     return sums
 

@@ -44,7 +44,7 @@ _PROPERTY = rb"""\b%s:(%s)(?:\s*=\s*(["'])(.*?)\2|\s*>([^<]*)<)"""
 #: An item of the directory that says what follows the picture in its file, and its properties.
 _ITEM = re.compile(rb"<([\w.-]+:Item)\b(.{0,2000}?)(?:/>|</\1>)", re.DOTALL)
 #: What the XMP of a picture behind a JPEG file's own says of it, as Apple's telephones write portraits.
-_APPLE_DISPARITY = re.compile(rb"""\b[\w.-]+:AuxiliaryImageType\s*(?:>|=\s*["'])\s*disparity\b""")
+_APPLE_DISPARITY = re.compile(rb""":AuxiliaryImageType\s*(?:>|=\s*["'])\s*disparity\b""")
 _START_OF_IMAGE = b"\xff\xd8\xff"
 _PRIMARY = (b"Primary", b"primary_image")
 #: Digits of a length and a padding together; no file is so long.
