@@ -9,6 +9,7 @@ from PIL import Image
 
 from lippmann.errors import SceneError
 from lippmann.scene.readers.load import load_scene
+from lippmann.scene.readers.three_mf.slicer_project import painted
 
 RELATIONS = """<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
 <Relationship Id="r" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel" Target="/3D/model.model"/>
@@ -34,7 +35,7 @@ def read(tmp_path):
             archive.writestr("_rels/.rels", RELATIONS)
             archive.writestr("3D/model.model", main)
             for name, data in files.items():
-                archive.writestr(f"3D/{name.replace('_', '.')}", data)
+                archive.writestr(name if "/" in name else f"3D/{name.replace('_', '.')}", data)
         return load_scene(path).description
 
     return read
@@ -224,3 +225,79 @@ def test_what_is_no_package(tmp_path):
     (tmp_path / "a.3mf").write_bytes(b"solid nothing")
     with pytest.raises(SceneError, match=r"a\.3mf: is no 3MF package"):
         load_scene(tmp_path / "a.3mf")
+
+
+PIECES = """<config><object id="3"><metadata key="extruder" value="2"/>
+<part id="1" subtype="normal_part"><metadata key="name" value="body"/></part>
+<part id="2" subtype="modifier_part"><metadata key="extruder" value="1"/></part></object>
+<plate><metadata key="extruder" value="7"/></plate><plate/></config>"""
+FILAMENTS = '{"filament_colour": ["#FF0000", "#00FF00", "#0000FF", "#FFFFFF"], "name": "a"}'
+TWO_PARTS = (
+    solid(1)
+    + solid(2)
+    + ('<object id="3"><components><component objectid="1"/><component objectid="2"/></components></object>')
+)
+
+
+def test_parts_have_the_colours_of_their_filaments_and_modifiers_are_not_shown(read):
+    """As Bambu Studio and OrcaSlicer write their projects."""
+    main = model(TWO_PARTS, '<item objectid="3"/>')
+    settings = {"Metadata/project_settings.config": FILAMENTS, "Metadata/model_settings.config": PIECES}
+    scene = read(main, **settings)
+    (mesh,) = scene.meshes
+    assert mesh.colors.tolist() == [[0, 1, 0, 1]] * 3
+    assert scene.notes == [
+        "the 2 plates of the slicer's project lie side by side",
+        "modifiers, supports and parts that the slicer cuts away are not shown",
+    ]
+    own = model(solid(1, more='pid="5" pindex="0"') + '<m:colorgroup id="5"><m:color color="#FFFFFF"/></m:colorgroup>')
+    assert read(own, **settings).meshes[0].colors.tolist() == [[1, 1, 1, 1]] * 3
+
+
+@pytest.mark.parametrize(
+    ("paint", "parts"),
+    [
+        ("8", [([[0, 0], [1, 0], [0, 1]], (0, 1, 0))]),
+        ("0C", [([[0, 0], [1, 0], [0, 1]], (0, 0, 1))]),
+        # One side is split: the last part comes first, and has no paint of its own.
+        ("801", [([[0.5, 0.5], [0, 1], [0, 0]], (1, 0, 0)), ([[0, 0], [1, 0], [0.5, 0.5]], (0, 1, 0))]),
+    ],
+)
+def test_painted_triangles(read, paint, parts):
+    main = model(solid(1, f'v1="0" v2="1" v3="2" paint_color="{paint}"'))
+    (mesh,) = read(main, **{"Metadata/project_settings.config": FILAMENTS}).meshes
+    corners = mesh.positions[mesh.faces][..., ::2]
+    assert corners.tolist() == [where for where, _ in parts]
+    assert mesh.colors[::3, :3].tolist() == [[*color] for _, color in parts]
+
+
+def test_the_parts_of_a_triangle_fill_it():
+    for text in ("0000003", "84843", "84842", "84846", "8484A", "841", "845", "849", "0C480C3", "4448413"):
+        areas = [np.linalg.det(weights) for weights, _ in painted(text)]
+        assert sum(areas) == pytest.approx(1.0)
+        assert min(areas) > 0.0
+
+
+def test_runs_of_triangles_have_the_filaments_of_prusa_slicer(read):
+    three = '<triangle v1="0" v2="1" v3="2"/>' * 3
+    main = model(f'<object id="1"><mesh>{VERTICES}<triangles>{three}</triangles></mesh></object>')
+    volumes = "".join(
+        f'<volume firstid="{at}" lastid="{at}"><metadata type="volume" key="{key}" value="{value}"/></volume>'
+        for at, (key, value) in enumerate([("extruder", 2), ("name", "a"), ("volume_type", "SupportBlocker")])
+    )
+    scene = read(
+        main,
+        **{
+            "Metadata/Slic3r_PE.config": '; extruder_colour = #FF0000;""\n; filament_colour = #FFFFFF;#0000FF\n',
+            "Metadata/Slic3r_PE_model.config": f'<config><object id="1">{volumes}</object></config>',
+        },
+    )
+    (mesh,) = scene.meshes
+    assert mesh.colors[::3, :3].tolist() == [[0, 0, 1], [1, 0, 0]]
+
+
+@pytest.mark.parametrize("paint", ["3", "x"])
+def test_damaged_paint(read, paint):
+    main = model(solid(1, f'v1="0" v2="1" v3="2" paint_color="{paint}"'))
+    with pytest.raises(SceneError, match="a painted triangle is damaged"):
+        read(main, **{"Metadata/project_settings.config": FILAMENTS})

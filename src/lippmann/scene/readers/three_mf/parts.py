@@ -73,12 +73,16 @@ class Beam(NamedTuple):
 
 @dataclass
 class Shape:
-    """An object: vertices ``x, y, z``, triangles, beams, radii of balls by their vertex, or objects of which it is."""
+    """An object: vertices ``x, y, z``, triangles, beams, radii of balls by their vertex, or objects of which it is.
+
+    ``paint`` are the texts of triangles that a slicer painted.
+    """
 
     group: str | None
     index: int
     vertices: list[tuple[float, float, float]] = field(default_factory=list)
     triangles: list[Triangle] = field(default_factory=list)
+    paint: dict[int, str] = field(default_factory=dict)
     beams: list[Beam] = field(default_factory=list)
     balls: dict[int, float] = field(default_factory=dict)
     components: list[Placed] = field(default_factory=list)
@@ -131,7 +135,7 @@ class Package:
             if attributes.get("Type") == _MODEL:
                 target = target or attributes.get("Target", "")
 
-        self._parse("_rels/.rels", begin)
+        self.parse("_rels/.rels", begin)
         return posixpath.join("/", target or "3D/3dmodel.model")
 
     def part(self, name: str) -> Part:
@@ -139,10 +143,15 @@ class Package:
         if name not in self._parts:
             reader = _PartReader(name)
             self._parts[name] = reader.part
-            self._parse(name, reader.begin)
+            self.parse(name, reader.begin)
         return self._parts[name]
 
-    def _parse(self, name: str, begin: Callable[[str, dict[str, str]], None]) -> None:
+    def has(self, name: str) -> bool:
+        """Whether the package holds a file."""
+        return name in self._archive.namelist()
+
+    def parse(self, name: str, begin: Callable[[str, dict[str, str]], None]) -> None:
+        """Hand each element of a file in XML to ``begin``; a :class:`SceneError` where it takes none of it."""
         parser = expat.ParserCreate()
         parser.StartElementHandler = begin
 
@@ -196,6 +205,9 @@ class _PartReader:
         if tag == "triangle":
             group = given.get("pid", self._shape.group)
             first = int(given.get("p1", self._shape.index))
+            paint = given.get("paint_color") or given.get("slic3rpe:mmu_segmentation")
+            if paint:
+                self._shape.paint[len(self._shape.triangles)] = paint
             self._shape.triangles.append(
                 (
                     *(int(given["v1"]), int(given["v2"]), int(given["v3"])),
@@ -250,13 +262,13 @@ class _PartReader:
         self._group = self.part.groups[given["id"]] = Group()
 
     def _base(self, given: dict[str, str]) -> None:
-        red, green, blue, alpha = _color(given.get("displaycolor", "#FFFFFF"))
+        red, green, blue, alpha = code_of_color(given.get("displaycolor", "#FFFFFF"))
         if alpha == 0.0:  # as SolidWorks writes it, of parts that are there
             self.part.unread["opacities of 0 of base materials"] = None
         self._group.values.append((red, green, blue, alpha or 1.0))
 
     def _color(self, given: dict[str, str]) -> None:
-        self._group.values.append(_color(given["color"]))
+        self._group.values.append(code_of_color(given["color"]))
 
     def _beamlattice(self, given: dict[str, str]) -> None:
         self._lattice = given
@@ -292,7 +304,8 @@ class _PartReader:
         self._group.values.append((float(given["u"]), float(given["v"])))
 
 
-def _color(text: str) -> tuple[float, ...]:
+def code_of_color(text: str) -> tuple[float, ...]:
+    """sRGB codes ``(r, g, b, a)`` in [0, 1] of ``#RRGGBB`` or ``#RRGGBBAA``; a ValueError of all else."""
     match = _COLOR.fullmatch(text.strip())
     if match is None:
         raise ValueError(f"the colour '{text}'")

@@ -14,10 +14,12 @@ from lippmann.scene.parsing.points_lines import as_mesh
 from lippmann.scene.parsing.texture_maps import unit
 from lippmann.scene.parsing.vertex_colors import COLORED, GREY, GREY_CODES, linear_colors, material_of
 from lippmann.scene.readers.three_mf.parts import Beam, Package, Part, Placed, Shape, Triangle
+from lippmann.scene.readers.three_mf.slicer_project import Piece, painted, read_project
 from lippmann.scene.values.description import Image, Instance, Material, Mesh, SceneDescription, Texture, Wrap
 
 #: Objects within others, and copies of objects, at most.
 _DEEPEST, _MOST = 16, 1 << 20
+_NOT_PRINTED = "modifiers, supports and parts that the slicer cuts away are not shown"
 
 
 def read_three_mf(path: Path) -> SceneDescription:
@@ -42,15 +44,19 @@ class _Reader:
         self._meshes: list[Mesh] = []
         self._materials: list[Material] = []
         self._images: dict[str, Image] = {}
-        self._shown: dict[tuple[str, str], list[int]] = {}
+        self._shown: dict[tuple[str, str, int], list[int]] = {}
         self._places: dict[int, list[NDArray[np.float64]]] = {}
         self._copies = 0
 
     def read(self) -> SceneDescription:
         """The scene."""
         start = self._package.part(self._package.start())
+        self._project = read_project(self._package)
+        if self._project.plates > 1:
+            self._notes[f"the {self._project.plates} plates of the slicer's project lie side by side"] = None
         for item in start.build:
-            self._place(item, np.diag([start.scale, start.scale, start.scale, 1.0]), 0)
+            piece = self._project.objects.get(item.number, Piece())
+            self._place(item, np.diag([start.scale, start.scale, start.scale, 1.0]), 0, piece)
         if not self._places:
             raise self._error("; ".join(["has nothing to build that is made of triangles or beams", *self._notes]))
         return SceneDescription(
@@ -62,7 +68,7 @@ class _Reader:
             up=(0.0, 0.0, 1.0),
         )
 
-    def _place(self, placed: Placed, world: NDArray[np.float64], depth: int) -> None:
+    def _place(self, placed: Placed, world: NDArray[np.float64], depth: int, piece: Piece) -> None:
         part = self._package.part(placed.part)
         self._notes |= {f"{what} are not shown": None for what in part.unread}
         shape = part.shapes.get(placed.number)
@@ -72,13 +78,27 @@ class _Reader:
             raise self._error(f"'{placed.part}' {what}")
         world = world @ placed.matrix
         for component in shape.components:
-            self._place(component, world, depth + 1)
-        key = placed.part, placed.number
+            own = self._project.parts.get((placed.number, component.number), piece)
+            if own.is_printed:
+                self._place(component, world, depth + 1, own)
+            else:
+                self._notes[_NOT_PRINTED] = None
+        key = placed.part, placed.number, piece.filament
         if key not in self._shown:
-            self._shown[key] = self._meshes_of(part, shape) if shape.triangles else []
+            filaments = self._filaments(placed.number, len(shape.triangles), piece)
+            self._shown[key] = self._meshes_of(part, shape, filaments) if (filaments >= 0).any() else []
             self._shown[key] += self._lattice_of(part, shape) if shape.beams else []
         for mesh in self._shown[key]:
             self._places.setdefault(mesh, []).append(world)
+
+    def _filaments(self, number: str, count: int, piece: Piece) -> NDArray[np.int64]:
+        """The filament of each triangle of an object; -1 of those that are not printed."""
+        filaments = np.full(count, piece.filament)
+        for run in self._project.runs.get(number, []):
+            filaments[run.first : run.last + 1] = run.filament if run.is_printed else -1
+        if (filaments < 0).any():
+            self._notes[_NOT_PRINTED] = None
+        return filaments
 
     def _lattice_of(self, part: Part, shape: Shape) -> list[int]:
         """Numbers of the meshes of an object's beams, and of balls at their ends, which are as wide as the widest."""
@@ -120,21 +140,27 @@ class _Reader:
         except IndexError:
             raise self._error("has a beam whose colours are not there") from None
 
-    def _meshes_of(self, part: Part, shape: Shape) -> list[int]:
+    def _meshes_of(self, part: Part, shape: Shape, filaments: NDArray[np.int64]) -> list[int]:
         """Numbers of the meshes of an object: one for each picture, one for all colours, one for what has neither."""
         vertices = np.array(shape.vertices, np.float64).reshape(-1, 3)
         faces = np.array([triangle[:3] for triangle in shape.triangles])
         if not (0 <= faces.min() <= faces.max() < len(vertices) and np.isfinite(vertices).all()):
             raise self._error("has a triangle whose vertices are not there")
         kinds: dict[tuple[str, tuple[float, ...]] | None, list[int]] = {}
-        for number, triangle in enumerate(shape.triangles):
-            group = part.groups.get(triangle[3] or "")
+        for number in np.flatnonzero(filaments >= 0).tolist():
+            group = part.groups.get(shape.triangles[number][3] or "")
             kinds.setdefault(None if group is None else (group.picture, group.below), []).append(number)
         first = len(self._meshes)
         for kind, chosen in kinds.items():
             corners = vertices[faces[chosen]].reshape(-1, 3).astype(np.float32)
             order = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
             mesh = Mesh(self._name, corners, order, len(self._materials))
+            if kind is None and self._project.colors:
+                corners, codes = self._printed(shape, chosen, corners, filaments)
+                order = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
+                colors = linear_colors(codes)
+                self._add(replace(mesh, positions=corners, faces=order, colors=colors), material_of(codes))
+                continue
             if kind is None:
                 self._add(mesh, GREY)
                 continue
@@ -149,6 +175,28 @@ class _Reader:
                 codes = np.rint(255.0 * values)
                 self._add(replace(mesh, colors=linear_colors(codes)), material_of(codes))
         return [*range(first, len(self._meshes))]
+
+    def _printed(
+        self, shape: Shape, chosen: list[int], corners: NDArray[np.float32], filaments: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+        """Corners ``(3 k, 3)`` of triangles, painted ones cut into parts, and sRGB codes of their filaments."""
+        whole = corners.reshape(-1, 3, 3)
+        pieces: list[NDArray[np.float32]] = []
+        own: list[int] = []
+        try:
+            for triangle, number in zip(whole, chosen, strict=True):
+                filament = int(filaments[number])
+                if number not in shape.paint:
+                    pieces.append(triangle)
+                    own.append(filament)
+                    continue
+                for weights, of_paint in painted(shape.paint[number]):
+                    pieces.append((weights @ triangle).astype(np.float32))
+                    own.append(of_paint or filament)
+        except ValueError as error:
+            raise self._error(f"a painted triangle is damaged ({error})") from None
+        codes = np.rint(255.0 * np.array([self._project.color(filament) for filament in own]))
+        return np.concatenate(pieces), np.repeat(codes, 3, axis=0)
 
     def _add(self, mesh: Mesh, material: Material) -> None:
         self._meshes.append(mesh)
