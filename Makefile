@@ -6,6 +6,8 @@ SITE := build/site
 JOBS ?= 2
 # How often a search runs each property test, with other examples each time.
 ROUNDS ?= 20
+# Else all programs that tests start, and both their workers, would compile every module anew.
+export PYTHONDONTWRITEBYTECODE :=
 OPEN := $(if $(filter Darwin,$(shell uname -s)),open,xdg-open)
 
 .DEFAULT_GOAL := help
