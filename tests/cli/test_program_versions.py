@@ -12,7 +12,7 @@ from lippmann.errors import PictureError
 from lippmann.rendering.denoise.oidn import denoiser_version
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import engine as engines
-from lippmann.sequences.files import saved_sequence
+from lippmann.sequences.files import save_sequence
 from lippmann.sequences.motion import open_motion
 from lippmann.tiles.job import made_by
 
@@ -62,7 +62,7 @@ def test_a_sequence_begun_with_other_programs_is_refused(
     engine, moving_ball, make_display, tmp_path, other_llvm, monkeypatch, changed
 ):
     def frames():
-        with saved_sequence(
+        with save_sequence(
             open_motion(moving_ball),
             tmp_path / "f_%d.png",
             lambda number: tmp_path / f"f_{number}.png",

@@ -263,7 +263,7 @@ def test_what_ends_before_its_first_frame_leaves_no_folder(lippmann, tmp_path, m
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("lippmann.sequences.files.saved_sequence", interrupted)
+    monkeypatch.setattr("lippmann.sequences.files.save_sequence", interrupted)
     assert lippmann("render", "teapot", "--turntable", "2", "-o", tmp_path / "frames").code == 130
     assert list(tmp_path.iterdir()) == []
 

@@ -24,7 +24,7 @@ from lippmann.scene.values.description import (
     Texture,
 )
 from lippmann.sequences.cuts import Moment, is_cut, is_light_at_rest
-from lippmann.sequences.frames import find_stand
+from lippmann.sequences.frames import place_frames
 from lippmann.sequences.motion import open_motion
 from lippmann.sequences.turntable import open_turntable
 
@@ -48,7 +48,7 @@ def moment(placed=IN_PLACE, **changed):
 
 
 def moments(motion, *frames):
-    where = find_stand(motion, DISPLAY, PlacementOptions())
+    where = place_frames(motion, DISPLAY, PlacementOptions())
     return [Moment(frame, motion.scene(frame), where(frame)) for frame in frames]
 
 

@@ -24,7 +24,7 @@ from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.preview import Preview
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime.atomic_write import temporary_file
-from lippmann.sequences.files import journal_of, saved_sequence
+from lippmann.sequences.files import journal_of, save_sequence
 from lippmann.sequences.motion import open_motion
 
 QUICK = RenderRequest(integrator="direct", spp=1, device="cpu")
@@ -56,7 +56,7 @@ def run(
         return folder / f"f_{number:02}.png"
 
     request = replace(QUICK, **changes)
-    with saved_sequence(
+    with save_sequence(
         moving, name, path_of, display, frames, request, resume=resume, bits=bits, runner=runner
     ) as saved:
         for frame in saved:
@@ -98,7 +98,7 @@ def test_a_frame_is_let_go_before_the_next_is_rendered(engine, moving_ball, disp
             return Preview(counted(np.uint8), frame.provenance)
 
     motion = open_motion(moving_ball)
-    with saved_sequence(
+    with save_sequence(
         motion,
         tmp_path / "f.png",
         lambda number: tmp_path / f"{number}.png",

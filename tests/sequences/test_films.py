@@ -12,7 +12,7 @@ from lippmann.display import load_display
 from lippmann.image.metadata import Provenance
 from lippmann.quilts.quilt import Quilt, QuiltLayout, quilt_of_display
 from lippmann.sequences.files import SavedFrame
-from lippmann.sequences.films import film_of_quilts
+from lippmann.sequences.films import film_quilts
 from lippmann.sequences.forms import QuiltForm
 
 
@@ -31,7 +31,7 @@ from lippmann.sequences.forms import QuiltForm
 def test_a_film_that_is_made_smaller_says_so(display, film, size, codec, note):
     device = load_display(display)
     form = QuiltForm(quilt_of_display(device, size=size))
-    told = film_of_quilts(Path(film), device, form, None, 2, codec=codec).note
+    told = film_quilts(Path(film), device, form, None, 2, codec=codec).note
     assert told is None if note is None else note in told
 
 
@@ -47,7 +47,7 @@ def test_a_frame_in_memory_gives_the_codes_of_its_file(tmp_path, monkeypatch, en
     path = tmp_path / f"0001_qs3x2a0.75{ending}"
     rendered = Quilt(pixels, QuiltLayout(3, 2, 0.7501), provenance=Provenance(transfer="linear"))
     frame = SavedFrame(1, path, Provenance(), quilt=form.write(rendered, path, bits))
-    codes = film_of_quilts(Path(film), device, form, None, 2).codes
+    codes = film_quilts(Path(film), device, form, None, 2).codes
     of_file = codes(replace(frame, quilt=None))
     monkeypatch.setattr("lippmann.sequences.films.read_quilt", None)
     np.testing.assert_array_equal(codes(frame), of_file)

@@ -10,7 +10,7 @@ import pytest
 import lippmann
 from lippmann.color.transfer import encode_srgb
 from lippmann.display import load_display
-from lippmann.sequences.flicker import film_in_words, mean_psnr, with_flicker
+from lippmann.sequences.flicker import add_flicker, film_in_words, mean_psnr
 from lippmann.sequences.frames import render_sequence
 from lippmann.sequences.turntable import open_turntable
 
@@ -18,32 +18,32 @@ ESTIMATE = {"psnr": 40.0, "psnr_low": 38.0, "psnr_high": 43.0, "by_chance": 46.0
 
 
 def test_errors_by_chance_count_whole_and_the_denoisers_own_half():
-    stated = with_flicker(ESTIMATE)
+    stated = add_flicker(ESTIMATE)
     by_chance, total = 10**-4.6, 10**-4.0
     assert stated["flicker"] == pytest.approx(-10 * math.log10(by_chance + (total - by_chance) / 2), abs=0.01)
     assert (stated["flicker_low"], stated["flicker_high"]) == (38.0, 46.0)
 
 
 def test_noise_alone_flickers_by_all_of_its_error():
-    stated = with_flicker(ESTIMATE | {"by_chance": 40.0})
+    stated = add_flicker(ESTIMATE | {"by_chance": 40.0})
     assert (stated["flicker"], stated["flicker_low"], stated["flicker_high"]) == (40.0, 38.0, 43.0)
 
 
 def test_pixels_that_were_not_traced_may_not_flicker_at_all():
-    stated = with_flicker(ESTIMATE, 0.1)
+    stated = add_flicker(ESTIMATE, 0.1)
     assert (stated["flicker_low"], stated["flicker_high"]) == (38.0, 56.0)
-    assert stated["flicker"] == with_flicker(ESTIMATE)["flicker"]
+    assert stated["flicker"] == add_flicker(ESTIMATE)["flicker"]
 
 
 def test_pixels_that_keep_their_code_do_not_flicker():
-    stated, whole = with_flicker(ESTIMATE, 0.1, stays=True), with_flicker(ESTIMATE)
+    stated, whole = add_flicker(ESTIMATE, 0.1, stays=True), add_flicker(ESTIMATE)
     assert stated["flicker"] == pytest.approx(whole["flicker"] + 10.0)
     assert (stated["flicker_low"], stated["flicker_high"]) == (38.0, 56.0)
 
 
 @pytest.mark.parametrize("estimate", [None, {"psnr": 40.0}])
 def test_nothing_is_stated_where_nothing_is_known(estimate):
-    assert with_flicker(estimate) == estimate
+    assert add_flicker(estimate) == estimate
 
 
 def test_the_mean_is_that_of_errors():
@@ -52,7 +52,7 @@ def test_the_mean_is_that_of_errors():
 
 
 def test_a_film_says_what_its_frames_say():
-    frames = [with_flicker(ESTIMATE), with_flicker(ESTIMATE | {"psnr": 39.0})]
+    frames = [add_flicker(ESTIMATE), add_flicker(ESTIMATE | {"psnr": 39.0})]
     assert film_in_words(frames).startswith(
         "estimated PSNR of the frames 39.5 dB, of the worst 39.0 dB, of their flicker"
     )

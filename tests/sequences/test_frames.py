@@ -16,7 +16,7 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import place
 from lippmann.sequences.frames import (
     FrameRange,
-    find_stand,
+    place_frames,
     render_frames,
     render_quilt_sequence,
     render_sequence,
@@ -45,7 +45,7 @@ def display():
 
 def test_a_display_that_does_not_follow_stands_still(moving_ball, display):
     motion = open_motion(moving_ball)
-    where = find_stand(motion, display, PlacementOptions())
+    where = place_frames(motion, display, PlacementOptions())
     first, middle = where(0), where(motion.count // 2)
     assert np.array_equal(first.world_from_display, middle.world_from_display)
     assert first.depth_range != middle.depth_range
@@ -54,20 +54,20 @@ def test_a_display_that_does_not_follow_stands_still(moving_ball, display):
 def test_nothing_ever_leaves_the_depth_that_the_scene_is_fitted_to(moving_ball, display):
     motion = open_motion(moving_ball)
     fitted = place(motion.bounds(), display)
-    where = find_stand(motion, display, PlacementOptions())
+    where = place_frames(motion, display, PlacementOptions())
     for frame in range(motion.count):
         back, front = where(frame).depth_range
         assert fitted.depth_range[0] - 1e-6 <= back <= front <= fitted.depth_range[1] + 1e-6
 
 
 def test_where_it_stands_does_not_hang_on_the_frame_rate(moving_ball, display):
-    slow, fast = (find_stand(open_motion(moving_ball, fps=fps), display, PlacementOptions()) for fps in (5, 60))
+    slow, fast = (place_frames(open_motion(moving_ball, fps=fps), display, PlacementOptions()) for fps in (5, 60))
     assert np.array_equal(slow.first, fast.first)
 
 
 def test_a_flight_keeps_the_display_before_the_camera(room, display):
     motion = open_motion(room[0], camera_path=room[1])
-    where = find_stand(motion, display, PlacementOptions())
+    where = place_frames(motion, display, PlacementOptions())
     for frame in range(3):
         camera = motion.camera(frame, None)
         relative = np.linalg.inv(camera.world_from_camera) @ where(frame).world_from_display
@@ -78,7 +78,7 @@ def test_a_flight_keeps_the_display_before_the_camera(room, display):
 
 def test_the_first_frame_of_a_flight_is_the_scene_seen_by_that_camera(room, display):
     """The path begins where the file's own camera stands."""
-    flown = find_stand(open_motion(room[0], camera_path=room[1]), display, PlacementOptions())(0)
+    flown = place_frames(open_motion(room[0], camera_path=room[1]), display, PlacementOptions())(0)
     scene = api.load_scene(room[0])
     still = place(scene.bounds, display, cameras=scene.cameras, home_camera=scene.home_camera)
     assert flown.world_from_display == pytest.approx(still.world_from_display, rel=1e-6)
@@ -88,19 +88,19 @@ def test_all_of_a_flight_is_comfortable_with_one_distance_between_the_eyes(room)
     """It was that of the first frame: what the camera left behind was too deep to look at."""
     (room[1]).write_text("0 0 1 0 1 0 0 0 -5\n0 0 1 0 1 0 0 0 -9\n0 0 1 0 1 0 0 0 -6\n")
     monitor, motion = load_display("odyssey-3d"), open_motion(room[0], camera_path=room[1])
-    where = find_stand(motion, monitor, PlacementOptions())
+    where = place_frames(motion, monitor, PlacementOptions())
     placements = [where(frame) for frame in range(3)]
     far, near = placements[0].depth_budget
     assert {each.eye_share for each in placements} == {where.eye_share}
     assert all(far <= each.depth_range[0] <= each.depth_range[1] <= near for each in placements)
     # No closer than the deepest frame asks for.
     assert placements[1].depth_range[0] == pytest.approx(far, rel=0.1)
-    assert find_stand(motion, monitor, PlacementOptions(depth_scale=1.0)).eye_share == 1.0
+    assert place_frames(motion, monitor, PlacementOptions(depth_scale=1.0)).eye_share == 1.0
 
 
 def test_a_camera_of_the_file_is_followed(moving_ball, display):
     motion = open_motion(moving_ball)
-    where = find_stand(motion, display, PlacementOptions(camera="eye"))
+    where = place_frames(motion, display, PlacementOptions(camera="eye"))
     moved = where(24).world_from_display[:3, 3] - where(0).world_from_display[:3, 3]
     assert moved == pytest.approx([1, 0, 0], abs=1e-6)
 
@@ -197,7 +197,7 @@ def test_every_frame_is_rendered_as_was_asked_for(moving_ball, display):
             asked.append((request.method, request.denoise))
             return Preview(np.zeros((2, 2, 3), np.float32), Provenance(method="full"))
 
-    where = find_stand(motion, display, PlacementOptions())
+    where = place_frames(motion, display, PlacementOptions())
     list(render_frames(motion, display, [0, 1, 2], where, RenderRequest(), Form(), lambda _: None))
     assert asked == [("auto", "auto")] * 3
 
@@ -211,7 +211,7 @@ def seeds(motion, frames, **options):
             return Preview(np.zeros((2, 2, 3), np.float32), Provenance(method="full"))
 
     display = load_display("seed-lenticular")
-    where = find_stand(motion, display, PlacementOptions())
+    where = place_frames(motion, display, PlacementOptions())
     list(render_frames(motion, display, frames, where, RenderRequest(spp=1, **options), Form(), lambda _: None))
     return asked
 
@@ -257,11 +257,11 @@ def test_empty_ranges_are_refused(first, stop, step):
 def test_contradictions_are_refused(moving_ball, room, display):
     flight = open_motion(room[0], camera_path=room[1])
     with pytest.raises(UsageError, match="beside a flight"):
-        find_stand(flight, display, PlacementOptions(place="fit"))
+        place_frames(flight, display, PlacementOptions(place="fit"))
     with pytest.raises(UsageError, match="beside a path"):
-        find_stand(flight, display, PlacementOptions(camera="x"))
+        place_frames(flight, display, PlacementOptions(camera="x"))
     with pytest.raises(SceneError, match="unknown camera 'x'"):
-        find_stand(open_motion(moving_ball), display, PlacementOptions(camera="x"))
+        place_frames(open_motion(moving_ball), display, PlacementOptions(camera="x"))
     with pytest.raises(UsageError, match="one pose a frame"):
         open_motion(room[0], camera_path=room[1], animation="x")
     with pytest.raises(UsageError, match="a camera path leads through"):

@@ -51,14 +51,14 @@ class Prepared:
 )
 def test_light_is_prepared_anew_where_what_it_depends_on_has_changed(light, scene, built, exposure, is_kept):
     kept, anew = KeptLight(), Prepared()
-    assert kept.of_key(lambda: light, "scene", "built", 1.0) is light
-    assert kept.of_next(lambda: anew, scene, built, exposure) is (light if is_kept else anew)
-    assert kept.of_next(lambda: anew, "scene", "built", 1.0) is light
+    assert kept.keep_key(lambda: light, "scene", "built", 1.0) is light
+    assert kept.reuse_key(lambda: anew, scene, built, exposure) is (light if is_kept else anew)
+    assert kept.reuse_key(lambda: anew, "scene", "built", 1.0) is light
 
 
 def test_without_a_key_frame_light_is_prepared():
     light = Prepared()
-    assert KeptLight().of_next(lambda: light, "scene", "built", 1.0) is light
+    assert KeptLight().reuse_key(lambda: light, "scene", "built", 1.0) is light
 
 
 @pytest.mark.long

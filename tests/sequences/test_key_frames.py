@@ -15,8 +15,8 @@ from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 from lippmann.rendering.preview import Preview
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.values.whitted_scene import CameraPose
-from lippmann.sequences.frames import find_stand, render_frames, render_sequence
-from lippmann.sequences.key_frames import estimate_of_next, frame_before
+from lippmann.sequences.frames import place_frames, render_frames, render_sequence
+from lippmann.sequences.key_frames import estimate_next, find_frame_before
 from lippmann.sequences.motion import Flight
 from lippmann.sequences.turntable import open_turntable
 
@@ -42,15 +42,15 @@ def asked_of(motion, display, frames, estimate=ESTIMATE, **options):
             asked.append((request.seed, request.spp, not request.judged_by))
             return Preview(np.zeros((2, 2, 3), np.float32), Provenance(method="pooled", spp=8, estimate=estimate))
 
-    where, request = find_stand(motion, display, PlacementOptions()), RenderRequest(**options)
+    where, request = place_frames(motion, display, PlacementOptions()), RenderRequest(**options)
     made = list(render_frames(motion, display, frames, where, request, Form(), lambda _: None))
     assert [frame for frame, _ in made] == list(frames)
     return asked
 
 
 def test_every_fourth_frame_is_followed_and_follows_another_where_light_is_passed_on():
-    assert [frame_before(frame, False) for frame in range(9)] == [None, 0, 0, 0, None, 4, 4, 4, None]
-    assert [frame_before(frame, True) for frame in range(3, 18)] == [0, 0, *[4] * 4, *[8] * 4, *[12] * 3, None, 16]
+    assert [find_frame_before(frame, False) for frame in range(9)] == [None, 0, 0, 0, None, 4, 4, 4, None]
+    assert [find_frame_before(frame, True) for frame in range(3, 18)] == [0, 0, *[4] * 4, *[8] * 4, *[12] * 3, None, 16]
 
 
 def test_frames_after_a_key_frame_take_three_quarters_of_its_samples_in_one_stream(motion, display):
@@ -99,7 +99,7 @@ def test_without_the_estimate_of_a_denoised_key_frame_all_have_halves(motion, di
 
 
 def test_fewer_samples_lower_the_estimate_by_their_root_and_its_lower_end_by_their_share():
-    after = estimate_of_next({**ESTIMATE, "worst_lens": [3, 4]})
+    after = estimate_next({**ESTIMATE, "worst_lens": [3, 4]})
     by_share = -10 * math.log10(0.75)
     assert after["psnr"] == pytest.approx(40 - by_share / 2, abs=0.01)
     assert after["by_chance"] == pytest.approx(46 - by_share / 2, abs=0.01)

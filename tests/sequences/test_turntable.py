@@ -15,9 +15,9 @@ from lippmann.quilts.quilt import quilt_of_display
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.matrices import inverse, transform_points
 from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
-from lippmann.sequences.files import saved_sequence
+from lippmann.sequences.files import save_sequence
 from lippmann.sequences.forms import QuiltForm
-from lippmann.sequences.frames import find_stand, render_sequence
+from lippmann.sequences.frames import place_frames, render_sequence
 from lippmann.sequences.turntable import Turntable, open_turntable
 
 QUICK = {"integrator": "direct", "spp": 4, "device": "cpu", "tone_map": "none"}
@@ -71,7 +71,7 @@ def corners_before(motion, where, frame):
 def test_one_placement_holds_the_scene_at_all_angles(display, turn, swing):
     options = PlacementOptions(turn=turn)
     motion = open_turntable(scene_of(block()), 24, swing=swing, placement=options)
-    where = find_stand(motion, display, options)
+    where = place_frames(motion, display, options)
     boxes = np.array([corners_before(motion, where, frame) for frame in range(24)])
     for frame in range(24):
         # The display goes round the scene as the scene would have turned before it.
@@ -81,7 +81,7 @@ def test_one_placement_holds_the_scene_at_all_angles(display, turn, swing):
     assert (boxes[:, 0, :2].min(axis=0) + boxes[:, 1, :2].max(axis=0)) == pytest.approx(0.0, abs=0.25)
     assert (np.abs(boxes[..., :2]) <= np.array(display.size_mm) / 2).all()
     # Nothing more than what is swept was made room for, whatever the yaw.
-    plain = find_stand(motion, display, replace(options, turn=(0.0, *turn[1:])))
+    plain = place_frames(motion, display, replace(options, turn=(0.0, *turn[1:])))
     scales = [np.linalg.norm(stand.first[:3, 0]) for stand in (where, plain)]
     assert swing is not None or scales[0] == pytest.approx(scales[1], rel=2e-3)
 
@@ -97,7 +97,7 @@ def test_a_frame_is_the_scene_turned(engine, display, frame):
     x, y, z = (block().positions.astype(np.float64) - (2.0, 3.0, 1.0)).T
     turned = np.stack([x * np.cos(angle) + z * np.sin(angle), y, z * np.cos(angle) - x * np.sin(angle)], axis=1)
     mesh = replace(block(), positions=(turned + np.array([2.0, 3.0, 1.0])).astype(np.float32))
-    placed = find_stand(motion, display, PlacementOptions())(0)
+    placed = place_frames(motion, display, PlacementOptions())(0)
     expected = lippmann.render(scene_of(mesh, lights=[SIDE_LIGHT]), display, placement=placed, **QUICK)
     assert expected.pixels.max() > 0.05
     # Edges may fall to the other side by rounding.
@@ -137,7 +137,7 @@ def test_classic_light_stands_still_too(engine, display, tmp_path):
     # Of the world, whose z is Tachyon's negated: (2, 0, 0) goes to (0, 0, -2), which is behind.
     still, turned = room("a.dat", (2, 0), (-2, 0)), room("b.dat", (0, 2), (0, -2))
     motion = open_turntable(still, 4)
-    where = find_stand(motion, display, PlacementOptions())
+    where = place_frames(motion, display, PlacementOptions())
     ((_, image),) = render_sequence(motion, display, [1], device="cpu")
     expected = lippmann.render(turned, display, placement=where(0), device="cpu")
     assert np.ptp(expected.pixels) > 0.3
@@ -160,7 +160,7 @@ def test_exposure_is_held(engine, display):
     scene = scene_of(block(), lights=[SIDE_LIGHT])
     scene = replace(scene, description=replace(scene.description, physical_lights=True))
     motion = open_turntable(scene, 4)
-    where = find_stand(motion, display, PlacementOptions())
+    where = place_frames(motion, display, PlacementOptions())
     request = RenderRequest(**QUICK, placement=where(0))
     exposure = picture.choose_exposure(motion.scene(0), display, request)
     images = dict(render_sequence(motion, display, [1, 2], **QUICK))
@@ -180,7 +180,7 @@ def test_unfinished_quilts_are_gone_on_with(engine, display, tmp_path):
         request = RenderRequest(**QUICK)
         output = folder / f"q_%d{ending}.png"
         folder.mkdir(exist_ok=True)
-        with saved_sequence(
+        with save_sequence(
             motion, output, lambda k: folder / f"q_{k}{ending}.png", display, range(3), request, form=form, **options
         ) as saved:
             for frame in saved:
@@ -203,7 +203,7 @@ def test_a_camera_that_places_the_display_cuts_nothing_off(display):
     teapot = lippmann.load_scene("teapot")
     options = PlacementOptions(place="camera")
     motion = open_turntable(teapot, 8, placement=options)
-    where = find_stand(motion, display, options)
+    where = place_frames(motion, display, options)
     fronts = [where(frame).depth_range[1] for frame in range(8)]
     assert max(fronts) <= display.aperture_distance
     assert "the lens plane moved" in where(0).warnings[0]

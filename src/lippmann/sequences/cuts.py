@@ -14,10 +14,7 @@ from lippmann.scene.matrices import Bounds, rotation_of, transform_points
 from lippmann.scene.placement import Placement
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import SceneDescription, Texture
-
-#: The farthest that anything moves without a cut, as a share of the display's width: a turn by 39 degrees moves the
-#: panel's edges so far.
-_FARTHEST = 1 / 3
+from lippmann.sequences.tuning import TUNING
 
 
 class Moment(NamedTuple):
@@ -36,21 +33,21 @@ def is_cut(before: Moment, after: Moment, display: Display) -> bool:
     """
     width, height = display.size_mm
     panel = box_corners(np.array([[-width / 2, -height / 2, 0], [width / 2, height / 2, 0]]))
-    moved = [_distances(_in_world(panel, before), _in_world(panel, after))]
+    moved = [_measure_distances(_in_world(panel, before), _in_world(panel, after))]
     reach = float(np.linalg.norm(before.placement.world_from_display[:3, 0])) * width
     one, other = before.scene.description, after.scene.description
     # Scenes of Whitted tracers have none: nothing moves in them.
     if one is not other or before.scene.name != after.scene.name:
         if not (isinstance(one, SceneDescription) and isinstance(other, SceneDescription)):
             return True
-        if _content(one) != _content(other) or not _has_same_texels(one, other):
+        if _list_content(one) != _list_content(other) or not _has_same_texels(one, other):
             return True
-        moved.append(_distances(_corners(one), _corners(other)))
-        lights = _lights(one, reach), _lights(other, reach)
+        moved.append(_measure_distances(_place_corners(one), _place_corners(other)))
+        lights = _place_lights(one, reach), _place_lights(other, reach)
         # A turntable's display goes round with them.
         along = transform_points(before.placement.world_from_display @ after.placement.display_from_world, lights[1])
-        moved.append(np.minimum(_distances(*lights), _distances(lights[0], along)))
-    return any(distances.max(initial=0.0) > _FARTHEST * reach for distances in moved)
+        moved.append(np.minimum(_measure_distances(*lights), _measure_distances(lights[0], along)))
+    return any(distances.max(initial=0.0) > TUNING.farthest * reach for distances in moved)
 
 
 def is_light_at_rest(before: Moment, after: Moment) -> bool:
@@ -64,7 +61,7 @@ def is_light_at_rest(before: Moment, after: Moment) -> bool:
     return bool(np.ptp(list(turns), axis=0).max() < 1e-6)
 
 
-def _distances(one: Bounds, other: Bounds) -> NDArray[np.float64]:
+def _measure_distances(one: Bounds, other: Bounds) -> NDArray[np.float64]:
     """Distances ``(n,)`` between points ``(n, 3)``."""
     return np.asarray(np.linalg.norm(one - other, axis=1))
 
@@ -73,7 +70,7 @@ def _in_world(points: Bounds, moment: Moment) -> Bounds:
     return transform_points(moment.placement.world_from_display, points)
 
 
-def _content(description: SceneDescription) -> object:
+def _list_content(description: SceneDescription) -> object:
     """Properties that smooth motion does not change; a difference is a cut."""
     return (
         {mesh: len(places) for mesh, places in description.placements.items()},
@@ -88,16 +85,16 @@ def _content(description: SceneDescription) -> object:
 
 def _has_same_texels(one: SceneDescription, other: SceneDescription) -> bool:
     """Whether the textures of as many materials have the same images."""
-    pairs = zip(_textures(one), _textures(other), strict=True)
+    pairs = zip(_list_textures(one), _list_textures(other), strict=True)
     return all(a is b or a.image is b.image or np.array_equal(a.image.pixels, b.image.pixels) for a, b in pairs)
 
 
-def _textures(description: SceneDescription) -> Iterator[Texture]:
+def _list_textures(description: SceneDescription) -> Iterator[Texture]:
     for material in description.materials:
         yield from (value for value in vars(material).values() if isinstance(value, Texture))
 
 
-def _lights(description: SceneDescription, reach: float) -> Bounds:
+def _place_lights(description: SceneDescription, reach: float) -> Bounds:
     """Two points ``(2 n, 3)`` of each light source: its place, and half of ``reach`` from there along its axis."""
     ends = []
     for light in description.lights:
@@ -106,7 +103,7 @@ def _lights(description: SceneDescription, reach: float) -> Bounds:
     return np.array(ends).reshape(-1, 3)
 
 
-def _corners(description: SceneDescription) -> Bounds:
+def _place_corners(description: SceneDescription) -> Bounds:
     """Corners ``(n, 3)`` of the boxes of all meshes, one for each copy, world units."""
     corners = [np.zeros((0, 3))]
     for mesh, places in description.placements.items():

@@ -19,7 +19,7 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import engine
 from lippmann.scene.placement import options_of_sequence
 from lippmann.sequences.forms import INTEGRAL, Form
-from lippmann.sequences.frames import Stand, find_stand, render_frames, render_tiled_frames
+from lippmann.sequences.frames import FramePlacements, place_frames, render_frames, render_tiled_frames
 from lippmann.sequences.motion import Motion
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def journal_of(output: Path, first: Path) -> Path:
 
 
 @contextmanager
-def saved_sequence(
+def save_sequence(
     motion: Motion,
     output: Path,
     path_of: Callable[[int], Path],
@@ -129,22 +129,22 @@ def saved_sequence(
         "frames are rendered": "whole" if runner is None else "in tiles",
         "the first frame": str(frames[0]),
     }
-    where = find_stand(motion, display, placement)
+    where = place_frames(motion, display, placement)
     with FrameJournal.open(journal_of(output, path_of(frames[0])), fingerprint, resume=resume) as journal:
         missing = [number for number in frames if not journal.holds(number, path_of(number))]
         if missing:
             sweep_beside(path_of(missing[0]))  # which an interrupted run may have left half written
         if runner is None:
-            made = _whole(motion, display, missing, where, path_of, bits, progress, request, form)
+            made = _render_whole(motion, display, missing, where, path_of, bits, progress, request, form)
         else:
             files = render_tiled_frames(motion, display, missing, where, path_of, request, runner, bits, progress)
             made = (SavedFrame(number, path_of(number), written.provenance) for number, written in files)
-        yield _in_order(frames, missing, path_of, made, journal, form)
+        yield _order_frames(frames, missing, path_of, made, journal, form)
         if all(number in journal for number in frames):
             journal.finish()
 
 
-def _in_order(
+def _order_frames(
     frames: Sequence[int],
     missing: Sequence[int],
     path_of: Callable[[int], Path],
@@ -165,11 +165,11 @@ def _in_order(
         del frame  # while the next is rendered
 
 
-def _whole(
+def _render_whole(
     motion: Motion,
     display: Display,
     frames: Sequence[int],
-    where: Stand,
+    where: FramePlacements,
     path_of: Callable[[int], Path],
     bits: int | None,
     progress: ProgressCallback,

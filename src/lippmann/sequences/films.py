@@ -26,7 +26,7 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import options_of_sequence
 from lippmann.sequences.files import SavedFrame
 from lippmann.sequences.forms import QuiltForm
-from lippmann.sequences.frames import Stand, find_stand, hold_exposure, of_frame
+from lippmann.sequences.frames import FramePlacements, give_seed, hold_exposure, place_frames
 from lippmann.sequences.kept_scene import KeptScene
 from lippmann.sequences.motion import Motion
 from lippmann.viewing.color_and_depth import rgbd_codes
@@ -75,7 +75,7 @@ class Filming(NamedTuple):
     has_depth: bool = False
 
 
-def film_of_pictures(
+def film_pictures(
     video: Path,
     motion: Motion,
     display: Display,
@@ -128,7 +128,7 @@ def film_of_pictures(
                 fix="layers=True, and frames named %04d.exr",
             )
         form = RgbdForm(half=shows == "rgbd-half")
-        place = find_stand(motion, display, options_of_sequence(request.placement))(0)
+        place = place_frames(motion, display, options_of_sequence(request.placement))(0)
         z = default_eye(display)[2] if eye is None else eye[2]
         # The same in all frames: what the motion ever fills, as far as it lies in front of the eye.
         back, front = (min(edge, 0.9 * z) for edge in place.depth_range)
@@ -145,10 +145,10 @@ def film_of_pictures(
         image = read_picture(frame.path)
         return quantize(projection(image), 8, image.provenance.transfer)
 
-    return _film_of(video, see, size if layout is None else (WIDEST_QUILT, WIDEST_QUILT), shows, codec, layout)
+    return _film_eye(video, see, size if layout is None else (WIDEST_QUILT, WIDEST_QUILT), shows, codec, layout)
 
 
-def film_of_quilts(
+def film_quilts(
     video: Path,
     display: Display,
     form: QuiltForm,
@@ -216,10 +216,10 @@ def film_of_quilts(
         quilt = _quilt(frame)
         return quantize(view_of_quilt(quilt, number), 8, quilt.provenance.transfer)
 
-    return _film_of(video, see, default_size(display), shows, codec)
+    return _film_eye(video, see, default_size(display), shows, codec)
 
 
-def _film_of(
+def _film_eye(
     video: Path,
     see: Callable[[SavedFrame], Pixels],
     size: tuple[int, int],
@@ -261,17 +261,17 @@ class QuiltCameras:
     display: Display
     request: RenderRequest
     layout: QuiltLayout
-    _where: Stand | None = field(default=None, init=False)
+    _where: FramePlacements | None = field(default=None, init=False)
     _kept: KeptScene = field(default_factory=KeptScene, init=False)
 
     def __call__(self, frame: int) -> Quilt:
         where = self._begin() if self._where is None else self._where
-        request = replace(of_frame(self.request, frame), placement=where(frame))
+        request = replace(give_seed(self.request, frame), placement=where(frame))
         return self._form().render(self.motion.scene(frame), self.display, request, silent, self._kept.build)
 
-    def _begin(self) -> Stand:
+    def _begin(self) -> FramePlacements:
         """Find where the display stands, and what of the request a quilt can honour."""
-        self._where = find_stand(self.motion, self.display, options_of_sequence(self.request.placement))
+        self._where = place_frames(self.motion, self.display, options_of_sequence(self.request.placement))
         held = hold_exposure(self.request, self.motion, self.display, self._where, self._kept.build)
         method = "full" if held.method in REUSING else held.method
         self.request = replace(held, method=method, order=None, respect_gloss=None, subpixels=False, layers=False)

@@ -6,10 +6,12 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import cast
 
+from lippmann.sequences.tuning import TUNING
+
 Figures = Mapping[str, object]
 
 
-def with_flicker(estimate: Figures | None, traced: float = 1.0, *, stays: bool = False) -> Figures | None:
+def add_flicker(estimate: Figures | None, traced: float = 1.0, *, stays: bool = False) -> Figures | None:
     """A frame's estimate, as its file holds it, with its flicker.
 
     Flicker is half the mean squared change of the error from one frame to the next, in dB, as
@@ -39,7 +41,7 @@ def with_flicker(estimate: Figures | None, traced: float = 1.0, *, stays: bool =
     by_chance, psnr, low, high = (
         cast("float", estimate[name]) for name in ("by_chance", "psnr", "psnr_low", "psnr_high")
     )
-    fewer = -10 * math.log10(max(traced, 0.01))  # finite where no pixel was traced: 20 dB
+    fewer = -10 * math.log10(max(traced, TUNING.least_traced))
     middle = mean_psnr((by_chance, psnr)) + (fewer if stays else 0.0)
     most = max(by_chance, high) + fewer
     return {**estimate, "flicker": round(middle, 2), "flicker_low": low, "flicker_high": round(most, 2)}

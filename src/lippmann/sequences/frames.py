@@ -25,13 +25,14 @@ from lippmann.runtime.machine import return_freed_memory
 from lippmann.scene.placement import Placement, find_eye_share, options_of_sequence, place, place_at
 from lippmann.scene.values.description import Camera, Matrix
 from lippmann.sequences.cuts import Moment
-from lippmann.sequences.flicker import with_flicker
+from lippmann.sequences.flicker import add_flicker
 from lippmann.sequences.forms import INTEGRAL, Form, Output, QuiltForm
 from lippmann.sequences.kept_scene import KeptScene
-from lippmann.sequences.key_frames import KeyFrames, estimate_of_next
+from lippmann.sequences.key_frames import KeyFrames, estimate_next
 from lippmann.sequences.key_light import KeyLight, LightOfSurfaces
-from lippmann.sequences.motion import MOMENTS, Motion, open_motion
+from lippmann.sequences.motion import Motion, open_motion
 from lippmann.sequences.still_pixels import StillPixels
+from lippmann.sequences.tuning import TUNING
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
@@ -90,8 +91,8 @@ class FrameRange:
 
 
 @dataclass(frozen=True)
-class Stand:
-    """Where the display stands in every frame; call it with a frame's number.
+class FramePlacements:
+    """Placements of the display in all frames; called with a frame's number.
 
     ``camera`` is the name of the scene's camera that the display follows, if it follows one of the scene's own.
     ``warnings`` hold for all frames, in place of those of each. ``may_cut`` is that of all placements.
@@ -112,7 +113,7 @@ class Stand:
         if self.first_pose is None:
             return self.motion.display_turn(frame) @ self.first, 0.0
         camera = cast(Camera, self.motion.camera(frame, self.camera))
-        return _pose(camera) @ np.linalg.inv(self.first_pose) @ self.first, camera.exposure
+        return _find_pose(camera) @ np.linalg.inv(self.first_pose) @ self.first, camera.exposure
 
     def __call__(self, frame: int) -> Placement:
         scene = self.motion.scene(frame)
@@ -123,8 +124,8 @@ class Stand:
         return placement if self.warnings is None else replace(placement, warnings=self.warnings)
 
 
-def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> Stand:
-    """Where a display stands in a scene that moves, for all its frames alike.
+def place_frames(motion: Motion, display: Display, options: PlacementOptions) -> FramePlacements:
+    """Place a display in a scene that moves, by one rule for all its frames.
 
     Raises
     ------
@@ -133,7 +134,7 @@ def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> S
     """
     own = motion.placement(display, options)
     if own is not None:
-        return _stand_as(own, motion, display, warnings=own.warnings)
+        return _repeat_placement(own, motion, display, warnings=own.warnings)
     camera = motion.camera(0, options.camera)
     if camera is None and options.place == "camera":
         cameras = motion.scene(0).cameras
@@ -143,27 +144,27 @@ def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> S
         camera = motion.camera(0, options.camera)
     if camera is None:
         placement = place(motion.bounds(), display, cameras=motion.scene(0).facing_cameras, options=options)
-        return _stand_as(placement, motion, display)
+        return _repeat_placement(placement, motion, display)
     if options.place not in (None, "camera"):
         raise UsageError(
             f"placement '{options.place}' beside a flight", parameter="place", rule="the display follows the camera"
         )
-    following = replace(options, place="camera", camera=camera.name)
-    bounds = motion.bounds()
-    placement = place(bounds, display, cameras=(camera,), options=following)
-    stand_of_first = _stand_as(placement, motion, display, camera=options.camera, first_pose=_pose(camera))
+    of_camera = replace(options, place="camera", camera=camera.name)
+    bounds, pose = motion.bounds(), _find_pose(camera)
+    placement = place(bounds, display, cameras=(camera,), options=of_camera)
+    following = _repeat_placement(placement, motion, display, camera=options.camera, first_pose=pose)
     if display.stereo is None or options.depth_scale is not None:
-        return stand_of_first
+        return following
     # One distance between the eyes for all frames, so that nothing changes its depth as they come and go.
-    moments = {round(moment) for moment in np.linspace(0, motion.count - 1, MOMENTS)}
-    shares = (find_eye_share(stand_of_first.where(frame)[0], bounds, display)[0] for frame in sorted(moments))
-    return replace(stand_of_first, eye_share=min(shares))
+    moments = {round(moment) for moment in np.linspace(0, motion.count - 1, TUNING.moments)}
+    shares = (find_eye_share(following.where(frame)[0], bounds, display)[0] for frame in sorted(moments))
+    return replace(following, eye_share=min(shares))
 
 
-def _stand_as(placement: Placement, motion: Motion, display: Display, **values: Any) -> Stand:
-    """The stand of a first placement."""
-    where, may_cut = placement.world_from_display, placement.may_cut
-    return Stand(motion, display, placement.mode, where, may_cut=may_cut, eye_share=placement.eye_share, **values)
+def _repeat_placement(placement: Placement, motion: Motion, display: Display, **values: Any) -> FramePlacements:
+    """The placements of all frames that follow from the first one."""
+    values |= {"may_cut": placement.may_cut, "eye_share": placement.eye_share}
+    return FramePlacements(motion, display, placement.mode, placement.world_from_display, **values)
 
 
 @checked
@@ -315,17 +316,17 @@ def _begin(
     display: Display | str | Path,
     frames: FrameRange | Sequence[int],
     placement: PlacementOptions | Mapping[str, object] | None,
-) -> tuple[Display, Sequence[int], Stand]:
+) -> tuple[Display, Sequence[int], FramePlacements]:
     target = display if isinstance(display, Display) else load_display(display)
     numbers = frames.of(motion) if isinstance(frames, FrameRange) else frames
-    return target, numbers, find_stand(motion, target, options_of_sequence(placement))
+    return target, numbers, place_frames(motion, target, options_of_sequence(placement))
 
 
 def render_frames(
     motion: Motion,
     display: Display,
     frames: Sequence[int],
-    where: Stand,
+    where: FramePlacements,
     request: RenderRequest,
     form: Form[Output],
     progress: ProgressCallback,
@@ -341,23 +342,23 @@ def render_frames(
         return form.render(now.scene, display, replace(request, placement=now.placement), report, kept.build)
 
     def render_key(key: Moment, own: RenderRequest, noise_of: int) -> Provenance:
-        return trace(key, of_frame(own, noise_of), silent).provenance
+        return trace(key, give_seed(own, noise_of), silent).provenance
 
-    shared = _shared_light(motion, where)
+    shared = _choose_key_light(motion, where)
     keys = KeyFrames(display, moment, render_key, shared)
 
     def render(position: int, frame: int) -> Output:
         now = moment(frame)
         key = keys.before(now, request)
-        own = keys.request_of(of_frame(request, keys.noise_of(frame, request)), now, key)
-        image = trace(now, own, _report_of_frame(progress, position, len(frames)))
+        own = keys.make_request(give_seed(request, keys.noise_of(frame, request)), now, key)
+        image = trace(now, own, _report_frame(progress, position, len(frames)))
         made = image.provenance
         keys.add(now, made, key)
-        estimate = made.estimate if key is None or key.made.estimate is None else estimate_of_next(key.made.estimate)
+        estimate = made.estimate if key is None or key.made.estimate is None else estimate_next(key.made.estimate)
         # Noise that stands still has no flicker that the frames' own errors would tell.
         if not request.fixed_noise:
             stays = shared is not None and shared.keeps_noise
-            estimate = with_flicker(estimate, made.pixel_shares.get("traced", 1.0), stays=stays)
+            estimate = add_flicker(estimate, made.pixel_shares.get("traced", 1.0), stays=stays)
         return replace(image, provenance=replace(made, options={**made.options, "frame": frame}, estimate=estimate))
 
     for position, frame in enumerate(frames):
@@ -369,7 +370,7 @@ def render_tiled_frames(
     motion: Motion,
     display: Display,
     frames: Sequence[int],
-    where: Stand,
+    where: FramePlacements,
     path_of: Callable[[int], Path],
     request: RenderRequest,
     runner: Runner | None,
@@ -386,18 +387,18 @@ def render_tiled_frames(
             render_to_file(
                 motion.scene(frame),
                 display,
-                replace(of_frame(request, frame), placement=where(frame)),
+                replace(give_seed(request, frame), placement=where(frame)),
                 path_of(frame),
                 bits=bits,
                 resume=True,
                 runner=runner,
-                progress=_report_of_frame(progress, position, len(frames)),
+                progress=_report_frame(progress, position, len(frames)),
             ),
         )
 
 
 def hold_exposure(
-    request: RenderRequest, motion: Motion, display: Display, where: Stand, build: Build | None = None
+    request: RenderRequest, motion: Motion, display: Display, where: FramePlacements, build: Build | None = None
 ) -> RenderRequest:
     """``request`` with the exposure that suits the motion's first frame, whichever frames are rendered."""
     scene = motion.scene(0)
@@ -409,14 +410,14 @@ def hold_exposure(
     return replace(request, exposure=choose_exposure(scene, display, still, build))
 
 
-def _shared_light(motion: Motion, where: Stand) -> KeyLight | None:
+def _choose_key_light(motion: Motion, where: FramePlacements) -> KeyLight | None:
     """What frames share of a key frame's light: none where the display goes round a scene and takes the light along."""
     if where.first_pose is not None:
         return LightOfSurfaces()
     return StillPixels() if np.array_equal(motion.display_turn(1), np.eye(4)) else None
 
 
-def of_frame(request: RenderRequest, number: int) -> RenderRequest:
+def give_seed(request: RenderRequest, number: int) -> RenderRequest:
     """What one frame is asked for: a seed of its own, which its number alone decides, unless noise is to stand still.
 
     With the same seed in all frames, noise stands on the glass like dirt.
@@ -427,7 +428,7 @@ def of_frame(request: RenderRequest, number: int) -> RenderRequest:
     return replace(request, seed=seed, fixed_noise=False)
 
 
-def _report_of_frame(progress: ProgressCallback, position: int, frames: int) -> ProgressCallback:
+def _report_frame(progress: ProgressCallback, position: int, frames: int) -> ProgressCallback:
     """Reports of one frame's tracing as reports of the whole sequence, which never run backwards."""
     done = float(position)
 
@@ -440,15 +441,15 @@ def _report_of_frame(progress: ProgressCallback, position: int, frames: int) -> 
     return report
 
 
-def _pose(camera: Camera) -> Matrix:
+def _find_pose(camera: Camera) -> Matrix:
     return np.asarray(camera.world_from_camera, np.float64)
 
 
 __all__ = [
     "FrameRange",
     "Motion",
-    "find_stand",
     "open_motion",
+    "place_frames",
     "render_quilt_sequence",
     "render_sequence",
     "sequence_to_files",

@@ -22,7 +22,7 @@ class KeptLight:
     def __init__(self) -> None:
         self._last: tuple[PreparedLight, Scene, BuiltScene, float] | None = None
 
-    def of_key(
+    def keep_key(
         self, prepare: Callable[[], PreparedLight], scene: Scene, built: BuiltScene, own_exposure: float
     ) -> PreparedLight:
         """The light of a key frame; parameters as :class:`~lippmann.rendering.request.render_request.RenderRequest`
@@ -33,7 +33,7 @@ class KeptLight:
         self._last = light, scene, built, own_exposure
         return light
 
-    def of_next(
+    def reuse_key(
         self, prepare: Callable[[], PreparedLight], scene: Scene, built: BuiltScene, own_exposure: float
     ) -> PreparedLight:
         """The light of a frame after the key frame: the same where it depends on nothing that has changed."""

@@ -26,13 +26,7 @@ from lippmann.sequences.cuts import Moment, is_cut
 from lippmann.sequences.flicker import Figures
 from lippmann.sequences.kept_light import KeptLight
 from lippmann.sequences.key_light import KeyLight
-
-#: Every so many frames one has half-buffers, or passes on the light that it took.
-FRAMES_OF_KEY = 4
-#: Every so many frames one has half-buffers where light is passed on.
-FRAMES_OF_LIGHT = 16
-#: Samples of a frame after a key frame, as a share of the key frame's. ``docs/research/films.md`` has all and half.
-_SAMPLES_KEPT = 0.75
+from lippmann.sequences.tuning import TUNING
 
 
 class Key(NamedTuple):
@@ -71,33 +65,33 @@ class KeyFrames:
         self._last: tuple[Moment, Key] | None = None  # the last frame that others follow, and its key frame
         self._light = KeptLight()
 
-    def request_of(self, request: RenderRequest, moment: Moment, key: Key | None) -> RenderRequest:
+    def make_request(self, request: RenderRequest, moment: Moment, key: Key | None) -> RenderRequest:
         """The request of a frame, which follows a ``key`` frame or, None, has halves of its own."""
-        has_next = moment.number % FRAMES_OF_KEY == 0
+        has_next = moment.number % TUNING.frames_of_key == 0
         if key is not None:
             assert key.made.spp is not None
             assert self._last is not None
-            of_key = f"the estimate of the error follows from frame {key.moment.number}'s"
-            estimate_source = f"{of_key}, with three quarters of its samples"
-            samples = math.ceil(_SAMPLES_KEPT * key.made.spp)
-            own = replace(request, spp=samples, judged_by=estimate_source, keep_light=self._light.of_next)
+            samples = math.ceil(TUNING.samples_kept * key.made.spp)
+            frame = key.moment.number
+            source = f"the estimate of the error follows from frame {frame}'s, with three quarters of its samples"
+            own = replace(request, spp=samples, judged_by=source, keep_light=self._light.reuse_key)
             if self._shared is None or not self._shared.holds(self._last[0], moment):
                 return own
             return replace(own, trace_through=self._shared.pass_on if has_next else self._shared.trace_next)
         if not (has_next and _is_open(request)):
             return request
-        own = replace(request, keep_light=self._light.of_key)
+        own = replace(request, keep_light=self._light.keep_key)
         return own if self._shared is None else replace(own, trace_through=self._shared.trace_key)
 
     def noise_of(self, frame: int, request: RenderRequest) -> int:
         """The number of the frame whose seed a frame has: its own, but the first's where noise would jump otherwise."""
         is_alike = self._shared is not None and self._shared.keeps_noise and _is_open(request)
-        return 0 if is_alike and frame % FRAMES_OF_LIGHT == 0 else frame
+        return 0 if is_alike and frame % TUNING.frames_of_light == 0 else frame
 
     def add(self, moment: Moment, made: Provenance, key: Key | None) -> Key:
         """Remember how a frame was made, which followed a ``key`` frame or, None, had halves; its key frame."""
         key = key or Key(moment, made)
-        if moment.number % FRAMES_OF_KEY == 0:
+        if moment.number % TUNING.frames_of_key == 0:
             self._last = moment, key
         return key
 
@@ -108,19 +102,19 @@ class KeyFrames:
         where the key frame's picture is no denoised one, and after a cut. A frame to follow that is missing is
         rendered.
         """
-        number = frame_before(moment.number, self._shared is not None)
+        number = find_frame_before(moment.number, self._shared is not None)
         if number is None or not _is_open(request):
             return None
         kept = self._last if self._last is not None and self._last[0].number == number else None
         last = self._moment(number) if kept is None else kept[0]
-        is_link = moment.number % FRAMES_OF_KEY == 0
+        is_link = moment.number % TUNING.frames_of_key == 0
         if is_cut(last, moment, self._display):
             return None
         if is_link and not (self._shared and self._shared.holds(last, moment)):
             return None
         if kept is None:
             before = self.before(last, request)
-            made = self._render(last, self.request_of(request, last, before), self.noise_of(number, request))
+            made = self._render(last, self.make_request(request, last, before), self.noise_of(number, request))
             key = self.add(last, made, before)
         else:
             key = kept[1]
@@ -128,21 +122,21 @@ class KeyFrames:
         return key if has_estimate and not is_cut(key.moment, moment, self._display) else None
 
 
-def frame_before(frame: int, passes_light_on: bool) -> int | None:
+def find_frame_before(frame: int, passes_light_on: bool) -> int | None:
     """The frame that a frame follows, by their numbers; None of those that always have halves."""
-    if frame % FRAMES_OF_KEY:
-        return frame - frame % FRAMES_OF_KEY
-    return frame - FRAMES_OF_KEY if passes_light_on and frame % FRAMES_OF_LIGHT else None
+    if frame % TUNING.frames_of_key:
+        return frame - frame % TUNING.frames_of_key
+    return frame - TUNING.frames_of_key if passes_light_on and frame % TUNING.frames_of_light else None
 
 
-def estimate_of_next(key: Figures) -> Figures:
+def estimate_next(key: Figures) -> Figures:
     """The estimate of a frame after a key frame, whose own is ``key``, both as files hold them.
 
     The MSE of a denoised picture is taken to fall with the square root of the number of samples, as it does on the
     average (``docs/background/measurements.md``: 2.4 dB for four times as many), and at most in proportion to it: that
     are the lower ends. The upper ends are the key frame's, as the frame is denoised as a whole.
     """
-    most = -10 * math.log10(_SAMPLES_KEPT)
+    most = -10 * math.log10(TUNING.samples_kept)
     less = {"psnr": most / 2, "worst": most / 2, "by_chance": most / 2, "psnr_low": most, "worst_low": most}
     return {name: round(cast("float", value) - less[name], 2) if name in less else value for name, value in key.items()}
 

@@ -80,7 +80,7 @@ class LightOfSurfaces(KeyLight):
     def trace_next(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
         if self._key is None or self._key[0] is not light_of(job):
             return trace(job)
-        pixels, is_known = _known_light(self._key[1], job)
+        pixels, is_known = _gather_light(self._key[1], job)
         return trace_others(job, pixels, is_known) if is_known.any() else trace(job)
 
     def holds(self, key: Moment, moment: Moment) -> bool:
@@ -89,10 +89,10 @@ class LightOfSurfaces(KeyLight):
     def _keep(self, job: Job, traced: Traced) -> None:
         from lippmann.device.pbr.diffuse_pixels import KeyPicture
 
-        light, views = light_of(job), _views_of(job)
+        light, views = light_of(job), _find_views(job)
         if light is not None and views is not None:
-            colors = _each_column(job, traced.frame.pixels)
-            self._key = light, KeyPicture(_pixels_of(job), colors, views, columns_of(job))
+            colors = _split_columns(job, traced.frame.pixels)
+            self._key = light, KeyPicture(_make_pixels(job), colors, views, count_columns(job))
 
     def _forget(self) -> None:
         self._key = None
@@ -107,7 +107,7 @@ def light_of(job: Job) -> PreparedLight | None:
     return job.integrator.light
 
 
-def _views_of(job: Job) -> NearbyViews | None:
+def _find_views(job: Job) -> NearbyViews | None:
     """The views of a job's picture; None of micro-lens arrays whose sub-pixels have rays of their own."""
     from lippmann.display.nearby_views import CameraViews, LensViews
     from lippmann.display.panel import PixelWindow
@@ -122,12 +122,12 @@ def _views_of(job: Job) -> NearbyViews | None:
     return LensViews(source.display, source.window if isinstance(source, WindowRays) else whole)
 
 
-def columns_of(job: Job) -> int:
+def count_columns(job: Job) -> int:
     """Columns that are traced of each pixel: 3 of sub-pixels in full colour, else 1."""
     return job.sample_source.width // job.source.width
 
 
-def _each_column(job: Job, pixels: Floats) -> Floats:
+def _split_columns(job: Job, pixels: Floats) -> Floats:
     """``pixels (H, W, 3)`` in traced columns: as they are, or ``(H, 3 W, 1)`` one colour for each sub-pixel."""
     from lippmann.rendering.transport.ray_source import SubpixelRays
 
@@ -137,7 +137,7 @@ def _each_column(job: Job, pixels: Floats) -> Floats:
     return np.ascontiguousarray(pixels[..., order].reshape(len(pixels), -1, 1))
 
 
-def _pixels_of(job: Job) -> DiffusePixels:
+def _make_pixels(job: Job) -> DiffusePixels:
     """What is traced of a job's picture, on the device."""
     from lippmann.device.pbr import BuiltScene
     from lippmann.device.pbr.diffuse_pixels import DiffusePixels
@@ -153,17 +153,17 @@ def _pixels_of(job: Job) -> DiffusePixels:
         job.display_from_world,
         guides.height,
         guides.normal,
-        _each_column(job, albedo),
+        _split_columns(job, albedo),
     )
 
 
-def _known_light(key: KeyPicture, job: Job) -> tuple[Floats, Mask]:
+def _gather_light(key: KeyPicture, job: Job) -> tuple[Floats, Mask]:
     """The light ``(H, columns W, 3)`` by a key frame, and the pixels ``(H, W)`` in which it is known."""
     from lippmann.rendering.sharing.cross_lens import light_of_pixels
     from lippmann.rendering.transport.ray_source import SubpixelRays
 
     source, albedo = job.sample_source, job.denoiser.guides().albedo
-    table = light_of_pixels(partial(key.irradiance, _pixels_of(job), job.request.coding), (*albedo.shape[:2], 4))
+    table = light_of_pixels(partial(key.irradiance, _make_pixels(job), job.request.coding), (*albedo.shape[:2], 4))
     irradiance, is_known = table[..., :3], np.asarray(table[..., 3] > 0)
     if isinstance(source, SubpixelRays):
         # Each column has one colour's own; the others are those beside it.
@@ -200,7 +200,7 @@ def trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
         frame = Frame(colors, shares=shares)
         frame.maps[SAMPLES_LAYER] = np.zeros(is_known.shape, np.uint32)
         return Traced(frame, request.samples, notes=(request.judged_by, note))
-    few, places = rays_of(source, ~np.repeat(is_known, columns_of(job), axis=1))
+    few, places = rays_of(source, ~np.repeat(is_known, count_columns(job), axis=1))
     session = replace(job.session, request=request)
     traced = one_stream(Job(session, job.integrator, few, job.display_from_world), request.judged_by, note)
     frame = traced.frame
@@ -220,10 +220,10 @@ def trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
         frame.coverage = Coverage(spread(frame.coverage.share, covered), frame.coverage.samples)
     frame.maps[SAMPLES_LAYER] = np.where(is_known, np.uint32(0), np.uint32(traced.samples))
     frame.shares = shares
-    job.denoiser.restrict_to(~np.repeat(is_known, columns_of(job), axis=1))
+    job.denoiser.restrict_to(~np.repeat(is_known, count_columns(job), axis=1))
     traced = denoise_whole(job, traced)
     traced.frame.pixels[is_known] = colors[is_known]
     return traced
 
 
-__all__ = ["KeyLight", "LightOfSurfaces", "columns_of", "light_of", "rays_of", "trace_others"]
+__all__ = ["KeyLight", "LightOfSurfaces", "count_columns", "light_of", "rays_of", "trace_others"]

@@ -24,6 +24,7 @@ from lippmann.scene.scene import Scene, check_description, find_camera, override
 from lippmann.scene.values.description import Camera, Matrix, SceneDescription
 from lippmann.scene.values.whitted_scene import CameraPose, ClassicScene
 from lippmann.scene.whitted.world_frame import world_camera
+from lippmann.sequences.tuning import TUNING
 
 #: Frames of an animation per second where nothing is said.
 FRAMES_PER_SECOND = 24.0
@@ -33,12 +34,6 @@ AS_IT_IS = SceneOptions()
 
 #: Options of a scene's file that go with its motion.
 _OF_MOVING = ("variants", "reader_options", "environment", "background", "single_scattering")
-
-#: Moments, spread evenly over an animation, whose boxes together stand for all that it ever fills.
-MOMENTS = 65
-
-#: A frame that rounding puts this far (frames) beyond an animation's end still belongs to it.
-_ROUNDING = 1e-3
 
 
 class Motion(ABC):
@@ -122,7 +117,7 @@ class AnimatedFile(Motion):
 
     @property
     def count(self) -> int:
-        return int(self._moving.duration * self._fps + _ROUNDING) + 1
+        return int(self._moving.duration * self._fps + TUNING.rounding) + 1
 
     @property
     def content(self) -> object:
@@ -138,7 +133,7 @@ class AnimatedFile(Motion):
         return None if name is None else find_camera(self.scene(frame).cameras, name)
 
     def bounds(self) -> Bounds:
-        boxes = [self._at(seconds).bounds for seconds in np.linspace(0.0, self._moving.duration, MOMENTS)]
+        boxes = [self._at(seconds).bounds for seconds in np.linspace(0.0, self._moving.duration, TUNING.moments)]
         return np.stack([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
 
     def _at(self, seconds: float) -> Scene:

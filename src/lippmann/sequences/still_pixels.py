@@ -23,18 +23,12 @@ from numpy.typing import NDArray
 
 from lippmann.display.panel import PixelWindow
 from lippmann.sequences.cuts import Moment
-from lippmann.sequences.key_light import Floats, KeyLight, Mask, columns_of, light_of, rays_of, trace_others
+from lippmann.sequences.key_light import Floats, KeyLight, Mask, count_columns, light_of, rays_of, trace_others
+from lippmann.sequences.tuning import TUNING
 
 if TYPE_CHECKING:
     from lippmann.rendering.film.wavefront import RayTotals
     from lippmann.rendering.methods import Job, Traced
-
-#: Of so many pixels one has a probe.
-_PIXELS_OF_PROBE = 4
-#: Pixels to either side whose probes are averaged.
-_REACH = 8
-#: Largest mean change of probes, less its standard error, as a share of the light of both.
-_LARGEST_CHANGE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +61,13 @@ class _Picture:
         def part(values: NDArray[Any]) -> NDArray[Any]:
             there = np.full((window.height, columns * window.width, *values.shape[2:]), np.nan, values.dtype)
             if common is not None:
-                there[_inside(common, window, columns)] = values[_inside(common, self.window, columns)]
+                there[_locate(common, window, columns)] = values[_locate(common, self.window, columns)]
             return there
 
         return _Picture(window, part(self.pixels), part(self.features), part(self.probes))
 
 
-def _inside(part: PixelWindow, window: PixelWindow, columns: int) -> tuple[slice, slice]:
+def _locate(part: PixelWindow, window: PixelWindow, columns: int) -> tuple[slice, slice]:
     """Rows and traced columns of a part within a window."""
     top, left = part.top - window.top, columns * (part.left - window.left)
     return slice(top, top + part.height), slice(left, left + columns * part.width)
@@ -90,12 +84,12 @@ class StillPixels(KeyLight):
 
     def trace_next(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
         self._own = None
-        window, columns = _window_of(job), columns_of(job)
+        window, columns = _find_window(job), count_columns(job)
         if self._key is None or window is None:
             return trace(job)
         key = self._key.crop(window, columns)
         probes, rays = _trace_probes(job, window)
-        self._own = own = _Picture(window, key.pixels, _features_of(job), probes)
+        self._own = own = _Picture(window, key.pixels, _hash_features(job), probes)
         is_known = _find_still(key, own, job)
         if not is_known.any():
             return trace(job)
@@ -110,18 +104,18 @@ class StillPixels(KeyLight):
         return np.array_equal(key.placement.world_from_display, moment.placement.world_from_display)
 
     def _keep(self, job: Job, traced: Traced) -> None:
-        window, pixels = _window_of(job), np.repeat(traced.frame.pixels, columns_of(job), axis=1)
+        window, pixels = _find_window(job), np.repeat(traced.frame.pixels, count_columns(job), axis=1)
         if self._own is not None:
             self._key = replace(self._own, pixels=pixels)
         elif window is not None:
-            self._key = _Picture(window, pixels, _features_of(job), _trace_probes(job, window)[0])
+            self._key = _Picture(window, pixels, _hash_features(job), _trace_probes(job, window)[0])
         self._own = None
 
     def _forget(self) -> None:
         self._key = None
 
 
-def _window_of(job: Job) -> PixelWindow | None:
+def _find_window(job: Job) -> PixelWindow | None:
     """The window that a picture shows; None of those whose pixels have several sets of rays, or that have photons."""
     from lippmann.rendering.transport.ray_source import QuiltRays, WindowRays
 
@@ -133,17 +127,17 @@ def _window_of(job: Job) -> PixelWindow | None:
     return PixelWindow(0, 0, source.width, source.height)
 
 
-def _features_of(job: Job) -> NDArray[np.float64]:
+def _hash_features(job: Job) -> NDArray[np.float64]:
     """A number for each pixel's feature buffers, which is another one if any of them is."""
     guides = job.denoiser.guides()
     assert guides.height is not None
     roots = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0])
     return np.asarray(
-        guides.albedo @ roots[:3] + guides.normal @ roots[3:6] + roots[6] * _coverage_of(job) + guides.height
+        guides.albedo @ roots[:3] + guides.normal @ roots[3:6] + roots[6] * _sum_coverage(job) + guides.height
     )
 
 
-def _coverage_of(job: Job) -> Floats:
+def _sum_coverage(job: Job) -> Floats:
     """Coverage ``(H, columns W)`` by surfaces of any kind."""
     coverage = job.denoiser.coverage()
     assert coverage is not None  # guides of one set of rays have it
@@ -161,8 +155,8 @@ def _trace_probes(job: Job, window: PixelWindow) -> tuple[Floats, RayTotals]:
     source = job.sample_source
     probes = np.full((source.height, source.width, 3), np.nan, np.float32)
     row, column = np.indices((source.height, source.width))
-    column += columns_of(job) * window.left
-    is_probed = ((row + window.top + 2 * column) % _PIXELS_OF_PROBE == 0) & (_coverage_of(job) > 0)
+    column += count_columns(job) * window.left
+    is_probed = ((row + window.top + 2 * column) % TUNING.pixels_of_probe == 0) & (_sum_coverage(job) > 0)
     if not is_probed.any():
         return probes, RayTotals()
     few, places = rays_of(source, is_probed)
@@ -186,13 +180,13 @@ def _find_still(key: _Picture, own: _Picture, job: Job) -> Mask:
     change = np.where(is_same, np.divide(change, light, out=np.zeros_like(light), where=is_lit), is_lit)
     bands = Bands(job.session.engine.threads)
     parts = change, np.square(change), is_lit, is_probed
-    change, squares, lit, probed = (mean_around(part.astype(np.float32), _REACH, bands) for part in parts)
+    change, squares, lit, probed = (mean_around(part.astype(np.float32), TUNING.probe_reach, bands) for part in parts)
     # Less its standard error: a few long paths that meet what moves would leave patches of grain on clean surfaces.
-    change -= np.sqrt(squares) / (2 * _REACH + 1)
+    change -= np.sqrt(squares) / (2 * TUNING.probe_reach + 1)
     # Where no probe finds light in either frame, such as on the outer side of a wall, there is none to change.
-    is_agreed = (probed > 0) & (change <= _LARGEST_CHANGE * lit)
-    is_still = is_same & (is_agreed | (_coverage_of(job) == 0))
-    return np.asarray(is_still.reshape(len(is_still), -1, columns_of(job)).all(axis=2))
+    is_agreed = (probed > 0) & (change <= TUNING.largest_change * lit)
+    is_still = is_same & (is_agreed | (_sum_coverage(job) == 0))
+    return np.asarray(is_still.reshape(len(is_still), -1, count_columns(job)).all(axis=2))
 
 
 __all__ = ["StillPixels"]

@@ -95,7 +95,7 @@ class Turntable(Motion):
         return inverse(self._turn(self.angle(frame)))
 
     def bounds(self) -> Bounds:
-        return _box_of(self.swept())
+        return _find_box(self.swept())
 
     def placement(self, display: Display, options: PlacementOptions) -> Placement:
         """Where the display stands: fitted to all that the scene sweeps, or as a camera or the scene's mm have it.
@@ -111,13 +111,13 @@ class Turntable(Motion):
         swept = self.swept()
         if options.place not in (None, "fit") or options.camera is not None:
             placement = place(
-                _box_of(swept),
+                _find_box(swept),
                 display,
                 cameras=scene.cameras,
                 options=options,
                 home_camera=scene.display_camera,
                 is_unbounded=scene.is_unbounded,
-                probe=partial(_depth_of, swept),
+                probe=partial(_find_depth, swept),
             )
             return replace(placement, warnings=(*notes, *placement.warnings))
         options = replace(face_viewer(scene.bounds, options, notes, scene.facing_cameras), place="fit")
@@ -128,10 +128,10 @@ class Turntable(Motion):
             options = replace(options, turn=(0.0, pitch, roll))
         turned = transform_points(turn, swept)
         placement = place(
-            _box_of(turned),
+            _find_box(turned),
             display,
             options=options,
-            bounds_in=lambda frame: _box_of(transform_points(frame, turned)),
+            bounds_in=lambda frame: _find_box(transform_points(frame, turned)),
             extreme_points=lambda: turned,
         )
         return replace(
@@ -184,12 +184,12 @@ def open_turntable(
     return Turntable(scene, TURNTABLE_FRAMES if frames is None else frames, swing=swing, axis=axis)
 
 
-def _depth_of(points: Bounds, view: CameraView) -> VisibleDepth | None:
+def _find_depth(points: Bounds, view: CameraView) -> VisibleDepth | None:
     """The depth that points in front of a camera fill; None if there are none."""
     depths = -transform_points(inverse(view.world_from_camera), points)[:, 2]
     ahead = depths[depths > 0.0]
     return VisibleDepth(float(ahead.min()), float(ahead.max())) if len(ahead) else None
 
 
-def _box_of(points: Bounds) -> Bounds:
+def _find_box(points: Bounds) -> Bounds:
     return np.stack([points.min(axis=0), points.max(axis=0)])

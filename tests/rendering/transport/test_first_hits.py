@@ -14,7 +14,7 @@ from lippmann.rendering.session import open_session
 from lippmann.scene.values.description import Camera, Instance, Material, Mesh, SceneDescription
 from lippmann.scene.values.splats import Splats
 from lippmann.scene.values.volume import TransferFunction, Volume
-from lippmann.sequences.frames import find_stand
+from lippmann.sequences.frames import place_frames
 from lippmann.sequences.turntable import Turntable, open_turntable
 
 pytestmark = pytest.mark.usefixtures("engine")
@@ -162,7 +162,7 @@ def test_splats_and_volumes_are_cut_as_meshes_are(more, height, near):
 
 def cuts(motion, options, frames):
     """What the frames of a sequence say."""
-    where = find_stand(motion, DISPLAY, options)
+    where = place_frames(motion, DISPLAY, options)
     for frame in frames:
         session = open_session(motion.scene(frame), RenderRequest(placement=where(frame)))
         yield any("panel's edge cuts" in line for line in session.place(DISPLAY).warnings)

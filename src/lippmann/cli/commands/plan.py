@@ -48,10 +48,10 @@ def plan(
     with console.progress() as progress:
         if turning:
             from lippmann.cli.commands.sequence import open_moving
-            from lippmann.sequences.frames import find_stand
+            from lippmann.sequences.frames import place_frames
 
             motion = open_moving(source, turning, request)
-            where = find_stand(motion, target, placement)
+            where = place_frames(motion, target, placement)
             loaded, frames = motion.scene(0), motion.count
             request = replace(request, placement=where(0))
         else:

@@ -56,7 +56,7 @@ def render_frames(
     """Render and write all frames: quilts of a given ``form``, or without one integral images."""
     from lippmann.image.write import format_for
     from lippmann.journal.tile_journal import sweep_beside
-    from lippmann.sequences.files import saved_sequence
+    from lippmann.sequences.files import save_sequence
     from lippmann.sequences.forms import INTEGRAL, QuiltForm
     from lippmann.sequences.motion import FRAMES_PER_SECOND
     from lippmann.viewing.video_file import write_codes
@@ -83,7 +83,7 @@ def render_frames(
     with (
         _places(output, path_of(frames[0]), spec.video),
         console.progress() as progress,
-        saved_sequence(
+        save_sequence(
             motion,
             output,
             path_of,
@@ -221,13 +221,13 @@ def _filming(
     """The part of each frame that the film shows."""
     if spec.video is None:
         return None
-    from lippmann.sequences.films import film_of_pictures, film_of_quilts
+    from lippmann.sequences.films import film_pictures, film_quilts
     from lippmann.sequences.forms import QuiltForm
 
     if isinstance(form, QuiltForm):
-        return film_of_quilts(spec.video, display, form, _eye(spec.eye), count, spec.shows, spec.codec)
+        return film_quilts(spec.video, display, form, _eye(spec.eye), count, spec.shows, spec.codec)
     eye = None if spec.eye is None else triple(spec.eye, "--eye")
-    return film_of_pictures(spec.video, motion, display, request, eye, spec.shows, spec.codec)
+    return film_pictures(spec.video, motion, display, request, eye, spec.shows, spec.codec)
 
 
 def _eye(text: str | None) -> FilmEye:
