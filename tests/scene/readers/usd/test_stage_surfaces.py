@@ -180,3 +180,61 @@ def test_an_omni_picture_stands_for_the_constant(read):
     material = read(body, files={"t.png": png(PICTURE)}).materials[0]
     assert material.base_color == (1.0, 1.0, 1.0)
     assert material.base_color_texture.srgb
+
+
+def of_kind(kind, inputs, nodes=""):
+    return surface(inputs, nodes).replace('"UsdPreviewSurface"', f'"{kind}"')
+
+
+@pytest.mark.parametrize("kind", ["OmniPBR_ClearCoat", "OmniPBR_ClearCoat_Opacity"])
+def test_relatives_of_omni_pbr(read, kind):
+    inputs = """float inputs:metallic_constant = 1
+        float inputs:clearcoat_weight = 0.5
+        float inputs:clearcoat_reflection_roughness = 0.25
+        float inputs:opacity_constant = 0.75"""
+    coated = read(of_kind(kind, "bool inputs:enable_clearcoat = 1\n" + inputs)).materials[0]
+    assert (coated.metallic, coated.clearcoat, coated.clearcoat_roughness) == (1.0, 0.5, 0.25)
+    assert coated.alpha == (0.75 if kind.endswith("Opacity") else 1.0)
+    assert read(of_kind(kind, inputs)).materials[0].clearcoat == 0.0
+
+
+def test_omni_glass(read):
+    scene = read(of_kind("OmniGlass", "color3f inputs:glass_color = (0.5, 1, 0.5)\nfloat inputs:glass_ior = 1.4"))
+    glass = scene.materials[0]
+    assert glass.base_color == (0.5, 1.0, 0.5)
+    assert (glass.transmission, glass.roughness, glass.ior) == (1.0, 0.0, pytest.approx(1.4))
+    assert scene.notes == []
+
+
+@pytest.mark.parametrize("file", ['string inputs:filename = "t.png"', "asset inputs:filename = @t.png@"])
+def test_arnold(read, file):
+    nodes = f"""
+    def Shader "i" {{
+        uniform token info:id = "arnold:image"
+        {file}
+        string inputs:swrap = "mirror"
+        string inputs:color_space = "Raw"
+        color4f outputs:out
+        float outputs:g
+    }}
+    def Shader "n" {{
+        uniform token info:id = "arnold:normal_map"
+        vector3f inputs:input.connect = </mat/i.outputs:out>
+        vector3f outputs:vector
+    }}
+"""
+    inputs = """color3f inputs:base_color.connect = </mat/i.outputs:out>
+        float inputs:specular_roughness.connect = </mat/i.outputs:g>
+        vector3f inputs:normal.connect = </mat/n.outputs:vector>
+        float inputs:metalness = 0.5"""
+    body = of_kind("arnold:standard_surface", inputs, nodes)
+    scene = read(
+        body.replace("outputs:surface.connect", "outputs:arnold:surface.connect"), files={"t.png": png(PICTURE)}
+    )
+    material = scene.materials[0]
+    color = material.base_color_texture
+    assert (color.srgb, color.wrap_u, color.wrap_v) == (False, "mirror", "repeat")
+    assert material.metallic_roughness_texture.image.pixels[1, 1, 1] == pytest.approx(90 / 255)
+    assert material.normal_texture is not None
+    assert material.metallic == 0.5
+    assert scene.notes == []

@@ -1,13 +1,14 @@
-"""Surfaces of other models by the inputs of ``UsdPreviewSurface``: MaterialX's and OmniPBR.
+"""Surfaces of other models by the inputs of ``UsdPreviewSurface``: MaterialX's, Arnold's, OmniPBR and OmniGlass.
 
 Names and defaults are those of MaterialX's definitions of nodes (``libraries/bxdf``, 1.39), which also has the
-translation to ``UsdPreviewSurface``, and of NVIDIA's OmniPBR.mdl.
+translation to ``UsdPreviewSurface``, and of NVIDIA's OmniPBR.mdl and OmniGlass.mdl. Arnold's are those of MaterialX.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from lippmann.scene.readers.usd.records import Record
 
 PREVIEW = "UsdPreviewSurface"
 #: Contexts of rendering whose surfaces are looked at where that for all of them is not read.
-_CONTEXTS = ("mtlx", "mdl")
+_CONTEXTS = ("mtlx", "mdl", "arnold")
 
 
 @dataclass(frozen=True)
@@ -96,6 +97,28 @@ _MODELS = {
         {"emissiveColor": ("enable_emission", 0.0)},
     ),
 }
+_MODELS |= {
+    "arnold:standard_surface": _MODELS["ND_standard_surface_surfaceshader"],
+    "arnold:openpbr_surface": _MODELS["ND_open_pbr_surface_surfaceshader"],
+    "OmniPBR_Opacity": _MODELS["OmniPBR"],
+    "OmniPBR_ClearCoat": replace(
+        _MODELS["OmniPBR"],
+        inputs={
+            **_MODELS["OmniPBR"].inputs,
+            "clearcoat": ("clearcoat_weight", 1.0),
+            "clearcoatRoughness": ("clearcoat_reflection_roughness", 0.0),
+        },
+    ),
+    "OmniGlass": _Model(
+        {
+            "diffuseColor": ("glass_color", _WHITE),
+            "roughness": ("frosting_roughness", 0.0),
+            "ior": ("glass_ior", 1.491),
+            "transmission": ("", 1.0),  # of all that it is
+        }
+    ),
+}
+_MODELS["OmniPBR_ClearCoat_Opacity"] = _MODELS["OmniPBR_ClearCoat"]
 #: Pictures of OmniPBR that stand for its constants: their channel, and what must be set for them to count.
 _OMNI_PICTURES = {
     "diffuseColor": ("diffuse_texture", "rgb", None),
@@ -138,9 +161,11 @@ def as_preview(kind: str, given: Record) -> Record:
         source = given.get(name, None if default is None else {"value": default})
         if source is not None:
             inputs[preview] = source
-    if kind == "OmniPBR":
+    if kind.startswith("OmniPBR"):
+        if not _number(given, "enable_clearcoat", 0.0):
+            inputs.pop("clearcoat", None)
         inputs.update(_omni_pictures(given))
-        if not _number(given, "enable_opacity", 0.0):
+        if not _number(given, "enable_opacity", float(kind.endswith("Opacity"))):
             inputs.pop("opacity")
     if kind == "ND_gltf_pbr_surfaceshader":
         mode = _number(given, "alpha_mode", 0.0)
@@ -218,7 +243,7 @@ def _number(given: Record, name: str, default: float) -> float:
     return float(value) if isinstance(value, (bool, int, float)) else default
 
 
-_WRAPS = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror", "constant": "black"}
+_WRAPS = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror", "constant": "black", "black": "black"}
 
 
 def materialx_node(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
@@ -246,6 +271,27 @@ def _image(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record:
         translation = {"value": [-number for number in shift]}
         texture["st"] = {"transform": {"in": texture["st"], "scale": given.get("uvtiling"), "translation": translation}}
     return {"texture": texture, "channel": "rgb" if is_color or "vector" in kind else "r"}
+
+
+def _arnold_image(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record:
+    """An image, whose outputs are the whole of it and its channels; its file may stand in a text."""
+    file = given.get("filename", {})
+    attribute = node.GetAttribute("inputs:filename")
+    if attribute and isinstance(name := file.get("value"), str):
+        layer = attribute.GetPropertyStack(Usd.TimeCode.Default())[0].layer.realPath
+        file = {"asset": {"name": name, "found": "", "folder": os.path.dirname(layer)}}
+    space = str(given.get("color_space", {}).get("value", "auto")).lower()
+    texture: Record = {
+        "file": file,
+        "sourceColorSpace": {"value": "auto" if space in ("", "auto") else "sRGB" if "srgb" in space else "raw"},
+        "wrapS": {"value": _WRAPS.get(given.get("swrap", {}).get("value", ""), "repeat")},
+        "wrapT": {"value": _WRAPS.get(given.get("twrap", {}).get("value", ""), "repeat")},
+    }
+    return {"texture": texture, "channel": channel if channel in "rgba" else "rgb"}
+
+
+def _arnold_normal_map(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+    return _normal_map(kind, channel, {"in": given.get("input", {})}, node)
 
 
 def _normal_map(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
@@ -314,4 +360,6 @@ _NODES: dict[str, Callable[[str, str, Record, Usd.Prim], Record | None]] = {
     "ND_separate": _separate,
     "ND_texcoord_": _coordinates,
     "ND_geompropvalue_": _coordinates,
+    "arnold:image": _arnold_image,
+    "arnold:normal_map": _arnold_normal_map,
 }
