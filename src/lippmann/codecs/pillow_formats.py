@@ -111,14 +111,17 @@ def _size(picture: Image.Image) -> str:
 
 def codes_of(picture: Image.Image) -> Pixels:
     """Codes ``(h, w, 1 | 3 | 4)`` of an open picture: uint8, or uint16 or float32 where the file holds such greys."""
+    has_alpha = "A" in picture.getbands() or "transparency" in picture.info
     if picture.mode.startswith("I;16") or picture.mode == "I":
         codes = np.asarray(np.clip(np.asarray(picture), 0, 65535), np.uint16)[..., None]
+        if has_alpha:  # the grey of a PNG that is transparent; Pillow makes alpha of 8 bits alone of it (13.0)
+            alpha = np.where(codes == picture.info["transparency"], 0, 65535).astype(np.uint16)
+            return np.concatenate([codes, codes, codes, alpha], axis=2)
         return ~codes if _is_white_zero(picture) else codes
     if picture.mode == "F":
         return np.asarray(picture, np.float32)[..., None]
-    if picture.mode in ("1", "L"):
+    if picture.mode in ("1", "L") and not has_alpha:
         return np.array(picture.convert("L"))[..., None]
-    has_alpha = "A" in picture.getbands() or "transparency" in picture.info
     mode = "RGBA" if has_alpha else "RGB"
     return np.array(picture if picture.mode == mode else picture.convert(mode))
 

@@ -119,6 +119,16 @@ def test_sixteen_bits_keep_their_precision():
     assert image.pixels[0, :, 0] == pytest.approx(values[0] / 65535.0, abs=1e-7)
 
 
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_the_transparent_grey_of_a_png_is_transparent(dtype):
+    file = io.BytesIO()
+    Pillow.fromarray(np.array([[10, 85]], dtype)).save(file, "PNG", transparency=85)
+    pixels = decode_image(file.getvalue(), "leaf.png", where="f").pixels
+    assert pixels.shape == (1, 2, 4)
+    assert (pixels[0, :, 3] / pixels.max()).tolist() == [1, 0]
+    assert (pixels[0, 1, :3] == pixels[0, 1, 0]).all()
+
+
 def test_damaged_pictures(tmp_path):
     whole = encoded(Pillow.fromarray(np.random.default_rng(0).integers(0, 255, (64, 64, 3), np.uint8)))
     with pytest.raises(SceneError, match=r"f:7: texture 'x\.png' cannot be decoded"):
