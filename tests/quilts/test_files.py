@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, features
 
 from lippmann.codecs.icc import rgb_profile
 from lippmann.color.primaries import REC709
@@ -79,6 +79,20 @@ def test_jpegs_of_others_are_read(tmp_path):
     quilt = read_quilt(path)
     assert quilt.stored == "uint8"
     assert quilt.pixels[0, 0] == pytest.approx([0.578, 0.127, 0.032], abs=0.02)
+
+
+@pytest.mark.skipif(not features.check("avif"), reason="this Pillow reads no AVIF")
+def test_what_a_decoder_says_of_damage_is_one_line(tmp_path):
+    path = tmp_path / "x_qs4x2a2.avif"
+    Image.new("RGB", (512, 256), (200, 100, 50)).save(path)
+    data = path.read_bytes()
+    start = data.index(b"mdat") + 4
+    path.write_bytes(data[:start] + bytes(len(data) - start))
+    with pytest.raises(PictureError, match=r"x_qs4x2a2\.avif: cannot be read \(.*[Dd]ecod"):
+        read_quilt(path)
+    path.write_bytes(b"no picture")
+    with pytest.raises(PictureError, match=r"x_qs4x2a2\.avif: is no picture that is read here; PNG, JPEG"):
+        read_quilt(path)
 
 
 @pytest.mark.parametrize(
@@ -312,7 +326,7 @@ def test_a_damaged_view_is_named(folder):
     with pytest.raises(PictureError, match=r"shot2_005\.png"):
         read_views(folder, LAYOUT)
     (folder / "shot2_005.png").rename(folder / "shot2_005.jpg")
-    with pytest.raises(PictureError, match=r"shot2_005\.jpg: cannot be read"):
+    with pytest.raises(PictureError, match=r"shot2_005\.jpg: is no picture"):
         read_views(folder, LAYOUT)
 
 

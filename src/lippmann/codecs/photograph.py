@@ -18,10 +18,11 @@ from lippmann.codecs.avif_colors import code_points
 from lippmann.codecs.claims import check_claim
 from lippmann.codecs.icc import adobe_profile, convert_cmyk, convert_codes, is_gray, profile_of_cicp
 from lippmann.codecs.picture_notes import aspect_note, pictures_note
-from lippmann.codecs.pillow_formats import BYTES_PER_PIXEL, FORMATS, codes_of, open_picture
+from lippmann.codecs.pillow_formats import BYTES_PER_PIXEL, FORMATS, RULE, codes_of, open_picture
 from lippmann.codecs.types import Pixels
 from lippmann.errors import PictureError
 from lippmann.runtime.machine import check_input
+from lippmann.runtime.regular_file import unreadable
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -116,6 +117,21 @@ def open_photograph(file: BinaryIO, path: Path, formats: tuple[str, ...] = (*FOR
                 )
             else:
                 yield _photograph(size, icc, turn, notes, lambda: orientations.upright(codes_of(picture), turn))
+
+
+@contextmanager
+def report_errors(path: Path) -> Iterator[None]:
+    """Errors of opening and decoding a photograph as :class:`PictureError` that names ``path``."""
+    from PIL import UnidentifiedImageError
+
+    try:
+        yield
+    except UnidentifiedImageError:
+        raise PictureError("is no picture that is read here", where=str(path), rule=RULE) from None
+    except OSError as error:
+        raise unreadable(path, error, PictureError) from None
+    except (SyntaxError, ValueError, RuntimeError) as error:  # the last of AVIF's decoder
+        raise PictureError(f"cannot be read ({error})", where=str(path)) from None
 
 
 def _photograph(

@@ -14,7 +14,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from lippmann.codecs.photograph import open_photograph
+from lippmann.codecs.photograph import open_photograph, report_errors
 from lippmann.codecs.picture_notes import FileNotes
 from lippmann.codecs.stereo_pairs import HEIF, PAIRS
 from lippmann.codecs.types import FILMS
@@ -315,16 +315,11 @@ def open_view(path: Path) -> Iterator[OpenView]:
         )
         return
     check_kind(path, PictureError)
-    try:
-        with path.open("rb") as stream, open_photograph(stream, path, _KINDS) as photograph:
-            if max(photograph.size) > MOST_SIDE:
-                raise PictureError(f"it has {photograph.size[0]} x {photograph.size[1]} pixels", where=str(path))
+    with report_errors(path), path.open("rb") as stream, open_photograph(stream, path, _KINDS) as photograph:
+        if max(photograph.size) > MOST_SIDE:
+            raise PictureError(f"it has {photograph.size[0]} x {photograph.size[1]} pixels", where=str(path))
 
-            def codes() -> Values:
-                return opaque_colors(photograph.srgb_codes(), path, on_black=True)
+        def codes() -> Values:
+            return opaque_colors(photograph.srgb_codes(), path, on_black=True)
 
-            yield OpenView(photograph.size, lambda: "uint8", codes, photograph.notes)
-    except OSError as error:
-        raise unreadable(path, error, PictureError) from None
-    except SyntaxError as error:
-        raise PictureError(f"cannot be read ({error})", where=str(path)) from None
+        yield OpenView(photograph.size, lambda: "uint8", codes, photograph.notes)

@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 import numpy as np
 
 from lippmann.codecs.icc import Profile, convert_picture
-from lippmann.codecs.photograph import Photograph, open_photograph
+from lippmann.codecs.photograph import Photograph, open_photograph, report_errors
 from lippmann.codecs.picture_notes import FileNotes
-from lippmann.codecs.pillow_formats import RULE
 from lippmann.codecs.stereo_pairs import HEIF, PAIRS, read_pair
 from lippmann.codecs.types import Pixels
 from lippmann.color.transfer import quantize
@@ -213,7 +212,7 @@ def _views_in(path: Path) -> list[_Source]:
     check_kind(path, PictureError)
     if not path.exists():
         raise unreadable(path, FileNotFoundError(), PictureError)
-    with _report_errors(path):
+    with report_errors(path):
         if path.suffix.lower() in HEIF:
             from lippmann.scene.readers.heif import read_heif_pair
 
@@ -293,22 +292,8 @@ def _open_source(source: _Source) -> Iterator[Photograph]:
         yield source.view
         return
     path = source.path
-    with _report_errors(path), path.open("rb") as file, open_photograph(file, path) as photograph:
+    with report_errors(path), path.open("rb") as file, open_photograph(file, path) as photograph:
         yield photograph
-
-
-@contextmanager
-def _report_errors(path: Path) -> Iterator[None]:
-    from PIL import UnidentifiedImageError
-
-    try:
-        yield
-    except UnidentifiedImageError:
-        raise PictureError("is no picture that is read here", where=str(path), rule=RULE) from None
-    except OSError as error:
-        raise unreadable(path, error, PictureError) from None
-    except (SyntaxError, ValueError) as error:
-        raise PictureError(f"cannot be read ({error})", where=str(path)) from None
 
 
 def _header(source: _Source) -> _Header:

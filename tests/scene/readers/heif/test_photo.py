@@ -98,6 +98,15 @@ def test_damaged_files_are_one_line():
         assert "\n" not in str(caught.value)
 
 
+def test_a_file_none_of_whose_pictures_is_opened_says_so(tmp_path):
+    path = tmp_path / "x.heic"
+    path.write_bytes(heif(PIXELS).replace(b"hvc1", b"unci"))  # the kind of a picture that is not compressed
+    with pytest.raises(SceneError, match=r"x\.heic: cannot be decoded \(libheif opens none of its pictures"):
+        read_heif_photo(path.read_bytes(), "x.heic")
+    with pytest.raises(PictureError, match=r"x\.heic: cannot be decoded \(libheif opens none of its pictures"):
+        read_quilt(path)
+
+
 def test_it_counts_against_the_memory(monkeypatch):
     monkeypatch.setattr(machine, "_UNSEEN", 0)
     monkeypatch.setattr(machine, "available_memory", lambda: 1000)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,10 +40,8 @@ def read_heif_photo(data: bytes, where: str) -> tuple[Image, DepthMap | None]:
         It takes more memory than is left.
     """
     check_installed("pillow_heif", "heif", "HEIF pictures need it", where)
-    import pillow_heif
-
     try:
-        file = pillow_heif.open_heif(io.BytesIO(data))
+        file = open_pictures(io.BytesIO(data))
         depths = file.info.get("depth_images", [])
         for each in (file, *depths):
             width, height = each.size
@@ -69,6 +68,22 @@ def read_heif_photo(data: bytes, where: str) -> tuple[Image, DepthMap | None]:
         rule = "inverse depth and disparity are read"
         raise SceneError(f"has depth of representation {kind}", where=where, rule=rule, fix="name a map: depth_map=...")
     return image, DepthMap(without_stairs(values))
+
+
+def open_pictures(source: Path | io.BytesIO) -> Any:
+    """The pictures of a HEIF file, at least one, not yet decoded.
+
+    Raises
+    ------
+    ValueError
+        Libheif opens none; it and pillow-heif raise other errors too.
+    """
+    import pillow_heif
+
+    file = pillow_heif.open_heif(source)
+    if not len(file):
+        raise ValueError("libheif opens none of its pictures, such as uncompressed ones")
+    return file
 
 
 def profile_of(info: Mapping[str, Any]) -> bytes:

@@ -10,7 +10,7 @@ from lippmann.codecs.photograph import Photograph
 from lippmann.errors import PictureError
 from lippmann.runtime.machine import check_input
 from lippmann.runtime.optional_import import check_installed
-from lippmann.scene.readers.heif.photo import BYTES_PER_PIXEL, profile_of
+from lippmann.scene.readers.heif.photo import BYTES_PER_PIXEL, open_pictures, profile_of
 
 
 def read_heif_pair(path: Path) -> tuple[Photograph, Photograph] | None:
@@ -26,10 +26,8 @@ def read_heif_pair(path: Path) -> tuple[Photograph, Photograph] | None:
         Its pixels take more than the memory that is left.
     """
     check_installed("pillow_heif", "heif", "HEIF pictures need it", str(path))
-    import pillow_heif
-
     try:
-        file = pillow_heif.open_heif(path)
+        file = open_pictures(path)
         groups = [group["images"][:2] for group in file.info.get("entity_groups", ()) if group["type"] == "ster"]
         if not groups:
             return None
@@ -44,6 +42,4 @@ def read_heif_pair(path: Path) -> tuple[Photograph, Photograph] | None:
 
 def has_depth(path: Path) -> bool:
     """Whether a HEIF file that can be read is a photograph with depth."""
-    import pillow_heif
-
-    return bool(pillow_heif.open_heif(path).info.get("depth_images"))
+    return bool(open_pictures(path).info.get("depth_images"))
