@@ -86,7 +86,7 @@ def test_primaries():
         (file_of(PIXELS, ["COLORCORR=1 2"]), r"COLORCORR is '1 2', not 3 number\(s\)"),
         (file_of(PIXELS, ["EXPOSURE=0"]), "its exposure must be above 0"),
         (file_of(PIXELS, ["PIXASPECT=2"]), "its pixels are not square"),
-        (file_of(PIXELS, ["PRIMARIES=0 0 0 0 0 0 0 1"]), "y other than 0"),
+        (file_of(PIXELS, ["PRIMARIES=0 0 0 0 0 0 0 1"]), "must not lie on a line"),
         (file_of(PIXELS, size="-Y 20000 +X 40000"), "hold no 40000x20000 pixels"),
         (file_of(PIXELS)[:-8], "cannot be decoded"),
     ],

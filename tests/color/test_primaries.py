@@ -20,10 +20,16 @@ def test_acescg_to_rec_709():
     assert rec709_from_rgb(REC709) == pytest.approx(np.eye(3), abs=1e-12)
 
 
+def test_primaries_may_be_those_of_xyz_itself():
+    xyz = (1, 0, 0, 1, 0, 0, 0.33333334, 0.33333334)
+    assert xyz_from_rgb(xyz) == pytest.approx(np.eye(3), abs=1e-6)
+    assert rec709_from_rgb(xyz) @ xyz_from_rgb(REC709) == pytest.approx(np.eye(3), abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("numbers", "message"),
     [
-        ((0.64, 0.0, 0.3, 0.6, 0.15, 0.06, 0.3, 0.3), "y other than 0"),
+        ((0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3, 0.0), "y of white other than 0"),
         ((0.64, np.nan, 0.3, 0.6, 0.15, 0.06, 0.3, 0.3), "finite"),
         ((0.2, 0.2, 0.3, 0.3, 0.4, 0.4, 0.3, 0.3), "must not lie on a line"),
     ],

@@ -27,13 +27,14 @@ def xyz_from_rgb(chromaticities: Sequence[float]) -> Matrix:
     Raises
     ------
     ValueError
-        They are not finite, a y is 0, or the primaries lie on a line.
+        They are not finite, the y of white is 0, or the primaries lie on a line.
     """
     x, y = np.asarray(chromaticities, np.float64).reshape(4, 2).T
-    if not np.isfinite([x, y]).all() or (y == 0.0).any():
-        raise ValueError("chromaticities must be finite, with y other than 0")
-    xyz = np.stack([x / y, np.ones(4), (1.0 - x - y) / y])
-    primaries, white = xyz[:, :3], xyz[:, 3]
+    if not np.isfinite([x, y]).all() or y[3] == 0.0:
+        raise ValueError("chromaticities must be finite, with y of white other than 0")
+    # A primary's y may be 0: those of XYZ itself are (1, 0), (0, 1) and (0, 0).
+    xyz = np.stack([x, y, 1.0 - x - y])
+    primaries, white = xyz[:, :3], xyz[:, 3] / y[3]
     if abs(np.linalg.det(primaries)) < 1e-9:
         raise ValueError("the primaries must not lie on a line")
     return np.asarray(primaries * np.linalg.solve(primaries, white))
@@ -42,9 +43,14 @@ def xyz_from_rgb(chromaticities: Sequence[float]) -> Matrix:
 def rec709_from_rgb(chromaticities: Sequence[float]) -> Matrix:
     """``(3, 3)`` from linear RGB of the given chromaticities to that of Rec. 709; white stays (1, 1, 1).
 
+    Values of XYZ itself are the colours that they say: its nominal white is that of no picture (OpenEXR's ``XYZ.exr``
+    and ``Rec709.exr`` are one picture).
+
     Errors are those of :func:`xyz_from_rgb`.
     """
     theirs = xyz_from_rgb(chromaticities)
+    if np.allclose(theirs, np.eye(3), atol=1e-5):
+        return np.asarray(np.linalg.inv(xyz_from_rgb(REC709)))
     return np.asarray(rec709_from_xyz(theirs.sum(axis=1)) @ theirs)
 
 
