@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image as Pillow
 
+from lippmann.codecs.exr import write_exr
 from lippmann.errors import SceneError
 from lippmann.scene.readers.mtl import parse_mtl
 from lippmann.scene.readers.obj import read_obj
@@ -322,3 +323,14 @@ def test_no_library(tmp_path):
     path.write_text("Kd 1 0 0\n")
     with pytest.raises(SceneError, match=r"m\.mtl:1: 'Kd' before any newmtl"):
         parse_mtl(path)
+
+
+def test_pictures_of_linear_light(material, tmp_path):
+    """As Meshroom writes textures of photographs; only what glows is brighter than white."""
+    values = np.array([[0.25, 3.0]], np.float32)
+    write_exr(tmp_path / "x.exr", dict.fromkeys("RGB", values), text={})
+    found = material("map_Kd x.exr\nmap_Ke x.exr\nKe 1 1 1\n")
+    assert not found.base_color_texture.srgb
+    assert found.base_color_texture.image.pixels[0, :, 0].tolist() == [0.25, 1.0]
+    assert found.emission_texture.image.pixels[0, :, 0].tolist() == [0.25, 3.0]
+    assert material("map_Kd x.exr\n", notes=True) == []

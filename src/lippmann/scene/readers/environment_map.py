@@ -14,6 +14,8 @@ from lippmann.errors import PictureError, SceneError
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.values.description import Environment
 
+#: Endings of pictures of linear light, whose values are not bounded.
+LINEAR_SUFFIXES = (".exr", ".hdr")
 _LARGEST_HALF = 65504.0
 
 #: Channels of red, green and blue: luminance or red alone is grey.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lippmann.scene.parsing import texture_maps
 from lippmann.scene.parsing.files import MissingFileError, NamedFiles, read_image
 from lippmann.scene.parsing.udim import TiledImage, is_tiled, read_tiles
+from lippmann.scene.readers.environment_map import LINEAR_SUFFIXES, possible_light, read_linear
 from lippmann.scene.readers.mtl import MapReference, MtlRecord
 from lippmann.scene.values.description import Color, Image, Material, Texture, Wrap
 
@@ -36,7 +37,7 @@ class MaterialMapper:
 
     def __init__(self, named: NamedFiles) -> None:
         self._named = named
-        self._images: dict[Path, Image] = {}
+        self._images: dict[tuple[Path, float], Image] = {}
         self._paths: dict[str, Path] = {}
         self.notes: list[str] = []
 
@@ -63,7 +64,7 @@ class MaterialMapper:
             name=record.name,
             base_color=diffuse,
             emission=self._tint(record, "ke", "map_ke", 0.0, clip=False),
-            emission_texture=self._color_map(record, "map_ke"),
+            emission_texture=self._color_map(record, "map_ke", brightest=np.inf),
             roughness=_roughness(record),
             metallic=min(max(record.scalar("pm", 0.0), 0.0), 1.0),
             metallic_roughness_texture=self._metallic_roughness(record),
@@ -198,8 +199,8 @@ class MaterialMapper:
             self._texture(reference, srgb=False), image=texture_maps.pack_channels(None, *planes, name=reference.file)
         )
 
-    def _color_map(self, record: MtlRecord, key: str) -> Texture | None:
-        return self._texture(record.maps[key], srgb=True) if key in record.maps else None
+    def _color_map(self, record: MtlRecord, key: str, *, brightest: float = 1.0) -> Texture | None:
+        return self._texture(record.maps[key], srgb=True, brightest=brightest) if key in record.maps else None
 
     def _scalar_map(self, record: MtlRecord, key: str, *, channel: int) -> Texture | None:
         """A one-value texture, repeated so that the ``channel`` that glTF reads holds it."""
@@ -220,17 +221,21 @@ class MaterialMapper:
             self._note(record, f"{key.capitalize()} above 1 is taken as 1")
         return _clip(color, 1.0 if clip else np.inf)
 
-    def _image(self, reference: MapReference) -> Image:
+    def _image(self, reference: MapReference, brightest: float = 1.0) -> Image:
         name = reference.file
-        if is_tiled(name):
-            key = Path(name)  # which no file can have
-            if key not in self._images:
-                self._images[key] = read_tiles(name, lambda tile: self._image(replace(reference, file=tile(name))))
-            return self._images[key]
-        path = self._path(reference)
-        if path not in self._images:
-            self._images[path] = read_image(path, where=reference.where)
-        return self._images[path]
+        path = Path(name) if is_tiled(name) else self._path(reference)  # no file has the name of tiles
+        key = path, brightest if _is_linear(name) else 1.0
+        if key not in self._images:
+            if is_tiled(name):
+                image = read_tiles(name, lambda tile: self._image(replace(reference, file=tile(name)), brightest))
+            elif _is_linear(name):
+                pixels, notes = read_linear(path)
+                self.notes += notes
+                image = Image(path.name, np.minimum(possible_light(pixels), np.float32(brightest)))
+            else:
+                image = read_image(path, where=reference.where)
+            self._images[key] = image
+        return self._images[key]
 
     def _path(self, reference: MapReference) -> Path:
         name = reference.file
@@ -238,8 +243,8 @@ class MaterialMapper:
             self._paths[name] = self._named.find_on_line(name, where=reference.where)
         return self._paths[name]
 
-    def _texture(self, reference: MapReference, *, srgb: bool) -> Texture:
-        image, transform = self._image(reference), _uv_transform(reference)
+    def _texture(self, reference: MapReference, *, srgb: bool, brightest: float = 1.0) -> Texture:
+        image, transform = self._image(reference, brightest), _uv_transform(reference)
         ignored = sorted(set(reference.options) & {"-mm", "-t", "-cc"})
         if ignored:
             self._note_once(f"{reference.where}: not honoured: {', '.join(ignored)}")
@@ -247,7 +252,8 @@ class MaterialMapper:
         if isinstance(image, TiledImage):
             is_clamped, transform = True, image.inside @ transform
         wrap: Wrap = "clamp" if is_clamped else "repeat"
-        srgb = srgb and reference.options.get("-colorspace", ("sRGB",))[0].lower() != "linear"
+        is_coded = reference.options.get("-colorspace", ("sRGB",))[0].lower() != "linear"
+        srgb = srgb and is_coded and not _is_linear(reference.file)
         return Texture(image, srgb, wrap, wrap, uv_transform=transform)
 
     def _note(self, record: MtlRecord, text: str) -> None:
@@ -256,6 +262,11 @@ class MaterialMapper:
     def _note_once(self, note: str) -> None:
         if note not in self.notes:
             self.notes.append(note)
+
+
+def _is_linear(name: str) -> bool:
+    """Whether a picture holds linear light, such as the textures that Meshroom makes."""
+    return name.lower().endswith(LINEAR_SUFFIXES)
 
 
 def _clip(color: Color, top: float = 1.0) -> Color:

@@ -19,7 +19,12 @@ from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import MissingFileError, NamedFiles, decode_image, read_bytes
 from lippmann.scene.parsing.texture_maps import unit
 from lippmann.scene.parsing.udim import is_tiled, read_tiles
-from lippmann.scene.readers.environment_map import possible_light, read_environment, read_linear
+from lippmann.scene.readers.environment_map import (
+    LINEAR_SUFFIXES,
+    possible_light,
+    read_environment,
+    read_linear,
+)
 from lippmann.scene.readers.usd.records import Record
 from lippmann.scene.values.description import Image
 
@@ -28,8 +33,6 @@ _MOST_ENTRIES = 65_536
 #: Packages within packages.
 _DEEPEST = 4
 
-#: Pictures of light, whose values are not bounded.
-_LIGHT_SUFFIXES = (".exr", ".hdr")
 _WHITE_SKY = np.ones((2, 4, 3), np.float32)
 
 
@@ -94,7 +97,7 @@ class Assets:
             return read_tiles(
                 name, lambda tile: self._load({**asset, "name": tile(name), "found": tile(asset["found"])})
             )
-        if name.lower().endswith(_LIGHT_SUFFIXES):
+        if name.lower().endswith(LINEAR_SUFFIXES):
             with self._file(asset) as path:
                 pixels, notes = read_linear(path)
             self.notes.update(dict.fromkeys(notes))
@@ -111,7 +114,7 @@ class Assets:
         SceneError
             As :meth:`image`, and as :func:`lippmann.scene.readers.environment_map.read_environment`.
         """
-        if asset["name"].lower().endswith(_LIGHT_SUFFIXES):
+        if asset["name"].lower().endswith(LINEAR_SUFFIXES):
             try:
                 with self._file(asset) as path:
                     sky = read_environment(path)
