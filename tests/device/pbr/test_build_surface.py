@@ -366,7 +366,8 @@ def test_samples_tell_whether_they_keep_images_sharp(build, parts, cosine):
     """Whichever lobe was sampled: half vectors within 0.05 rad of the narrow lobe's normal, and all transmission."""
     from mitsuba import BSDFFlags
 
-    from lippmann.device.pbr.gltf_bsdf import SHARP_EVENT, SHARP_FIRST
+    from lippmann.device.pbr.gltf_bsdf import SHARP_FIRST
+    from lippmann.device.pbr.surface_lobes import SHARP_EVENT
 
     wi = at(cosine)
     for name, asked in (("glaze", 0), ("veil", 0), ("varnish", SHARP_FIRST), ("cloudy glass", SHARP_FIRST)):

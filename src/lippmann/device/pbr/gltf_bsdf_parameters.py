@@ -118,6 +118,11 @@ class SurfaceModel:
     tinted: bool = False
     faded: bool = False
 
+    @property
+    def is_glossy(self) -> bool:
+        """Whether the body below the coat has a microfacet lobe."""
+        return self.metal or not self.dull
+
     def base(self, place: Place) -> Color3f:
         """Base colour at a point."""
         color = self.base_color.eval(place)

@@ -8,6 +8,7 @@ from typing import Any
 
 import mitsuba as mi
 
+from lippmann.device.pbr.surface_lobes import is_sharp_event
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import (
     Bool,
@@ -22,7 +23,7 @@ from lippmann.device.types import (
     Vector3f,
 )
 from lippmann.rendering.transport.light_vertices import Arrival
-from lippmann.rendering.transport.sharp_events import follows_sharply, has_wide_lobes, lambertian, sharp_lobe
+from lippmann.rendering.transport.sharp_events import has_wide_lobes, lambertian, sharp_lobe
 
 #: Sample dimensions of one vertex of any path, chain or photon: none of them uses more.
 DIMENSIONS = 8
@@ -129,7 +130,7 @@ class Scattering:
     @cached_property
     def is_rough(self) -> Bool:
         """Whether the event is neither sharp nor straight through."""
-        return self.is_event & ~follows_sharply(self.bs)
+        return self.is_event & ~is_sharp_event(self.bs)
 
     @property
     def scattered(self) -> Color3f:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide, to_numpy, upload
 from lippmann.device.pbr.scene import SceneFeatures
+from lippmann.device.pbr.surface_lobes import is_sharp_event
 from lippmann.device.sobol import SampleStream
 from lippmann.device.syntax import syntax
 from lippmann.device.types import (
@@ -29,7 +30,6 @@ from lippmann.rendering.transport.photon_map import Photons
 from lippmann.rendering.transport.sharp_events import (
     MOST_EVENTS,
     facing_normal,
-    follows_sharply,
     has_wide_lobes,
     lambertian,
 )
@@ -158,7 +158,7 @@ class PhotonShooter:
         wo = si.to_world(bs.wo)
         # Light that passes the first surface starts at the next.
         active &= ~passes | (events > 0)
-        active &= follows_sharply(bs)
+        active &= is_sharp_event(bs)
         # Adjoint of shading normals: Veach 1997, eq. 5.19.
         into, out = dr.dot(si.n, si.to_world(si.wi)), dr.dot(si.n, wo)
         active &= passes | ((into * si.wi.z > 0) & (out * bs.wo.z > 0))

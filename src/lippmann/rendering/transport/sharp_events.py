@@ -14,8 +14,8 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from lippmann.device.pbr.gltf_bsdf import LAMBERTIAN, SHARP_EVENT, SHARP_LOBE, WIDE_LOBES
-from lippmann.device.types import Bool, BSDFPtr, BSDFSample3f, Color3f, SurfaceInteraction3f, Vector3f
+from lippmann.device.pbr.gltf_bsdf import LAMBERTIAN, SHARP_LOBE, WIDE_LOBES
+from lippmann.device.types import Bool, BSDFPtr, Color3f, SurfaceInteraction3f, Vector3f
 
 #: Sharp events between an emitter and a caustic, straight-through surfaces beside them, and specular surfaces in front
 #: of one whose features a denoiser gets, at most; light of more is left to paths.
@@ -26,11 +26,6 @@ def sharp_lobe(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Vector3
     """Unit normal of a surface's narrow lobe in the frame of ``si``, on the side of ``si.wi``; 0 where it has none."""
     has_word = active & bsdf.has_attribute(SHARP_LOBE, active)
     return dr.select(has_word, mi.Vector3f(bsdf.eval_attribute_3(SHARP_LOBE, si, has_word)), 0)
-
-
-def follows_sharply(bs: BSDFSample3f) -> Bool:
-    """Whether a sampled event is sharp: by a lobe without width or by a narrow one, or straight through."""
-    return (bs.sampled_type & (int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null) | SHARP_EVENT)) != 0
 
 
 def has_wide_lobes(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Bool:

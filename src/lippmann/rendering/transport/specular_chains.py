@@ -23,6 +23,7 @@ import mitsuba as mi
 
 from lippmann.device.pbr.gltf_bsdf import SHARP_FIRST, SHARP_LOBE
 from lippmann.device.pbr.microfacet import is_sharp
+from lippmann.device.pbr.surface_lobes import is_sharp_event
 from lippmann.device.sobol import SampleStream, hash32, named_seed
 from lippmann.device.syntax import syntax
 from lippmann.device.types import (
@@ -42,7 +43,6 @@ from lippmann.rendering.transport.light_sampling import MAX_CROSSINGS
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.path_vertex import DIMENSIONS, LastVertex, Scattering, Vertex
 from lippmann.rendering.transport.ray_source import PixelRays
-from lippmann.rendering.transport.sharp_events import follows_sharply
 from lippmann.rendering.transport.tuning import TUNING
 
 
@@ -186,7 +186,7 @@ def _leave(integrator: PathIntegrator, vertex: Vertex, at_first: UInt32, state: 
         scattering = Scattering(vertex, bs, weight)
         passes = scattering.passes
         states = integrator.absorption.scatter(vertex, scattering)
-        continues &= follows_sharply(bs)
+        continues &= is_sharp_event(bs)
         throughput *= weight
         onward = si.spawn_ray(si.to_world(bs.wo))
         o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
+from lippmann.device.pbr.surface_lobes import is_sharp_event
 from lippmann.device.sobol import SampleStream
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, BSDFPtr, Ray3f, Spectrum, SurfaceInteraction3f, UInt32, Vector3f
@@ -14,7 +15,6 @@ from lippmann.rendering.transport.path_vertex import DIMENSIONS
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.sharp_events import (
     facing_normal,
-    follows_sharply,
     lambertian,
     sharp_lobe,
 )
@@ -50,7 +50,7 @@ class VisibleBlur:
 
             dimension = (depth * 2 + crossings) * DIMENSIONS + 1
             bs, weight = bsdf.sample(context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), active)
-            active &= follows_sharply(bs)
+            active &= is_sharp_event(bs)
             throughput *= weight
             if mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null):
                 crossings += 1
