@@ -49,8 +49,8 @@ class Engine:
         ``cpu`` or ``gpu``.
     threads:
         CPU threads.
-    llvm_path, llvm_version:
-        The LLVM library; None on the GPU.
+    llvm_version:
+        Of the LLVM library; None on the GPU.
     gpu_name:
         Name of the GPU; None on the CPU.
     """
@@ -58,7 +58,6 @@ class Engine:
     variant: str
     device: Literal["cpu", "gpu"]
     threads: int
-    llvm_path: str | None = None
     llvm_version: str | None = None
     gpu_name: str | None = None
 
@@ -231,8 +230,7 @@ def _on_cpu(dr: Any, library: llvm.Library | None) -> Engine:
             rule=f"LLVM {llvm.OLDEST} or newer is needed, and has to be selected before Dr.Jit is first imported",
             fix=f"start Lippmann before Mitsuba is imported, or set {llvm.PATH_VARIABLE}",
         )
-    path = str(library.path) if library else os.environ.get(llvm.PATH_VARIABLE)
-    return Engine("llvm_ad_rgb", "cpu", 1, llvm_path=path, llvm_version=".".join(map(str, version)))
+    return Engine("llvm_ad_rgb", "cpu", 1, llvm_version=".".join(map(str, version)))
 
 
 def _load_error(path: Path) -> str:
