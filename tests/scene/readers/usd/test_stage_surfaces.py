@@ -238,3 +238,68 @@ def test_arnold(read, file):
     assert material.normal_texture is not None
     assert material.metallic == 0.5
     assert scene.notes == []
+
+
+def test_highlights_and_sheen(read):
+    inputs = """float inputs:specular = 0.25
+        color3f inputs:specular_color = (1, 0.5, 0)
+        float inputs:sheen = 0.5
+        color3f inputs:sheen_color = (1, 0.5, 0)
+        float inputs:specular_anisotropy = 0.5
+        float inputs:thin_film_thickness = 0"""
+    scene = read(material_x(STANDARD, inputs))
+    material = scene.materials[0]
+    assert (material.specular, material.specular_color) == (0.25, (1.0, 0.5, 0.0))
+    assert (material.sheen_color, material.sheen_roughness) == ((0.5, 0.25, 0.0), pytest.approx(0.3))
+    assert scene.notes == ["material /mat: not honoured: specular_anisotropy"]
+    plain = read(material_x(STANDARD, "")).materials[0]
+    assert (plain.specular, plain.sheen_color) == (1.0, (0.0, 0.0, 0.0))
+
+
+def test_a_picture_of_highlights(read):
+    nodes = """
+    def Shader "i" {
+        uniform token info:id = "ND_image_float"
+        asset inputs:file = @t.png@
+        float outputs:out
+    }
+"""
+    body = material_x(STANDARD, "float inputs:specular.connect = </mat/i.outputs:out>", nodes)
+    material = read(body, files={"t.png": png(PICTURE)}).materials[0]
+    assert material.specular_texture.image.pixels[0, 1, 3] == 20
+
+
+@pytest.mark.parametrize(("kind", "share"), [(STANDARD, "transmission"), (OPEN_PBR, "transmission_weight")])
+def test_what_is_let_through_has_a_colour_of_its_own(read, kind, share):
+    through = f"color3f inputs:base_color = (0, 0, 1)\nfloat inputs:{share} = 1"
+    assert read(material_x(kind, through)).materials[0].base_color == (1.0, 1.0, 1.0)
+    tinted = f"{through}\ncolor3f inputs:transmission_color = (1, 0.5, 0)"
+    assert read(material_x(kind, tinted)).materials[0].base_color == (1.0, 0.5, 0.0)
+
+
+def test_images_of_gltf(read):
+    nodes = """
+    def Shader "i" {
+        uniform token info:id = "ND_gltf_colorimage"
+        asset inputs:file = @t.png@
+        color4f inputs:color = (0.5, 0.25, 1, 1)
+        color3f outputs:outcolor
+        float outputs:outa
+    }
+    def Shader "n" {
+        uniform token info:id = "ND_gltf_normalmap_vector3_1_0"
+        asset inputs:file = @t.png@
+        float3 outputs:out
+    }
+"""
+    inputs = """color3f inputs:base_color.connect = </mat/i.outputs:outcolor>
+        float3 inputs:normal.connect = </mat/n.outputs:out>"""
+    body = material_x("ND_gltf_pbr_surfaceshader", inputs, nodes)
+    scene = read(body, files={"t.png": png(PICTURE)})
+    material = scene.materials[0]
+    assert material.base_color == (0.5, 0.25, 1.0)
+    assert material.base_color_texture.srgb
+    assert not material.normal_texture.srgb
+    assert scene.notes == []
+    placed = body.replace("color4f inputs:color", "float2 inputs:scale = (2, 2)\n color4f inputs:color")
+    assert read(placed).notes == ["shader nodes of type 'gltf_colorimage' are not read"]

@@ -85,6 +85,7 @@ class SurfaceReader:
         material = self._with_reflection(material, inputs)
         material = self._with_opacity(material, inputs)
         material = self._with_coat(material, inputs)
+        material = self._with_highlight_and_sheen(material, inputs)
         transmission = min(max(self._number(inputs, "transmission", 0.0), 0.0), 1.0)
         material = replace(material, transmission=transmission, thickness=float(transmission > 0.0))
         material = replace(material, normal_texture=self._normal_map(inputs))
@@ -159,6 +160,26 @@ class SurfaceReader:
             clearcoat_texture=_in_channel(texture, 0),
             clearcoat_roughness=rough,
             clearcoat_roughness_texture=_in_channel(rough_texture, 1),
+        )
+
+    def _with_highlight_and_sheen(self, material: Material, inputs: Record) -> Material:
+        """Of surfaces that ``UsdPreviewSurface`` has no words for."""
+        if "specular" not in inputs:
+            return material
+        specular, texture = self._scalar(inputs, "specular", 1.0)
+        color, color_texture = self._color(inputs, "highlightColor", (1.0, 1.0, 1.0))
+        sheen, sheen_texture = self._color(inputs, "sheenColor", (0.0, 0.0, 0.0))
+        rough, rough_texture = self._scalar(inputs, "sheenRoughness", 0.0)
+        return replace(
+            material,
+            specular=specular,
+            specular_texture=_in_alpha(texture),
+            specular_color=_fraction(color),
+            specular_color_texture=color_texture,
+            sheen_color=_fraction(sheen),
+            sheen_color_texture=sheen_texture,
+            sheen_roughness=rough,
+            sheen_roughness_texture=_in_alpha(rough_texture),
         )
 
     def _number(self, inputs: Record, name: str, default: float) -> float:
@@ -292,6 +313,14 @@ def _encode(texture: Texture) -> Image:
 
     values = np.clip(texture_maps.unit(texture.image)[..., :3], 0.0, 1.0)
     return Image(texture.image.name, np.asarray(encode_srgb(values), np.float32))
+
+
+def _in_alpha(texture: Texture | None) -> Texture | None:
+    """A texture of one channel, which the opacity of a white one holds."""
+    if texture is None:
+        return None
+    image = texture_maps.with_alpha(None, texture_maps.unit(texture.image)[..., 0], texture.image.name)
+    return replace(texture, image=image)
 
 
 def _in_channel(texture: Texture | None, channel: int) -> Texture | None:

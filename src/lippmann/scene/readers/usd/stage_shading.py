@@ -8,7 +8,7 @@ from typing import Any
 from pxr import Gf, Sdf, Usd, UsdShade
 
 from lippmann.scene.readers.usd.records import Record
-from lippmann.scene.readers.usd.stage_surfaces import as_preview, is_read, materialx_node, surface_of
+from lippmann.scene.readers.usd.stage_surfaces import as_preview, is_read, materialx_node, surface_of, unread_inputs
 
 #: Nodes between a surface and what it reads.
 _DEEPEST = 8
@@ -56,7 +56,10 @@ class MaterialTable:
             self._notes[f"material {name}: {what}: display colours are taken"] = None
             return None
         inputs = {each.GetBaseName(): self._source(each, _DEEPEST) for each in surface.GetInputs()}
-        given = as_preview(kind, {key: value for key, value in inputs.items() if value is not None})
+        known = {key: value for key, value in inputs.items() if value is not None}
+        if unread := unread_inputs(kind, known):
+            self._notes[f"material {name}: not honoured: {', '.join(unread)}"] = None
+        given = as_preview(kind, known)
         if primvar := given.get("diffuseColor", {}).get("primvar"):
             self.color_names[str(primvar)] = None
         return {"name": name, "inputs": given}

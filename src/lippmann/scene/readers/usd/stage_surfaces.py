@@ -25,13 +25,16 @@ _CONTEXTS = ("mtlx", "mdl", "arnold")
 class _Model:
     """Inputs by those of ``UsdPreviewSurface``: name and default; and what multiplies them, with its default.
 
-    ``subsurface`` is the share of light that is scattered below the surface, and has ``subsurface_color``.
+    ``subsurface`` is the share of light that is scattered below the surface, and has ``subsurface_color``;
+    ``transmission_color`` tints what is let through in place of the base. ``unread`` are shares of what is left out.
     """
 
     inputs: dict[str, tuple[str, Any]]
     weights: dict[str, tuple[str, float]] = field(default_factory=dict)
     coat_color: str = ""
     subsurface: str = ""
+    transmission_color: str = ""
+    unread: tuple[str, ...] = ()
 
 
 _WHITE, _LIGHT_GREY = [1.0, 1.0, 1.0], [0.8, 0.8, 0.8]
@@ -48,10 +51,16 @@ _MODELS = {
             "opacity": ("opacity", 1.0),
             "normal": ("normal", None),
             "transmission": ("transmission", 0.0),
+            "specular": ("specular", 1.0),
+            "highlightColor": ("specular_color", _WHITE),
+            "sheenColor": ("sheen_color", _WHITE),
+            "sheenRoughness": ("sheen_roughness", 0.3),
         },
-        {"diffuseColor": ("base", 1.0), "emissiveColor": ("emission", 0.0)},
+        {"diffuseColor": ("base", 1.0), "emissiveColor": ("emission", 0.0), "sheenColor": ("sheen", 0.0)},
         "coat_color",
         "subsurface",
+        "transmission_color",
+        ("specular_anisotropy", "thin_film_thickness", "transmission_depth"),
     ),
     "ND_open_pbr_surface_surfaceshader": _Model(
         {
@@ -65,10 +74,20 @@ _MODELS = {
             "opacity": ("geometry_opacity", 1.0),
             "normal": ("geometry_normal", None),
             "transmission": ("transmission_weight", 0.0),
+            "specular": ("specular_weight", 1.0),
+            "highlightColor": ("specular_color", _WHITE),
+            "sheenColor": ("fuzz_color", _WHITE),
+            "sheenRoughness": ("fuzz_roughness", 0.5),
         },
-        {"diffuseColor": ("base_weight", 1.0), "emissiveColor": ("emission_luminance", 0.0)},
+        {
+            "diffuseColor": ("base_weight", 1.0),
+            "emissiveColor": ("emission_luminance", 0.0),
+            "sheenColor": ("fuzz_weight", 0.0),
+        },
         "coat_color",
         "subsurface_weight",
+        "transmission_color",
+        ("specular_roughness_anisotropy", "thin_film_weight", "transmission_depth"),
     ),
     "ND_gltf_pbr_surfaceshader": _Model(
         {
@@ -82,8 +101,13 @@ _MODELS = {
             "opacity": ("alpha", 1.0),
             "normal": ("normal", None),
             "transmission": ("transmission", 0.0),
+            "specular": ("specular", 1.0),
+            "highlightColor": ("specular_color", _WHITE),
+            "sheenColor": ("sheen_color", [0.0, 0.0, 0.0]),
+            "sheenRoughness": ("sheen_roughness", 0.0),
         },
         {"emissiveColor": ("emissive_strength", 1.0)},
+        unread=("anisotropy_strength", "iridescence", "dispersion"),
     ),
     # Its emissive_intensity counts for a camera's exposure: the colour alone is taken.
     "OmniPBR": _Model(
@@ -151,6 +175,12 @@ def _kind_of(surface: UsdShade.Shader) -> str:
     return PREVIEW if kind == f"ND_{PREVIEW}_surfaceshader" else kind.split("(")[0]
 
 
+def unread_inputs(kind: str, given: Record) -> list[str]:
+    """Inputs that a surface has, and that make it look otherwise than it is shown."""
+    names = _MODELS[kind].unread if kind in _MODELS else ()
+    return [name for name in names if name in given and given[name].get("value") != 0.0]
+
+
 def as_preview(kind: str, given: Record) -> Record:
     """The inputs of a surface of any kind that is read, by the names of ``UsdPreviewSurface``."""
     if kind == PREVIEW:
@@ -178,6 +208,9 @@ def as_preview(kind: str, given: Record) -> Record:
         inputs[preview] = _scale(inputs[preview], [weight, weight, weight])
     if share := _number(given, model.subsurface, 0.0):
         inputs["diffuseColor"] = _mix(inputs["diffuseColor"], given.get("subsurface_color", {"value": _WHITE}), share)
+    if through := _number(inputs, "transmission", 0.0) if model.transmission_color else 0.0:
+        tint = given.get(model.transmission_color, {"value": _WHITE})
+        inputs["diffuseColor"] = _mix(inputs["diffuseColor"], tint, through)
     coat, tint = _number(inputs, "clearcoat", 0.0), given.get(model.coat_color)
     if coat > 0.0 and tint is not None:
         inputs["diffuseColor"] = _under_coat(inputs["diffuseColor"], tint, coat)
@@ -301,6 +334,21 @@ def _normal_map(kind: str, channel: str, given: Record, node: Usd.Prim) -> Recor
     return {**source, "texture": {**source["texture"], **_AS_DIRECTIONS}}
 
 
+def _gltf_image(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+    """An image of glTF's materials, whose colours may be tinted; None of one that is placed otherwise than whole."""
+    if given.keys() & {"offset", "rotate", "scale"}:
+        return None
+    image = _image(f"{kind}_color" if "color" in kind else kind, channel, given, node)
+    if channel == "outa":
+        return {**image, "channel": "a"}
+    tint = given.get("color", given.get("factor", {})).get("value", 1.0)
+    return _scale(image, tint[:3] if isinstance(tint, list) else [tint] * 3)
+
+
+def _gltf_normal_map(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+    return _normal_map(kind, channel, {"in": _gltf_image("vector", channel, given, node) or {}}, node)
+
+
 def _passed_on(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
     return given.get("in", given.get("value"))
 
@@ -360,6 +408,9 @@ _NODES: dict[str, Callable[[str, str, Record, Usd.Prim], Record | None]] = {
     "ND_separate": _separate,
     "ND_texcoord_": _coordinates,
     "ND_geompropvalue_": _coordinates,
+    "ND_gltf_normalmap": _gltf_normal_map,
+    "ND_gltf_colorimage": _gltf_image,
+    "ND_gltf_image_": _gltf_image,
     "arnold:image": _arnold_image,
     "arnold:normal_map": _arnold_normal_map,
 }
