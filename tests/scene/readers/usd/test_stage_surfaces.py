@@ -303,3 +303,19 @@ def test_images_of_gltf(read):
     assert scene.notes == []
     placed = body.replace("color4f inputs:color", "float2 inputs:scale = (2, 2)\n color4f inputs:color")
     assert read(placed).notes == ["shader nodes of type 'gltf_colorimage' are not read"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "inputs", "thickness"),
+    [
+        (STANDARD, "float inputs:transmission = 1\nbool inputs:thin_walled = 1", 0.0),
+        (OPEN_PBR, "float inputs:transmission_weight = 1\nbool inputs:geometry_thin_walled = 1", 0.0),
+        ("OmniGlass", "bool inputs:thin_walled = 1", 0.0),
+        ("OmniGlass", "", 1.0),
+        ("ND_gltf_pbr_surfaceshader", "float inputs:transmission = 1", 0.0),
+        ("ND_gltf_pbr_surfaceshader", "float inputs:transmission = 1\nfloat inputs:thickness = 0.1", 1.0),
+    ],
+)
+def test_panes_of_glass(read, kind, inputs, thickness):
+    material = read(material_x(kind, inputs)).materials[0]
+    assert (material.transmission, material.thickness) == (1.0, thickness)

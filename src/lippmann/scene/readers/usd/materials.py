@@ -87,7 +87,8 @@ class SurfaceReader:
         material = self._with_coat(material, inputs)
         material = self._with_highlight_and_sheen(material, inputs)
         transmission = min(max(self._number(inputs, "transmission", 0.0), 0.0), 1.0)
-        material = replace(material, transmission=transmission, thickness=float(transmission > 0.0))
+        is_solid = transmission > 0.0 and not self._number(inputs, "thinWalled", 0.0)
+        material = replace(material, transmission=transmission, thickness=float(is_solid))
         material = replace(material, normal_texture=self._normal_map(inputs))
         by_color, by_opacity = self._reads(inputs, "diffuseColor"), self._reads(inputs, "opacity")
         for unread in inputs.keys() - {"diffuseColor", "opacity"}:

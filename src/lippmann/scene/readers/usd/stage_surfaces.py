@@ -51,6 +51,7 @@ _MODELS = {
             "opacity": ("opacity", 1.0),
             "normal": ("normal", None),
             "transmission": ("transmission", 0.0),
+            "thinWalled": ("thin_walled", 0.0),
             "specular": ("specular", 1.0),
             "highlightColor": ("specular_color", _WHITE),
             "sheenColor": ("sheen_color", _WHITE),
@@ -74,6 +75,7 @@ _MODELS = {
             "opacity": ("geometry_opacity", 1.0),
             "normal": ("geometry_normal", None),
             "transmission": ("transmission_weight", 0.0),
+            "thinWalled": ("geometry_thin_walled", 0.0),
             "specular": ("specular_weight", 1.0),
             "highlightColor": ("specular_color", _WHITE),
             "sheenColor": ("fuzz_color", _WHITE),
@@ -107,7 +109,7 @@ _MODELS = {
             "sheenRoughness": ("sheen_roughness", 0.0),
         },
         {"emissiveColor": ("emissive_strength", 1.0)},
-        unread=("anisotropy_strength", "iridescence", "dispersion"),
+        unread=("anisotropy_strength", "iridescence", "dispersion", "attenuation_distance"),
     ),
     # Its emissive_intensity counts for a camera's exposure: the colour alone is taken.
     "OmniPBR": _Model(
@@ -139,6 +141,7 @@ _MODELS |= {
             "roughness": ("frosting_roughness", 0.0),
             "ior": ("glass_ior", 1.491),
             "transmission": ("", 1.0),  # of all that it is
+            "thinWalled": ("thin_walled", 0.0),
         }
     ),
 }
@@ -198,6 +201,7 @@ def as_preview(kind: str, given: Record) -> Record:
         if not _number(given, "enable_opacity", float(kind.endswith("Opacity"))):
             inputs.pop("opacity")
     if kind == "ND_gltf_pbr_surfaceshader":
+        inputs["thinWalled"] = {"value": float(_number(given, "thickness", 0.0) == 0.0)}
         mode = _number(given, "alpha_mode", 0.0)
         if mode == 0.0:
             inputs.pop("opacity")
