@@ -332,12 +332,11 @@ def test_what_shows_nothing_is_refused_in_one_line(tmp_path):
         load_scene(tmp_path / "huge")
 
 
-def test_an_unknown_compression_is_named(tmp_path):
+def compress(path):
+    """The file's pixels as JPEG XL's, which no decoder of pydicom's own reads."""
     import pydicom
     from pydicom.encaps import encapsulate
 
-    save_series(tmp_path / "ls", [0])
-    (path,) = (tmp_path / "ls").iterdir()
     data = pydicom.dcmread(path)
     data.PixelData = encapsulate([b"\xff\xd8\xff\xd9"])
     data["PixelData"].is_undefined_length = True
@@ -346,8 +345,23 @@ def test_an_unknown_compression_is_named(tmp_path):
         pydicom.uid.JPEGXL if hasattr(pydicom.uid, "JPEGXL") else "1.2.840.10008.1.2.4.80"
     )
     data.save_as(path)
+
+
+def test_an_unknown_compression_is_named(tmp_path):
+    save_series(tmp_path / "ls", [0])
+    compress(next((tmp_path / "ls").iterdir()))
     with pytest.raises(SceneError, match=r"ls: (its pixels are compressed as|cannot be read)"):
         load_scene(tmp_path / "ls")
+
+
+def test_a_slice_of_an_unknown_compression_is_left_out_of_its_series(tmp_path):
+    save_series(tmp_path / "ct", [0, 3, 6, 9])
+    read = pytest.importorskip("pydicom").dcmread
+    path = next(each for each in (tmp_path / "ct").iterdir() if read(each).ImagePositionPatient[2] == 3)
+    compress(path)
+    scene = load_scene(tmp_path / "ct")
+    assert scene.description.volume.grid[:, 1, 0].tolist() == [0, 30, 60, 90]
+    assert any(f"1 of 4 files is left out: 1 compressed as JPEG" in each and path.name in each for each in scene.notes)
 
 
 def test_links_in_a_folder_are_left_alone(tmp_path):

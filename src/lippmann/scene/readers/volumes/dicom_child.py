@@ -233,7 +233,7 @@ def _fill(frames: list[Frame], lost: dict[str, list[str]], memory: int) -> tuple
         if held[0] != frame.file:
             try:
                 held = (frame.file, _pixels(frame))
-            except (SeriesError, MemoryError):
+            except MemoryError:
                 raise
             except Exception as error:  # noqa: BLE001  # as above
                 damaged[frame.file] = error
@@ -252,7 +252,10 @@ def _fill(frames: list[Frame], lost: dict[str, list[str]], memory: int) -> tuple
     if grid is None:
         raise next(iter(damaged.values()))
     if damaged:
-        lost.setdefault("damaged", []).extend(damaged)
+        for name, error in damaged.items():
+            is_packed = isinstance(error, SeriesError)  # others of the series are not, or in a way that is decoded
+            kind = error.said["error"].removeprefix("its pixels are ") if is_packed else "damaged"
+            lost.setdefault(kind, []).append(name)
         return _fill([frame for frame in frames if frame.file not in damaged], lost, memory)
     if stack.places is not None:
         grid = interpolate(grid, stack.places)
