@@ -47,6 +47,12 @@ def test_cameras_of_the_stanford_archive_are_ordered_by_where_they_stood(down, r
         assert found[name] == (row if down > 0 else 1 - row, column if right > 0 else 2 - column)
 
 
+@pytest.mark.parametrize("grid", [GRID, [(0, 0), (0, 1), (0, 2)], [(0, 0), (1, 0)]])
+def test_views_of_jpeg_pleno_are_named_by_column_and_row(grid):
+    names = {(row, column): Path(f"{column:03}_{row:03}.ppm") for row, column in grid}
+    assert places_of_views([*names.values()]) == names
+
+
 def test_names_without_numbers_and_doubles_are_named():
     with pytest.raises(PictureError, match=r"a\.png: the name has no number.*rename it: view_00"):
         places("a.png", "b_1.png")

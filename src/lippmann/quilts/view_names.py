@@ -3,7 +3,8 @@
 Numbers that all names share say nothing. Of the others the last one counts the views, or the last two side by side are
 row and column, where rows and columns repeat; column and row where names say so (``x3_y0``, ``col3_row0``). Folders
 of the 4D Light Field Benchmark count row by row, in rows as long as their ``parameters.cfg`` says; without it a square
-number of views, counted from 0, is a square grid. Names of the Stanford light field archive also
+number of views, counted from 0, is a square grid. Views of JPEG Pleno (``004_012.ppm``) are named by column, then
+row, as its reference software (ISO/IEC 21794-4) writes and reads them. Names of the Stanford light field archive also
 hold where the camera stood, ``out_ROW_COLUMN_Y_X``, in mm, x to the right and y downwards; their rows and columns run
 either way.
 """
@@ -30,6 +31,7 @@ _NUMBER = re.compile(r"[0-9]{1,9}")
 _COLUMN_FIRST = re.compile(r"(?<![a-z])(x|col|column)[ _=-]?\d+[^a-z0-9]*(y|row)[ _=-]?\d+\D*$", re.IGNORECASE)
 _HCI = re.compile(r"input_Cam(\d{3,6})")
 _HCI_COLUMNS = re.compile(rb"^\s*num_cams_x\s*=\s*([1-9]\d{0,4})\s*$", re.MULTILINE)
+_PLENO = re.compile(r"(\d{3})_(\d{3})\.ppm", re.IGNORECASE)
 _STANFORD = re.compile(r"_(\d{1,6})_(\d{1,6})_(-?\d{1,9}\.\d{1,9})_(-?\d{1,9}\.\d{1,9})(?![\d.])")
 
 
@@ -61,6 +63,9 @@ def places_of_views(paths: Sequence[Path]) -> dict[Place, Path]:
     stems = [path.stem for path in paths]
     if all(_STANFORD.search(stem) for stem in stems):
         return _by_place(paths, _stanford_places(stems))
+    pleno = [match for path in paths if (match := _PLENO.fullmatch(path.name))]
+    if len(pleno) == len(paths):
+        return _by_place(paths, [(int(match[2]), int(match[1])) for match in pleno])
     if across := _benchmark_columns(paths):
         return _by_place(paths, [divmod(int(stem[len("input_Cam") :]), across) for stem in stems])
     numbers = [tuple(int(number) for number in _NUMBER.findall(stem)) for stem in stems]
