@@ -19,7 +19,7 @@ from lippmann.scene.extent import bounds_of
 from lippmann.scene.matrices import transform_points
 from lippmann.scene.placement import place
 from lippmann.scene.readers.depth_layers import EDGE, split_layers
-from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map
+from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map, says_disparity
 from lippmann.scene.readers.load import load_scene
 
 DEPTH = np.array([[1.0, 2.0, 4.0], [2.0, 0.0, np.nan]], np.float32)
@@ -397,6 +397,22 @@ def test_without_any_depth_there_is_no_scene(tmp_path):
     slices.save(tmp_path / "pair.jpg", "MPO", save_all=True, append_images=[slices])
     with pytest.raises(SceneError, match=r"^pair\.jpg: needs a depth map; .* beside it$"):
         load_scene(tmp_path / "pair.jpg")
+
+
+@pytest.mark.parametrize("name", ["photo_disparity.npy", "disp0GT.pfm", "gt_disp_lowres.pfm", "photo-disp.png"])
+def test_a_map_whose_name_says_disparity_is_nearer_where_it_is_larger(tmp_path, name):
+    path, photo = tmp_path / name, tmp_path / "photo.png"
+    disparity = np.array([[0.0, 8.0, 2.0]] * 3, np.float32)
+    if name.endswith(".png"):
+        Pillow.fromarray(disparity.astype(np.uint16)).save(path)
+    else:
+        disparity[1, 1] = np.inf  # unknown, as in Middlebury's
+        saved(path, disparity)
+    np.testing.assert_array_equal(read_depth_map(path).inverse[0], disparity[0])
+    assert np.isnan(read_depth_map(path).inverse[1, 1]) == np.isinf(disparity[1, 1])
+    photo.write_bytes(encoded(np.zeros((3, 3, 3), np.uint8)))
+    assert f"{name} is taken for disparity" in " ".join(load_scene(photo, depth_map=path).notes)
+    assert not says_disparity(tmp_path / "display.npy")
 
 
 @pytest.mark.parametrize(

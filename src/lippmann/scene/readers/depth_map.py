@@ -27,6 +27,8 @@ from lippmann.scene.parsing.files import read_bytes
 
 #: Names of channels of OpenEXR that hold depth, by their own name or that of their layer, before those of any value.
 _CHANNELS = (r"Z", r".*depth(\.[ZVYRX])?", r".*\.Z", r"[VYR]")
+#: Names that say that larger values are nearer: ``disp0GT.pfm``, ``gt_disp_lowres.pfm``, ``photo_disparity.png``.
+_DISPARITY = re.compile(r"disparity|(?<![a-z])disp\d*(gt)?(?![a-z])", re.IGNORECASE)
 #: Mean difference of the channels of a grey picture, in codes of 8 bits, which JPEG's greys stay below.
 _MOST_TINT = 8.0
 
@@ -65,6 +67,16 @@ def of_depth(depth: NDArray[np.float32]) -> DepthMap:
     return DepthMap(np.where(np.isfinite(inverse), inverse, np.nan).astype(np.float32))
 
 
+def of_disparity(disparity: NDArray[np.float32]) -> DepthMap:
+    """Depth map of disparities, of which larger ones are nearer; those that are not finite are unknown."""
+    return DepthMap(np.where(np.isfinite(disparity), disparity, np.nan).astype(np.float32))
+
+
+def says_disparity(path: Path) -> bool:
+    """Whether a depth map's name says that it holds disparities, not distances."""
+    return _DISPARITY.search(path.stem) is not None
+
+
 def without_stairs(levels: NDArray[np.generic]) -> NDArray[np.float32]:
     """Whole numbers ``(h, w)`` as the smooth surface that they may have been rounded from.
 
@@ -82,8 +94,9 @@ def without_stairs(levels: NDArray[np.generic]) -> NDArray[np.float32]:
 def read_depth_map(path: Path) -> DepthMap:
     """Read a depth map.
 
-    Floats (``.pfm``, ``.npy``, OpenEXR, TIFF) are metres, pictures of 16 bits millimetres. A picture of 8 bits is
-    brighter where something is nearer, as programs that estimate depth write it.
+    Floats (``.pfm``, ``.npy``, OpenEXR, TIFF) are metres, pictures of 16 bits millimetres, but disparities where the
+    name says so (:func:`says_disparity`). A picture of 8 bits is brighter where something is nearer, as programs that
+    estimate depth write it.
 
     Raises
     ------
@@ -94,19 +107,23 @@ def read_depth_map(path: Path) -> DepthMap:
     """
     data = read_bytes(path)
     suffix = path.suffix.lower()
+    convert = of_disparity if says_disparity(path) else of_depth
     check_input(2 * len(data), "the depth map", where=path.name)
     try:
         if suffix == ".npy":
-            return of_depth(_one_channel(_numpy_array(path), path.name))
+            return convert(_one_channel(_numpy_array(path), path.name))
         if suffix == ".pfm":
-            return of_depth(read_pfm(path))
+            return convert(read_pfm(path))
         if suffix == ".exr":
-            return of_depth(_exr(path))
+            return convert(_exr(path))
     except PictureError as error:
         raise SceneError(error.what, where=path.name, rule=error.rule, fix=error.fix) from None
     except (ValueError, EOFError, OSError) as error:
         raise SceneError(f"is no depth map ({error})", where=path.name) from None
-    return _picture(data, path.name)
+    values, is_wide = _gray(data, path.name)
+    if values.dtype.kind == "f" or is_wide:  # a scale is no matter
+        return convert(values.astype(np.float32))
+    return DepthMap(without_stairs(values))
 
 
 def _numpy_array(path: Path) -> NDArray[np.generic]:
@@ -150,13 +167,6 @@ def _one_channel(values: NDArray[np.generic], where: str) -> NDArray[np.float32]
     check_input(4 * values.size, "the depth map", where=where)
     with np.errstate(over="ignore"):
         return np.asarray(values, np.float32)
-
-
-def _picture(data: bytes, where: str) -> DepthMap:
-    values, is_wide = _gray(data, where)
-    if values.dtype.kind == "f" or is_wide:  # a scale is no matter
-        return of_depth(values.astype(np.float32))
-    return DepthMap(without_stairs(values))
 
 
 def _gray(data: bytes, where: str, turn: int | None = None) -> tuple[NDArray[np.generic], bool]:

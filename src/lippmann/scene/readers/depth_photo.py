@@ -21,7 +21,7 @@ from lippmann.errors import SceneError
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import decoding, read_bytes, texels_of_codes
 from lippmann.scene.readers.depth_layers import Layers, split_layers
-from lippmann.scene.readers.depth_map import DepthMap, embedded_depth, of_nearness, read_depth_map
+from lippmann.scene.readers.depth_map import DepthMap, embedded_depth, of_nearness, read_depth_map, says_disparity
 from lippmann.scene.values.description import Image, Instance, Material, Mesh, SceneDescription, Texture
 
 #: How the name of a depth map goes on after that of its photograph, and how it ends.
@@ -91,6 +91,8 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
                 fix += "; slices of a volume are read as .npy: numpy.save('a.npy', tifffile.imread('a.tif'))"
             raise SceneError("needs a depth map", where=path.name, rule=rule, fix=fix)
         notes = (*notes, f"depth from {depth_map.name}, which lies beside it")
+    if depth_map is not None and says_disparity(depth_map):
+        notes = (*notes, f"{depth_map.name} is taken for disparity, as its name says: larger values are nearer")
     chosen = read_depth_map(depth_map) if depth_map is not None else own
     assert chosen is not None
     height, width = image.pixels.shape[:2]

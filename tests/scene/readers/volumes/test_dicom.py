@@ -361,7 +361,7 @@ def test_a_slice_of_an_unknown_compression_is_left_out_of_its_series(tmp_path):
     compress(path)
     scene = load_scene(tmp_path / "ct")
     assert scene.description.volume.grid[:, 1, 0].tolist() == [0, 30, 60, 90]
-    assert any(f"1 of 4 files is left out: 1 compressed as JPEG" in each and path.name in each for each in scene.notes)
+    assert any("1 of 4 files is left out: 1 compressed as JPEG" in each and path.name in each for each in scene.notes)
 
 
 def test_links_in_a_folder_are_left_alone(tmp_path):
