@@ -62,28 +62,27 @@ BLOCKS = Display("blocks", Panel(192, 128, 0.25), LensArray("square", 1.0), 1.0,
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("display", "most"), [(FINE, 0.38), (BLOCKS, 0.7)], ids=["fine", "blocks"])
+@pytest.mark.parametrize(("display", "most"), [(FINE, 0.43), (BLOCKS, 0.5)], ids=["fine", "blocks"])
 def test_noise_is_taken_out_of_the_eyes_view(display, most):
     """In a room, whose walls are noisy: the network does not smooth edges, which are most of the error elsewhere.
 
-    Of sub-pixels it gets all colours: one colour of each leaves 0.43 of the error, as their noise looks like texture.
+    Of sub-pixels it gets all colours: one colour of each leaves 0.48 of the error, as their noise looks like texture.
     """
     room = lippmann.load_scene("room")
 
     def shown(**options):
         return render_eye_preview(room, display, EYES[0], RenderRequest(integrator="path", **options), (90, 90))
 
-    many = shown(spp=128, denoise="none").pixels
-    noisy, clean, asked = (shown(spp=4, denoise=each, seed=3) for each in ("none", "auto", "oidn-high"))
+    many = shown(spp=32, denoise="none").pixels
+    noisy, clean = (shown(spp=4, denoise=each, seed=3) for each in ("none", "auto"))
     assert "denoise" not in noisy.provenance.options
     assert clean.provenance.options["denoise_effort"] == "fast"
-    assert asked.provenance.options["denoise_effort"] == "high"
-    error = np.mean((noisy.pixels - many) ** 2)
-    assert np.mean((clean.pixels - many) ** 2) < most * error
-    assert np.mean((asked.pixels - many) ** 2) < 0.5 * error
+    assert np.mean((clean.pixels - many) ** 2) < most * np.mean((noisy.pixels - many) ** 2)
 
 
 def test_a_denoiser_that_is_asked_for_is_there_or_missed_at_once(teapot, monkeypatch):
+    asked = render_eye_preview(teapot, BLOCKS, EYES[0], RenderRequest(spp=4, denoise="oidn-high"), (60, 60))
+    assert asked.provenance.options["denoise_effort"] == "high"
     with pytest.raises(UsageError, match="denoise: normal has no noise"):
         render_eye_preview(teapot, BLOCKS, EYES[0], RenderRequest(integrator="normal", denoise="oidn"), (60, 60))
     monkeypatch.setitem(sys.modules, "pyoidn", None)
