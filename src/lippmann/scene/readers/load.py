@@ -59,6 +59,7 @@ _CLOUD_COMPARE = "save it as .ply, in CloudCompare for instance"
 _NIBABEL = "save it as .nii.gz, in Python by: nibabel.save(nibabel.load('a{0}'), 'a.nii.gz')"
 _MAYA = "export it from Maya as FBX, and that from Blender as glTF 2.0 (.glb)"
 _ASSIMP = "convert it by Assimp: assimp export in{0} out.glb"
+_AUTODESK = "export it there as FBX, and that from Blender as glTF 2.0 (.glb)"
 _TILES = "take the .glb out of it by: npx 3d-tiles-tools {0}ToGlb -i in.{0} -o out.glb"
 _PARAVIEW = "open it in ParaView, then File > Save Data as .vtu"
 _STEP = "export it as STEP, open that in FreeCAD, then File > Export > glTF (.glb)"
@@ -67,17 +68,26 @@ _OPEN_BABEL = "save it as .pdb or .cif, in Avogadro or by: obabel in{0} -O out.p
 
 #: Files of other programs, and how one that is read is made of them.
 _ELSEWHERE = {
-    **dict.fromkeys((".fbx", ".dae", ".3ds", ".abc", ".lwo"), _BLENDER),
+    **dict.fromkeys((".fbx", ".abc"), _BLENDER),
     ".max": "in 3ds Max: File > Export > glTF",
     ".c4d": "in Cinema 4D: File > Export > glTF",
     ".skp": "in SketchUp: File > Export > 3D Model > glTF (.glb)",
     ".3dm": "in Rhino: File > Export > glTF (.glb)",
     **dict.fromkeys((".ma", ".mb"), _MAYA),
     **dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep", ".fcstd", ".dxf"), _FREECAD),
+    **dict.fromkeys(
+        (".pmx", ".pmd"), "import it into Blender by its add-on MMD Tools, then File > Export > glTF 2.0 (.glb)"
+    ),
+    **dict.fromkeys((".rvt", ".rfa", ".nwd", ".dwg"), _AUTODESK),
+    ".reality": "in Reality Composer: export it as .usdz",
+    ".kmz": "open it in SketchUp, then File > Export > 3D Model > glTF (.glb)",
     ".ifc": "convert it by IfcOpenShell: IfcConvert in.ifc out.glb",
     ".pbrt": "its meshes, mostly .ply files beside it, are read one by one",
     **dict.fromkeys((".wrl", ".x3d", ".x3dv", ".vrml"), "open it in MeshLab, and export it as .ply or .obj"),
-    **{kind: _ASSIMP.format(kind) for kind in (".x", ".ac", ".ase", ".b3d", ".lws", ".md2", ".ms3d", ".smd")},
+    **{
+        kind: _ASSIMP.format(kind)
+        for kind in (".dae", ".3ds", ".lwo", ".x", ".ac", ".ase", ".b3d", ".lws", ".md2", ".ms3d", ".smd")
+    },
     ".drc": "convert it by Draco: draco_decoder -i in.drc -o out.ply",
     **dict.fromkeys((".sldprt", ".sldasm", ".sat", ".x_t", ".jt", ".catpart", ".ipt"), _STEP),
     **dict.fromkeys((".hip", ".hipnc", ".bgeo"), "in Houdini: export it as .usd"),
@@ -98,9 +108,9 @@ _ELSEWHERE = {
     ".hdr": "a sky is given by environment=...; save a volume as .nii, which holds header and voxels in one file",
     ".amf": "save it as .stl in the slicer",
     **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar"), "unpack it, and name the scene file inside"),
-    ".zae": "unzip it, open the .dae in Blender, then File > Export > glTF 2.0 (.glb)",
+    ".zae": "unzip it, and convert the .dae by Assimp: assimp export in.dae out.glb",
     **dict.fromkeys((".ksplat", ".lcc"), "open it in SuperSplat (superspl.at/editor), export it as .ply"),
-    **dict.fromkeys((".las", ".laz", ".e57", ".pts", ".ptx", ".xyzrgb"), _CLOUD_COMPARE),
+    **dict.fromkeys((".las", ".laz", ".e57", ".pts", ".ptx", ".asc", ".xyzrgb"), _CLOUD_COMPARE),
     ".txt": "save clouds of points as .ply, in CloudCompare for instance, COLMAP's by its model_converter",
     **dict.fromkeys((".mrc", ".map", ".ccp4"), "save it as .npy: numpy.save('a.npy', mrcfile.read('a.mrc'))"),
     **{kind: _OPEN_BABEL.format(kind) for kind in (".cube", ".gro", ".mae", ".pqr")},

@@ -294,6 +294,15 @@ def test_pointers_of_animations_are_named(writer, read):
     assert read(writer).notes == (expected,)
 
 
+def test_where_a_tile_lies_on_the_globe_does_not_matter(writer, read):
+    writer.triangle().json |= {
+        "extensionsUsed": ["CESIUM_RTC"],
+        "extensionsRequired": ["CESIUM_RTC"],
+        "extensions": {"CESIUM_RTC": {"center": [6378137, 0, 0]}},
+    }
+    assert read(writer).notes == ()
+
+
 def test_used_extension_that_is_not_understood_is_noted(writer, read):
     writer.triangle().json["extensionsUsed"] = ["KHR_materials_dispersion", "KHR_materials_ior", "KHR_xmp_json_ld"]
     assert read(writer).notes == (

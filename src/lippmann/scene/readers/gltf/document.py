@@ -76,6 +76,8 @@ _UNDERSTOOD = frozenset(
 
 # They say nothing about what is seen while the scene stands still.
 _SILENT = frozenset({"KHR_xmp", "KHR_xmp_json_ld", "KHR_node_selectability", "KHR_node_hoverability"})
+# They say where on the globe a tile lies, and what its parts stand for.
+_SILENT |= {"CESIUM_RTC", "EXT_instance_features", "EXT_mesh_features", "EXT_structural_metadata"}
 
 # It moves what stands still in a scene at rest.
 _POINTER = "KHR_animation_pointer"
