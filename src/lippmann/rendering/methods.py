@@ -15,7 +15,7 @@ from lippmann.display import Display
 from lippmann.display.panel import PixelWindow
 from lippmann.options.choices import Method
 from lippmann.progress import ProgressCallback
-from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
+from lippmann.rendering.adaptive.stopping import Goal, Outcome, make_goal, reach
 from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.denoise.dual_buffer import Denoised, clean_light, exchange_coverage, remove_excess
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
@@ -124,7 +124,7 @@ def trace(job: Job) -> Traced:
     """Render by the method of ``job.request``; the number of samples per pixel is among the maps."""
     recipe, through = RECIPES[job.request.method], job.request.trace_through
     traced = recipe(job) if through is None else through(job, recipe)
-    traced.frame.maps.setdefault(SAMPLES_LAYER, _samples_of_pixels(traced))
+    traced.frame.maps.setdefault(SAMPLES_LAYER, _count_samples(traced))
     return traced
 
 
@@ -142,10 +142,10 @@ def trace_samples(job: Job) -> Traced:
 
 def trace_unjudged(job: Job, *notes: str) -> Traced:
     """A fixed number of samples without an error estimate; denoised if requested."""
-    return denoise_whole(job, one_stream(job, *notes))
+    return denoise_whole(job, trace_one_stream(job, *notes))
 
 
-def one_stream(job: Job, *notes: str) -> Traced:
+def trace_one_stream(job: Job, *notes: str) -> Traced:
     """All samples in one stream: without half-buffers there is no error estimate."""
     request, source = job.request, job.sample_source
     plan = cut_wavefronts(
@@ -177,7 +177,7 @@ RECIPES: dict[Method, Callable[[Job], Traced]] = {
 }
 
 
-def _samples_of_pixels(traced: Traced) -> NDArray[np.uint32]:
+def _count_samples(traced: Traced) -> NDArray[np.uint32]:
     """Samples per pixel ``(H, W)``; 0 for reprojected pixels."""
     status = traced.frame.maps.get(STATUS_LAYER)
     if status is None:
@@ -227,7 +227,7 @@ def _start_goal(job: Job) -> Goal:
     writing = 1e-7 * job.source.width * job.source.height
     began = time.perf_counter() if job.request.began is None else job.request.began
     part = "view" if isinstance(job.source, QuiltRays) else "micro-image"
-    return replace(goal_of(job.request), began=began, reserve=writing, part=part)
+    return replace(make_goal(job.request), began=began, reserve=writing, part=part)
 
 
 def _assemble(
@@ -245,7 +245,7 @@ def _assemble(
     if errors is not None:
         frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
     traced = Traced(frame, batches.samples, estimate, notes, errors=errors)
-    return traced if denoiser is None else _with_denoiser(traced, denoiser)
+    return traced if denoiser is None else _add_denoiser(traced, denoiser)
 
 
 def _make_batches(job: Job, memory: int | None = None, window: PixelWindow | None = None) -> FullInBatches:
@@ -326,10 +326,10 @@ def denoise_whole(job: Job, traced: Traced) -> Traced:
     # The network runs once, not for each of two halves: its high effort is worth its time from half as many samples on.
     clean = remove_excess(clean_light(noisy, frame.specular, denoiser, 2 * traced.samples), frame.excess)
     frame.pixels = source.own_colors(clean) if isinstance(source, SubpixelRays) else clean
-    return _with_denoiser(traced, denoiser)
+    return _add_denoiser(traced, denoiser)
 
 
-def _with_denoiser(traced: Traced, denoiser: GuidedDenoiser) -> Traced:
+def _add_denoiser(traced: Traced, denoiser: GuidedDenoiser) -> Traced:
     options: dict[str, object] = {"denoise": "oidn", "denoise_effort": denoiser.used}
     return replace(traced, options=options, seconds={"denoise": denoiser.seconds})
 

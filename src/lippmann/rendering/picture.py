@@ -13,7 +13,7 @@ from lippmann.display.panel import PixelWindow
 from lippmann.display.view_cone import panel_window
 from lippmann.options.choices import REUSING
 from lippmann.progress import ProgressCallback, silent
-from lippmann.rendering.provenance import provenance_of
+from lippmann.rendering.provenance import make_provenance
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Build, Session, even_background, open_session
@@ -84,7 +84,7 @@ def render_picture(
                 session.built, source, plan_layers(source, session.memory), display_from_world, progress
             ),
         )
-    provenance = provenance_of(
+    provenance = make_provenance(
         session,
         frame,
         samples=traced.samples,

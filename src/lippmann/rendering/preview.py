@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lippmann.image.metadata import Provenance
 from lippmann.progress import ProgressCallback, silent
-from lippmann.rendering.provenance import provenance_of
+from lippmann.rendering.provenance import make_provenance
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session
@@ -59,5 +59,5 @@ def render_preview(
     traced = trace_unjudged(Job(session, integrator, source, frame_from_world))
     session.watch.seconds.update(traced.seconds)
     options = {"pixel_filter": request.pixel_filter, "camera": pose.name, **traced.options}
-    provenance = provenance_of(session, traced.frame, samples=traced.samples, options=options)
+    provenance = make_provenance(session, traced.frame, samples=traced.samples, options=options)
     return Preview(request.tone_mapped(traced.frame.pixels), provenance)

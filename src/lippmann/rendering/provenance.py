@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 LEAST_SHARE = 0.01
 
 
-def provenance_of(
+def make_provenance(
     session: Session,
     frame: Frame,
     *,

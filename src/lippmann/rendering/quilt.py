@@ -14,7 +14,7 @@ from lippmann.display.view_cone import view_window
 from lippmann.image.metadata import Provenance
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.picture import describe_placement
-from lippmann.rendering.provenance import provenance_of
+from lippmann.rendering.provenance import make_provenance
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Build, even_background, open_session
@@ -88,7 +88,7 @@ def render_quilt(
     traced = trace(Job(session, integrator, source, display_from_world))
     session.watch.seconds.update(traced.seconds)
     traced.frame.pixels = _assemble(traced.frame.pixels, source, size, background)
-    provenance = provenance_of(
+    provenance = make_provenance(
         session,
         traced.frame,
         samples=traced.samples,

@@ -186,7 +186,7 @@ def rays_of(source: OnePicture | QuiltRays, is_chosen: Mask) -> tuple[SinglePixe
 def trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
     """The picture with ``pixels`` where their light ``is_known``; the others are traced and denoised among them."""
     from lippmann.rendering.film.wavefront import Coverage, Frame
-    from lippmann.rendering.methods import SAMPLES_LAYER, Job, Traced, denoise_whole, one_stream
+    from lippmann.rendering.methods import SAMPLES_LAYER, Job, Traced, denoise_whole, trace_one_stream
     from lippmann.rendering.transport.ray_source import SubpixelRays
 
     source = job.sample_source
@@ -202,7 +202,7 @@ def trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
         return Traced(frame, request.samples, notes=(request.judged_by, note))
     few, places = rays_of(source, ~np.repeat(is_known, count_columns(job), axis=1))
     session = replace(job.session, request=request)
-    traced = one_stream(Job(session, job.integrator, few, job.display_from_world), request.judged_by, note)
+    traced = trace_one_stream(Job(session, job.integrator, few, job.display_from_world), request.judged_by, note)
     frame = traced.frame
 
     def spread(part: Floats, others: Floats | float) -> Floats:

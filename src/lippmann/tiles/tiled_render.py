@@ -37,7 +37,7 @@ from lippmann.rendering.denoise import oidn
 from lippmann.rendering.estimate.denoised_psnr import estimate_sums
 from lippmann.rendering.estimate.psnr import ErrorSums, Estimate
 from lippmann.rendering.film import memory_model
-from lippmann.rendering.provenance import is_among_mirrors, provenance_of
+from lippmann.rendering.provenance import is_among_mirrors, make_provenance
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import memory_limit
 from lippmann.runtime import engine as engines
@@ -253,7 +253,7 @@ def _sum_up(prepared: Prepared, store: TileStore) -> Provenance:
         estimate = estimate_sums(sums[""], sums.get(OF_SAMPLES), size, job.request.samples, mirrors)
     # Only the size of these pixels is asked for; they take no memory.
     frame = Frame(np.broadcast_to(np.float32(0), (job.grid.height, job.grid.width, 3)), rays)
-    return provenance_of(
+    return make_provenance(
         prepared.session,
         frame,
         samples=job.request.samples,

@@ -14,7 +14,7 @@ from lippmann.display import Display
 from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.progress import Progress
-from lippmann.rendering.adaptive.stopping import Goal, goal_of, reach
+from lippmann.rendering.adaptive.stopping import Goal, make_goal, reach
 from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.psnr import Estimate, PixelErrors
@@ -202,9 +202,9 @@ def test_a_quality_of_the_whole_asks_for_micro_images_too():
 
 def test_a_default_picture_is_to_be_clean_by_the_likely_value():
     request = RenderRequest(method="pooled", denoise="oidn", spp=8)
-    assert goal_of(request) == Goal(spp=8)
+    assert make_goal(request) == Goal(spp=8)
     with_reserve = resolve(RenderRequest(), load_scene("teapot"), SHOWN)
-    goal = goal_of(with_reserve)
+    goal = make_goal(with_reserve)
     assert goal == Goal(TUNING.clean, spp=with_reserve.spp_reserve, is_promise=False)
     worst = TUNING.clean - TUNING.most_below
     wide = Estimate(TUNING.clean, 20.0, 50.0, worst, 5.0, 40.0, (0, 0))

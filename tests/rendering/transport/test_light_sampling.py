@@ -63,9 +63,9 @@ def picture(integrator, source, samples, seed):
 
 
 def estimated_weights(integrator, source):
-    from lippmann.rendering.preparation.prepare import emitter_weights, trace_pilot
+    from lippmann.rendering.preparation.prepare import trace_pilot, weigh_emitters
 
-    return emitter_weights(trace_pilot(integrator, source))
+    return weigh_emitters(trace_pilot(integrator, source))
 
 
 def pilot_sampler(integrator, source):
@@ -274,7 +274,7 @@ def test_invalid_contributions_do_not_count(monkeypatch):
 
     integrator, source = stage(room())
     whole = estimated_weights(integrator, source)
-    along = prepare._contributions
+    along = prepare._sample_contributions
 
     def some_lost(*given):
         import drjit as dr
@@ -283,7 +283,7 @@ def test_invalid_contributions_do_not_count(monkeypatch):
         squares, *others = along(*given)
         return dr.select(dr.arange(mi.UInt32, dr.width(squares)) % 64 == 0, dr.nan, squares), *others
 
-    monkeypatch.setattr(prepare, "_contributions", some_lost)
+    monkeypatch.setattr(prepare, "_sample_contributions", some_lost)
     assert estimated_weights(integrator, source) == pytest.approx(whole, rel=0.05)
 
 

@@ -124,7 +124,7 @@ def _floor(value: float) -> float:
     return math.floor(10.0 * value) / 10.0
 
 
-def goal_of(request: RenderRequest) -> Goal:
+def make_goal(request: RenderRequest) -> Goal:
     """The goal of a request. A default picture takes samples of its reserve until its estimated PSNR is good enough."""
     if request.is_open_ended:
         return Goal(request.quality, request.quality_worst, request.max_time, request.spp)
@@ -174,7 +174,7 @@ def reach(
     first, note, seconds, expected = min(first, goal.most), "", 0.0, 0.0
     samples = first if goal.max_time is None else 1
     while True:
-        sampler.add(samples, _of_all(progress, sampler.samples, samples, expected, note, seconds))
+        sampler.add(samples, _report_all(progress, sampler.samples, samples, expected, note, seconds))
         left = goal.seconds_left(clock() - began)
         if sampler.samples < first:
             samples = min(first - sampler.samples, _count_affordable(left - assessment, sampler))
@@ -193,18 +193,18 @@ def reach(
             return Outcome("quality", estimate, errors)
         if sampler.samples >= goal.most:
             return Outcome("samples", estimate, errors)
-        needed = _next_total(sampler.samples, growth)
+        needed = _choose_total(sampler.samples, growth)
         samples = min(needed, goal.most) - sampler.samples
         samples = min(samples, _count_affordable(left - assessment, sampler))
         if samples < 1:
             return Outcome("time", estimate, errors)
         if goal.has_quality:
             expected = min(goal.most, sampler.samples * growth)
-        seconds = min(left, (expected - sampler.samples) * _seconds_per_sample(sampler) if expected else left)
+        seconds = min(left, (expected - sampler.samples) * _time_sample(sampler) if expected else left)
         note = goal.describe(estimate)
 
 
-def _next_total(samples: int, growth: float) -> int:
+def _choose_total(samples: int, growth: float) -> int:
     """Samples per pixel after the next round, which asks for ``growth`` times as many, within its limits.
 
     An even number, so that both streams get the same.
@@ -215,16 +215,16 @@ def _next_total(samples: int, growth: float) -> int:
 
 def _count_affordable(seconds: float, sampler: FullInBatches) -> int:
     """Samples per pixel that are taken within a share of ``seconds``."""
-    most = TUNING.time_share * max(0.0, seconds) / max(_seconds_per_sample(sampler), 1e-9)
+    most = TUNING.time_share * max(0.0, seconds) / max(_time_sample(sampler), 1e-9)
     return math.floor(min(most, MOST_SAMPLES))
 
 
-def _seconds_per_sample(sampler: FullInBatches) -> float:
+def _time_sample(sampler: FullInBatches) -> float:
     """Seconds of one sample of every pixel, without compilation."""
     return sampler.seconds_trace / max(sampler.samples, 1)
 
 
-def _of_all(
+def _report_all(
     progress: ProgressCallback, done: int, coming: int, expected: float, note: str, seconds: float
 ) -> ProgressCallback:
     """A round of ``coming`` samples after ``done``, reported as part of ``expected`` samples; ``seconds`` are left."""

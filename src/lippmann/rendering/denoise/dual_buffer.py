@@ -91,16 +91,16 @@ class Denoised:
 
     def picture(self) -> Floats:
         """``(H, W, 3)`` float32 linear RGB."""
-        return remove_excess(self._mean(), self._renderer.excess())
+        return remove_excess(self._blend_halves(), self._renderer.excess())
 
     def squared_error(self) -> PixelErrors:
         """Squared error of every pixel's code, estimated from the two halves."""
         noisy, clean = self._clean_halves()
         first, second = (encode(half, self._coding) for half in clean)
         apart: Floats = (np.float32(0.25) * np.square(first - second)).mean(axis=2)
-        picture = self._mean()
+        picture = self._blend_halves()
         bend = encode(picture, self._coding) - np.float32(0.5) * (first + second)
-        slope = self._slope(picture, noisy)
+        slope = self._measure_slope(picture, noisy)
         left = [slope * (half - smooth) + bend for half, smooth in zip(noisy, clean, strict=True)]
         common = (left[0] * left[1]).mean(axis=2)
         limit = TUNING.hidden * max(1.0, REQUEST.usual / self._renderer.samples)
@@ -114,7 +114,7 @@ class Denoised:
             samples = replace(samples, outliers=np.float32(TUNING.untold_outliers) * np.maximum(samples.values, 0))
         return PixelErrors(common + apart, None, samples, apart, samples.blur)
 
-    def _mean(self) -> Floats:
+    def _blend_halves(self) -> Floats:
         if self._renderer.samples < 2:
             # A single sample makes no half-buffers and no error estimate.
             return self._clean_picture()
@@ -123,7 +123,7 @@ class Denoised:
         return mean
 
     def _clean_picture(self) -> Floats:
-        noisy, coverage = self._renderer.average_samples(), self._coverages()
+        noisy, coverage = self._renderer.average_samples(), self._pair_coverages()
         if coverage is not None:
             (paths, further), (more_paths, more_further) = coverage
             noisy = exchange_coverage(noisy, paths + more_paths, further + more_further, threads=self._threads)
@@ -134,7 +134,7 @@ class Denoised:
     def _clean_halves(self) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
         if self._halves is None or self._samples_of_halves != self._renderer.samples:
             self._samples_of_halves = self._renderer.samples
-            traced, specular = self._noisy_halves(), self._renderer.specular_halves() or (None, None)
+            traced, specular = self._average_noisy_halves(), self._renderer.specular_halves() or (None, None)
             with keep_filters():
                 first, second = (
                     self._renderer.to_display(
@@ -147,9 +147,9 @@ class Denoised:
             self._halves = noisy, (first + own * (noisy[0] - first), second + own * (noisy[1] - second))
         return self._halves
 
-    def _noisy_halves(self) -> tuple[Floats, Floats]:
+    def _average_noisy_halves(self) -> tuple[Floats, Floats]:
         """The noisy half-buffers, with the coverage of all rays at outlines."""
-        halves, coverage = self._renderer.average_halves(), self._coverages()
+        halves, coverage = self._renderer.average_halves(), self._pair_coverages()
         if coverage is None:
             return halves
         threads = self._threads
@@ -158,13 +158,13 @@ class Denoised:
         )
         return first, second
 
-    def _coverages(self) -> list[tuple[Coverage, Coverage]] | None:
+    def _pair_coverages(self) -> list[tuple[Coverage, Coverage]] | None:
         """Coverage of each half-buffer by its paths, and by its feature rays; None where either is not known."""
         paths = self._renderer.coverage_halves()
         further = None if paths is None or self._coverage is None else self._coverage()
         return None if paths is None or further is None else list(zip(paths, further, strict=True))
 
-    def _slope(self, picture: Floats, noisy: tuple[Floats, Floats]) -> Floats:
+    def _measure_slope(self, picture: Floats, noisy: tuple[Floats, Floats]) -> Floats:
         """Factor from linear errors to errors of the code, per pixel: the curve's slope, or a finite difference."""
         coding = self._coding
         slope = coding_slope(picture, coding)

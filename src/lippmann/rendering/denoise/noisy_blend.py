@@ -47,7 +47,7 @@ def weigh_samples(noisy: Halves, clean: Halves, coding: Coding, *, threads: int)
     def measure_rows(start: int, end: int) -> None:
         band = slice(start, end)
         a, b, clean_a, clean_b = (half[band] for half in (*noisy, *clean))
-        noise[band], error[band] = _noise_and_error(a, b, clean_a, clean_b, coding)
+        noise[band], error[band] = _estimate_noise_and_error(a, b, clean_a, clean_b, coding)
 
     bands.lines(measure_rows, len(noise))
     share = np.ones_like(noise)
@@ -58,7 +58,9 @@ def weigh_samples(noisy: Halves, clean: Halves, coding: Coding, *, threads: int)
     return np.asarray(np.sqrt(share)[..., None])
 
 
-def _noise_and_error(a: Floats, b: Floats, clean_a: Floats, clean_b: Floats, coding: Coding) -> tuple[Floats, Floats]:
+def _estimate_noise_and_error(
+    a: Floats, b: Floats, clean_a: Floats, clean_b: Floats, coding: Coding
+) -> tuple[Floats, Floats]:
     """Unbiased estimates of the squared errors, in codes, of a noisy and of a denoised half, ``(H, W)``.
 
     Codes are clipped at white only for their slope, as an error beyond white reaches the pixels around.
@@ -72,18 +74,18 @@ def _noise_and_error(a: Floats, b: Floats, clean_a: Floats, clean_b: Floats, cod
 def mean_around(values: Floats, reach: int, bands: Bands) -> Floats:
     """Means of ``(H, W)`` over the square of pixels up to ``reach`` away, cut at the edges."""
     padded = np.pad(values, reach)
-    count = _pixels_around(values.shape, reach)
+    count = _count_pixels_around(values.shape, reach)
     mean = np.empty_like(values)
 
     def mean_rows(start: int, end: int) -> None:
-        columns = _window_sums(padded[start : end + 2 * reach], 2 * reach + 1)
-        mean[start:end] = _window_sums(columns.T, 2 * reach + 1).T / count[start:end]
+        columns = _sum_windows(padded[start : end + 2 * reach], 2 * reach + 1)
+        mean[start:end] = _sum_windows(columns.T, 2 * reach + 1).T / count[start:end]
 
     bands.lines(mean_rows, len(values))
     return mean
 
 
-def _window_sums(values: Floats, size: int) -> Floats:
+def _sum_windows(values: Floats, size: int) -> Floats:
     """Sums down each column over all windows of ``size`` rows.
 
     Windows are composed of windows of 1, 2, 4, ... rows. Unlike in a running sum nothing is subtracted, so a large
@@ -102,7 +104,7 @@ def _window_sums(values: Floats, size: int) -> Floats:
         rows *= 2
 
 
-def _pixels_around(shape: tuple[int, ...], reach: int) -> Floats:
+def _count_pixels_around(shape: tuple[int, ...], reach: int) -> Floats:
     """``(H, W)``: number of pixels in the window around each, itself included."""
     rows, columns = (
         np.minimum(place + reach, len(place) - 1) - np.maximum(place - reach, 0) + 1 for place in map(np.arange, shape)
@@ -117,17 +119,17 @@ def leave_one_out_mean(values: Floats, reach: int, bands: Bands, errors: float =
     is that of n independent values: their sample standard deviation over the root of n. Where fewer than two others
     are left, nothing is known: 0.
     """
-    mean = _mean_of_others(values, reach, bands)
-    squares = _mean_of_others(np.square(values), reach, bands)
-    others = _pixels_around(values.shape, reach) - 1
+    mean = _average_others(values, reach, bands)
+    squares = _average_others(np.square(values), reach, bands)
+    others = _count_pixels_around(values.shape, reach) - 1
     # Of n values: the mean square about the mean, over n - 1.
     variance = np.maximum(squares - np.square(mean), 0) / np.maximum(others - 1, 1)
     known: NDArray[Any] = np.maximum(mean - np.float32(errors) * np.sqrt(variance), 0)
     return np.where(others > 1, known, np.float32(0))
 
 
-def _mean_of_others(values: Floats, reach: int, bands: Bands) -> Floats:
+def _average_others(values: Floats, reach: int, bands: Bands) -> Floats:
     """Means of ``(H, W)`` over the other pixels up to ``reach`` away, cut at the edges; 0 where there is none."""
-    count = _pixels_around(values.shape, reach)
+    count = _count_pixels_around(values.shape, reach)
     mean: NDArray[Any] = (mean_around(values, reach, bands) * count - values) / np.maximum(count - 1, 1)
     return mean

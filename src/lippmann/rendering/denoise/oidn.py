@@ -69,10 +69,10 @@ def denoise(
     EngineError
         Open Image Denoise fails.
     """
-    images = {"color": _picture(color, "color")}
+    images = {"color": _wrap_picture(color, "color")}
     for name, guide in (("albedo", albedo), ("normal", normal)):
         if guide is not None:
-            images[name] = _picture(guide, name)
+            images[name] = _wrap_picture(guide, name)
             if images[name].shape != images["color"].shape:
                 rule = f"that of the picture is {images['color'].shape}"
                 raise UsageError(f"the {name} has the shape {images[name].shape}", parameter="denoise", rule=rule)
@@ -106,7 +106,7 @@ def _rotate(image: FloatArray) -> FloatArray:
     return np.pad(image[::-1, ::-1], before, mode="reflect")
 
 
-def _picture(values: NDArray[np.generic], name: str) -> FloatArray:
+def _wrap_picture(values: NDArray[np.generic], name: str) -> FloatArray:
     """Packed float32, as the C library wants it."""
     array = np.ascontiguousarray(values, dtype=np.float32)
     if array.ndim != 3 or array.shape[2] != 3 or 0 in array.shape:
@@ -170,16 +170,16 @@ def _filter_images(images: dict[str, FloatArray], options: Mapping[str, float], 
     """
     if engine.runs_on_gpu() and library.is_cuda_available():
         try:
-            return _on_gpu(images, options)
+            return _denoise_on_gpu(images, options)
         except EngineError:
             pass
-    return _on_cpu(images, options, threads)
+    return _denoise_on_cpu(images, options, threads)
 
 
-def _on_cpu(images: dict[str, FloatArray], options: Mapping[str, float], threads: int) -> FloatArray:
+def _denoise_on_cpu(images: dict[str, FloatArray], options: Mapping[str, float], threads: int) -> FloatArray:
     output = np.empty_like(next(iter(images.values())))
     # Dr.Jit's threads share the cores: pinned ones would wait for each other.
-    device = _device(threads, library.DEVICE_TYPE_CPU, numThreads=threads, setAffinity=False)
+    device = _make_device(threads, library.DEVICE_TYPE_CPU, numThreads=threads, setAffinity=False)
     with library.open_filter(device, images, options) as work:
         for name, image in (*images.items(), ("output", output)):
             work.set_image(name, image)
@@ -188,10 +188,10 @@ def _on_cpu(images: dict[str, FloatArray], options: Mapping[str, float], threads
     return output
 
 
-def _on_gpu(images: dict[str, FloatArray], options: Mapping[str, float]) -> FloatArray:
+def _denoise_on_gpu(images: dict[str, FloatArray], options: Mapping[str, float]) -> FloatArray:
     """As :func:`_filter_images`, on copies in the memory of the GPU."""
     output = np.empty_like(next(iter(images.values())))
-    device = _device(None, library.DEVICE_TYPE_CUDA)
+    device = _make_device(None, library.DEVICE_TYPE_CUDA)
     with ExitStack() as stack:
         work = stack.enter_context(library.open_filter(device, images, options))
         for name, image in (*images.items(), ("output", output)):
@@ -207,7 +207,7 @@ def _on_gpu(images: dict[str, FloatArray], options: Mapping[str, float]) -> Floa
     return output
 
 
-def _device(threads: int | None, kind: int, **options: int) -> library.Device:
+def _make_device(threads: int | None, kind: int, **options: int) -> library.Device:
     if threads not in _devices:
         device = library.Device(kind, **options)
         _check(device)

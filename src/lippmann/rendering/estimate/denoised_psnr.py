@@ -109,7 +109,7 @@ def estimate_denoised(errors: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     often_better = TUNING.often_better * (1 - errors.share_less(middle))
     worse, better = likely.quantiles(np.array([0.975, 0.025])) * (model, often_better / model)
 
-    parts = _parts(errors, samples.squares, index, grid, middle)
+    parts = _estimate_parts(errors, samples.squares, index, grid, middle)
     common = likely.quantiles((np.arange(TUNING.draws) + 0.5) / TUNING.draws) / middle
     largest, without_blur = _draw_worst(parts, common)
     worst = *quantiles(largest, (0.5, 0.975)), quantiles(without_blur, 0.025) * TUNING.often_better**2
@@ -128,7 +128,7 @@ def _draw_worst(parts: PartErrors, common: Real) -> tuple[Real, Real]:
     return largest * factors, without_blur * factors
 
 
-def _parts(
+def _estimate_parts(
     errors: ErrorSums, of_samples: Real, index: NDArray[np.intp], grid: tuple[int, int], mean: float
 ) -> PartErrors:
     """Posterior error of each part: a prior in proportion to the variance of its halves, and its own measurement.

@@ -16,7 +16,7 @@ from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.film.memory_model import cut_wavefronts
 from lippmann.rendering.picture import describe_placement
 from lippmann.rendering.preview import Preview
-from lippmann.rendering.provenance import provenance_of
+from lippmann.rendering.provenance import make_provenance
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.request.tuning import TUNING
@@ -95,7 +95,7 @@ def render_eye_preview(
         picture = visible.arrange_denoised(clean)
         options = {"denoise": "oidn", "denoise_effort": effort}
     frame.pixels = picture
-    provenance = provenance_of(
+    provenance = make_provenance(
         session,
         frame,
         samples=samples,

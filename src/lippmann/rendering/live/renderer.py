@@ -16,7 +16,6 @@ from lippmann.display import Display
 from lippmann.display.visible_pixels import window_pixels
 from lippmann.errors import SceneError, UsageError
 from lippmann.options.choices import POOLED_LIGHT
-from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.live.develop import develop
 from lippmann.rendering.live.live_view import LiveFrame, LiveView, PlacedView
 from lippmann.rendering.request.plan import resolve
@@ -47,8 +46,6 @@ class LiveRenderer:
         What is shown, and on what.
     machine:
         A request of which ``device``, ``threads`` and ``memory`` count.
-    progress:
-        Told how the scene is built.
 
     Raises
     ------
@@ -62,10 +59,8 @@ class LiveRenderer:
         display: Display,
         *,
         machine: RenderRequest | None = None,
-        progress: ProgressCallback = silent,
     ) -> None:
         self._machine = machine or RenderRequest()
-        self._progress = progress
         self._display = display
         # Caches for the eyes of some pages, and for the whole panel in motion and at rest.
         self._map = lru_cache(4)(lambda kind, *of, subpixels: kind(*of, subpixels=subpixels))
@@ -129,26 +124,26 @@ class LiveRenderer:
 
         seconds: dict[str, float] = {}
         with exclusive():
-            stand = self._stand(kernels, display, view, _moving(view.request), seconds)
-            exposure = kernels.expose(stand.display, stand.request, stand.placement, measure=False)
-            tracer = kernels.tracer(stand.display, stand.request)
-            count, step = len(stand.pixels.column), min(TRANSPORT.lanes, kernels.most_lanes)
+            placed_view = self._place_view(kernels, display, view, _request_moving(view.request), seconds)
+            exposure = kernels.expose(placed_view.display, placed_view.request, placed_view.placement, measure=False)
+            tracer = kernels.tracer(placed_view.display, placed_view.request)
+            count, step = len(placed_view.pixels.column), min(TRANSPORT.lanes, kernels.most_lanes)
             values, heights = np.empty((count, 3), np.float32), np.empty(count, np.float32)
         for start in range(0, count, step):
             if start:
                 yield None
             with exclusive(), _time_stage(seconds, "trace"):
-                stand.light_up(exposure)
-                lanes = Lanes(stand.pixels, slice(start, start + step))
-                traced = tracer.trace(lanes, stand.placed, seed=stand.request.seed)
+                placed_view.light_up(exposure)
+                lanes = Lanes(placed_view.pixels, slice(start, start + step))
+                traced = tracer.trace(lanes, placed_view.placed, seed=placed_view.request.seed)
                 values[lanes.part], heights[lanes.part] = traced.sums[0], traced.height
-        self._latest, self._height = stand, heights
+        self._latest, self._height = placed_view, heights
         with _time_stage(seconds, "encode"):
-            codes = develop(values, stand.pixels, stand.request)
+            codes = develop(values, placed_view.pixels, placed_view.request)
             if view.eye is None and view.row_step > 1:
                 height = display.panel.height if view.window is None else view.window.height
                 codes = np.repeat(codes, view.row_step, axis=0)[:height]
-        yield LiveFrame(codes, 1, False, stand.placement, exposure, seconds)
+        yield LiveFrame(codes, 1, False, placed_view.placement, exposure, seconds)
 
     def refine_steps(self, view: LiveView) -> Iterator[LiveFrame | None]:
         """Endless short steps of progressive rendering for a view at rest.
@@ -167,9 +162,9 @@ class LiveRenderer:
     def _begin_rest(self, kernels: SceneKernels, display: Display, view: LiveView) -> Progressive:
         from lippmann.rendering.live.progressive import Progressive
 
-        stand = self._stand(kernels, display, view, _resting(view.request), {})
-        exposure = kernels.expose(stand.display, stand.request, stand.placement, measure=True)
-        return Progressive(stand, exposure)
+        placed_view = self._place_view(kernels, display, view, _request_resting(view.request), {})
+        exposure = kernels.expose(placed_view.display, placed_view.request, placed_view.placement, measure=True)
+        return Progressive(placed_view, exposure)
 
     @exclusive()
     def heights(self, view: LiveView) -> Floats:
@@ -219,15 +214,13 @@ class LiveRenderer:
                 rule="live pictures show surfaces",
                 fix="lippmann preview and lippmann render trace them",
             )
-        request = replace(_moving(self._machine), device=self._machine.device, threads=self._machine.threads)
-        session = open_session(
-            scene, resolve(request, scene, self._display), memory=self._machine.memory, progress=self._progress
-        )
+        request = replace(_request_moving(self._machine), device=self._machine.device, threads=self._machine.threads)
+        session = open_session(scene, resolve(request, scene, self._display), memory=self._machine.memory)
         from lippmann.rendering.live.scene_kernels import SceneKernels
 
         return SceneKernels(session)
 
-    def _stand(
+    def _place_view(
         self, kernels: SceneKernels, display: Display, view: LiveView, request: RenderRequest, seconds: dict[str, float]
     ) -> PlacedView:
         from lippmann.rendering.live.live_tracer import PlacedDisplay
@@ -247,21 +240,21 @@ class LiveRenderer:
                 pixels = self._window(display, view.window, subpixels=subpixels, row_step=view.row_step)
             else:
                 pixels = self._visible(self._map(view.eye_map, display, view.size, subpixels=subpixels), view.eye)
-        stand = PlacedView(kernels, placement.traced(display), view, resolved, placement, placed, pixels)
-        kernels.lit_for = stand
-        return stand
+        placed_view = PlacedView(kernels, placement.traced(display), view, resolved, placement, placed, pixels)
+        kernels.lit_for = placed_view
+        return placed_view
 
 
-def _moving(request: RenderRequest) -> RenderRequest:
-    return _plain(request, "direct", None)
+def _request_moving(request: RenderRequest) -> RenderRequest:
+    return _request_plain(request, "direct", None)
 
 
-def _resting(request: RenderRequest) -> RenderRequest:
+def _request_resting(request: RenderRequest) -> RenderRequest:
     light = "path" if request.integrator == "auto" else request.integrator
-    return _plain(request, light, request.depth)
+    return _request_plain(request, light, request.depth)
 
 
-def _plain(request: RenderRequest, integrator: str, depth: int | None) -> RenderRequest:
+def _request_plain(request: RenderRequest, integrator: str, depth: int | None) -> RenderRequest:
     """The request of a plain full rendering with one sample per pixel."""
     if request.integrator not in ("auto", *POOLED_LIGHT):
         rule = f"live pictures show the light of {' and '.join(POOLED_LIGHT)}"

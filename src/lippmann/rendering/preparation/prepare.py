@@ -79,7 +79,7 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
     emitter, path = divide(lane, dr.opaque(mi.UInt32, paths))
     stream, column, row, jitter = _place_of(path, source)
     ray = source.rays(column, row, mi.UInt32(0), jitter)
-    traced = _contributions(integrator, ray, stream, emitter, dr.opaque(mi.Float, emitters))
+    traced = _sample_contributions(integrator, ray, stream, emitter, dr.opaque(mi.Float, emitters))
     dr.eval(traced)
     squares, indirect = (np.array(each, dtype=np.float64).reshape(emitters, -1) for each in traced[:2])
     hit, point = (np.array(each)[..., :paths] for each in traced[2:])
@@ -87,10 +87,10 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
     moments = np.nan_to_num(squares).mean(axis=1) if emitters == count else np.zeros(count)
     placed = _has_place(lights) if emitters == count else np.zeros(emitters, bool)
     brightest = float(np.nan_to_num(indirect[placed]).sum(axis=0).max())
-    return Pilot(moments, brightest, _region_about(point.T[hit != 0].astype(np.float64)))
+    return Pilot(moments, brightest, _bound_region(point.T[hit != 0].astype(np.float64)))
 
 
-def brightest_specular_light(integrator: PathIntegrator, source: RaySource) -> float:
+def find_brightest_specular_light(integrator: PathIntegrator, source: RaySource) -> float:
     """Largest exposed radiance, mean of its components, of the pilot's specular chains."""
     stream, column, row, _ = _place_of(dr.arange(mi.UInt32, TRANSPORT.probe_side**2), source)
     pixel, number = PixelRays(source, column, row, mi.UInt32(0)), dr.opaque(mi.UInt32, 1)
@@ -113,11 +113,11 @@ def make_light_sampler(scene: MitsubaScene, pilot: Pilot) -> LightSampler:
     The scene's own weights are used where the pilot gives no better ones: with a single emitter, with very many, or
     where no contribution was found.
     """
-    weights = emitter_weights(pilot)
+    weights = weigh_emitters(pilot)
     return WeightedLightSampler(scene, weights) if (weights != weights[:1]).any() else SceneLightSampler(scene)
 
 
-def emitter_weights(pilot: Pilot) -> NDArray[np.float64]:
+def weigh_emitters(pilot: Pilot) -> NDArray[np.float64]:
     """Sampling probabilities of the emitters, ``(emitters,)``, adding up to 1, in the order of ``pilot.moments``."""
     roots = np.sqrt(pilot.moments)
     uniform = np.full(len(roots), 1 / max(len(roots), 1))
@@ -133,7 +133,7 @@ def _has_place(emitters: list[mi.Emitter]) -> NDArray[np.bool_]:
     return np.asarray(flags & int(mi.EmitterFlags.Surface | mi.EmitterFlags.DeltaPosition), bool)
 
 
-def _region_about(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _bound_region(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Corners ``(2, 3)`` of the box of visible points ``(n, 3)``, outliers apart, padded; None without points."""
     if not len(points):
         return None
@@ -144,7 +144,7 @@ def _region_about(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
 
 
 @syntax
-def _contributions(
+def _sample_contributions(
     integrator: PathIntegrator, ray: Ray3f, stream: SampleStream, emitter: UInt32, emitters: Float
 ) -> tuple[Float, Float, Bool, Point3f]:
     """Contributions of ``emitter``, one of ``emitters``, to the path of each lane.
@@ -293,7 +293,7 @@ def count_chains(integrator: PathIntegrator, request: RenderRequest, source: Ray
     is_denoised = request.denoise != "none" and request.box_filter and request.method not in REUSING
     if not is_denoised or not has_sharp_surfaces(integrator.scene):
         return 0
-    return TUNING.chains if brightest_specular_light(integrator, source) > 1 else 0
+    return TUNING.chains if find_brightest_specular_light(integrator, source) > 1 else 0
 
 
 @dataclass(frozen=True, eq=False)

@@ -150,15 +150,15 @@ class PathIntegrator:
         # All samples of a single delta emitter are the same.
         self._single_delta = len(emitters) == len(self.without_size) == 1
         self._clamp = Clamp(self.light.most_indirect)
-        self.absorption = Techniques(*self._absorption())
-        self._techniques = Techniques(*self._absorption(), *self._sharing())
+        self.absorption = Techniques(*self._make_absorption())
+        self._techniques = Techniques(*self._make_absorption(), *self._make_sharing())
         apart = WithoutSpecularLight(len(self.without_size) > 0)
-        self._techniques_without_specular = Techniques(*self._absorption(), *self._sharing(), apart)
+        self._techniques_without_specular = Techniques(*self._make_absorption(), *self._make_sharing(), apart)
 
-    def _absorption(self) -> list[Technique]:
+    def _make_absorption(self) -> list[Technique]:
         return [] if self.features.absorption is None else [Absorption(self.features)]
 
-    def _sharing(self) -> list[Technique]:
+    def _make_sharing(self) -> list[Technique]:
         """Techniques that sample a part of the light in place of, or beside, the plain path."""
         light, techniques = self.light, list[Technique]()
         if light.photons is not None:
@@ -251,13 +251,13 @@ class PathIntegrator:
         context, passes = mi.BSDFContext(), mi.Bool(False)
         if continues:
             radiance, shadow = techniques.arrive(vertex, radiance, shadow)
-            samples, number = self._emitter_samples(stream.index, all_specular)
+            samples, number = self._count_emitter_samples(stream.index, all_specular)
             count, last_number = mi.Float(samples), number + samples - 1
             sampling = vertex.smooth & (number != last_number)
             while dr.hint(sampling, label="emitters", exclude=[stream, dimension, si, bsdf, count, last_number]):
                 ds, emitted = self.light_sampler.sample_direction(si, stream.at(number).next_2d(dimension), sampling)
                 value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, si.to_local(ds.d), sampling)
-                light, tests = self._from_emitter(vertex, techniques, ds, emitted, value, pdf, count, sampling)
+                light, tests = self._reflect_emitter(vertex, techniques, ds, emitted, value, pdf, count, sampling)
                 radiance += light
                 shadow += tests
                 number += 1
@@ -268,7 +268,7 @@ class PathIntegrator:
             value, pdf, bs, weight = bsdf.eval_pdf_sample(
                 context, si, si.to_local(ds.d), stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), continues
             )
-            light, tests = self._from_emitter(vertex, techniques, ds, emitted, value, pdf, count, vertex.smooth)
+            light, tests = self._reflect_emitter(vertex, techniques, ds, emitted, value, pdf, count, vertex.smooth)
             radiance += light
             shadow += tests
             passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
@@ -292,7 +292,7 @@ class PathIntegrator:
         """``radiance`` times the gain."""
         return radiance if self.light.gain is None else radiance * self.light.gain
 
-    def _emitter_samples(self, sample: UInt32, all_specular: Bool) -> tuple[UInt32, UInt32]:
+    def _count_emitter_samples(self, sample: UInt32, all_specular: Bool) -> tuple[UInt32, UInt32]:
         """Count of emitter samples at a vertex of a pixel's path number ``sample``, and the number of the first."""
         samples, number = mi.UInt32(1), mi.UInt32(sample)
         if self._single_delta:
@@ -323,7 +323,7 @@ class PathIntegrator:
         half:
             Of the picture, see :class:`~lippmann.device.sobol.SampleStream`.
         """
-        emission = self._weighted_emission(si, last, techniques, states, half)
+        emission = self._weigh_emission(si, last, techniques, states, half)
         if self.features.background is None:
             return emission
         background = mi.Spectrum(self.features.background)
@@ -332,7 +332,7 @@ class PathIntegrator:
         return dr.select((depth == 0) & ~si.is_valid(), background, emission)
 
     @syntax
-    def _weighted_emission(
+    def _weigh_emission(
         self, si: SurfaceInteraction3f, last: LastVertex, techniques: Techniques, states: list[Any], half: UInt32
     ) -> Spectrum:
         """Emission by MIS; in a branch, so that the processor skips it for a vector of lanes of which none emits."""
@@ -361,7 +361,7 @@ class PathIntegrator:
         """Emitter samples at the first surface that is not purely specular, of a pixel's path number ``sample``."""
         return mi.UInt32(1) if self._single_delta else first_emitter_samples(sample)[0]
 
-    def _from_emitter(
+    def _reflect_emitter(
         self,
         vertex: Vertex,
         techniques: Techniques,

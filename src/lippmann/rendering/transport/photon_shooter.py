@@ -54,7 +54,7 @@ class PhotonShooter:
         pairs: list[NDArray[np.int64]] = []
         for first in range(0, len(pair), TUNING.lanes):
             part = pair[first : first + TUNING.lanes]
-            photons, lanes = self._wavefront(part, each, first, seed)
+            photons, lanes = self._shoot_wavefront(part, each, first, seed)
             landed.append(photons)
             pairs.append(part[lanes])
         return Photons.join(landed), np.concatenate(pairs)
@@ -70,7 +70,7 @@ class PhotonShooter:
         ds, light = emitter.sample_direction(point.reference(), stream.next_2d(1), mi.Bool(True))
         return point, ds, light
 
-    def _wavefront(
+    def _shoot_wavefront(
         self, pair: NDArray[np.int64], each: NDArray[np.int64], first: int, seed: int
     ) -> tuple[Photons, NDArray[np.int64]]:
         """Photons of one wavefront that land on rough surfaces, and the lane of each."""
@@ -135,12 +135,12 @@ class PhotonShooter:
             power = _absorb(power, absorption, si)
             landed.note(si, power, events, turn, active & (events > 0))
             active &= turn < surfaces
-            o, d, power, events, absorption, active = self._next_ray(
+            o, d, power, events, absorption, active = self._spawn_next(
                 si, power, events, absorption, active, stream, DIMENSIONS * (turn + 1)
             )
             turn += 1
 
-    def _next_ray(
+    def _spawn_next(
         self,
         si: SurfaceInteraction3f,
         power: Spectrum,

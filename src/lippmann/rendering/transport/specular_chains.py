@@ -58,7 +58,7 @@ def sample_pixel(
     light = integrator.light
     if light.chains is None:
         radiance, counts, hit = integrator.sample_with_hit(ray, stream, active)
-        return PixelSample(radiance, counts, covered=None if samples is None else _covered(hit))
+        return PixelSample(radiance, counts, covered=None if samples is None else _find_coverage(hit))
     rest, counts, hit = integrator.sample_with_hit(ray, stream, active, without_specular=True)
     chains = mi.Float(light.chains)
     scale = dr.rcp(chains) if light.gain is None else light.gain / chains
@@ -68,10 +68,10 @@ def sample_pixel(
     counts = RayCounts(counts.secondary + traced.secondary, counts.shadow + traced.shadow)
     if samples is None:
         return PixelSample(rest + specular, counts)
-    return PixelSample(rest + specular, counts, specular, excess * scale, _covered(hit))
+    return PixelSample(rest + specular, counts, specular, excess * scale, _find_coverage(hit))
 
 
-def _covered(hit: FirstHit) -> Float:
+def _find_coverage(hit: FirstHit) -> Float:
     return dr.select(dr.isfinite(hit.distance), mi.Float(1), mi.Float(0))
 
 
@@ -106,7 +106,7 @@ def specular_light(
         tracing, label="chains", exclude=[integrator, of_chains, pixel, stream, chains, first, most, takes_shadow_rays]
     ):
         further = of_chains.at(first + number)
-        met, traced, tests = _chain(integrator, pixel.ray(further), further, stream.index, tracing)
+        met, traced, tests = _trace_chain(integrator, pixel.ray(further), further, stream.index, tracing)
         met = dr.select(dr.isfinite(dr.sum(met)), met, 0)
         light += met
         if dr.hint(most is not None, mode="scalar"):
@@ -125,7 +125,7 @@ def specular_light(
 
 
 @syntax
-def _chain(
+def _trace_chain(
     integrator: PathIntegrator, ray: Ray3f, stream: SampleStream, path: UInt32, active: Bool
 ) -> tuple[Spectrum, UInt32, UInt32 | None]:
     """Light of one chain with the MIS weights of the path number ``path``, and the rays and shadow rays traced.
@@ -179,7 +179,7 @@ def _leave(integrator: PathIntegrator, vertex: Vertex, at_first: UInt32, state: 
     if continues:
         if dr.hint(len(integrator.without_size) > 0, mode="scalar"):
             point = stream.next_2d(dimension + 2)
-            reflection, tests = _without_size(integrator, si, bsdf, vertex.lobe, point, continues)
+            reflection, tests = _reflect_delta_emitter(integrator, si, bsdf, vertex.lobe, point, continues)
             light += integrator.clamp_indirect(throughput * reflection, depth + 1)
             shadow += tests
         bs, weight = bsdf.sample(context, si, stream.next_1d(dimension), stream.next_2d(dimension + 1), continues)
@@ -201,7 +201,7 @@ def _leave(integrator: PathIntegrator, vertex: Vertex, at_first: UInt32, state: 
     return states, throughput, depth, continues, light, shadow, crossings, o, d, last, all_specular
 
 
-def _without_size(
+def _reflect_delta_emitter(
     integrator: PathIntegrator, si: SurfaceInteraction3f, bsdf: BSDFPtr, lobe: Vector3f, point: Point2f, active: Bool
 ) -> tuple[Spectrum, UInt32]:
     """Radiance toward ``si.wi`` by a sharp event from a sampled delta emitter, and the shadow rays traced."""

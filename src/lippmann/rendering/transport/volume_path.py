@@ -104,7 +104,7 @@ class VolumePathIntegrator:
 
         si = scene.ray_intersect(ray, mi.RayFlags.All, True, active)  # the surface ahead of the ray
         first_distance = mi.Float(si.t)
-        medium, secondary = self._medium_at_start(ray, si, active)
+        medium, secondary = self._find_first_medium(ray, si, active)
         view_dependent = mi.Bool(False)
 
         while dr.hint(active, label="volume paths"):
@@ -165,7 +165,7 @@ class VolumePathIntegrator:
             toward_light[at_surface & si.is_medium_transition()] = si.target_medium(light_ds.d)
             # A stream of its own: a shadow ray may collide any number of times.
             of_shadow = SampleStream(hash32(stream.key ^ (dimension + 7)), stream.index, stream.half)
-            visible, tests = self._transmittance(reference, light_ds.p, toward_light, of_shadow, lit)
+            visible, tests = self._estimate_transmittance(reference, light_ds.p, toward_light, of_shadow, lit)
             radiance += dr.select(lit, throughput * reflected * visible, 0)
             shadow += tests
 
@@ -209,7 +209,7 @@ class VolumePathIntegrator:
         return radiance, RayCounts(secondary, shadow), FirstHit(first_distance, view_dependent)
 
     @syntax
-    def _medium_at_start(self, ray: Ray3f, si: SurfaceInteraction3f, active: Bool) -> tuple[MediumPtr, UInt32]:
+    def _find_first_medium(self, ray: Ray3f, si: SurfaceInteraction3f, active: Bool) -> tuple[MediumPtr, UInt32]:
         """The medium at the origin of ``ray``, whose first surface is ``si``, and the rays traced to find it.
 
         It is that before the first boundary of a medium along the ray, whatever surfaces come first; where the ray
@@ -231,7 +231,7 @@ class VolumePathIntegrator:
         return medium, crossings
 
     @syntax
-    def _transmittance(
+    def _estimate_transmittance(
         self,
         reference: Interaction3f,
         target: Point3f,

@@ -118,7 +118,7 @@ class WhittedIntegrator:
 
             continues = active & (mirrored.weight > MIN_WEIGHT)
             passes = active & (through.weight > MIN_WEIGHT)
-            ray = _either(continues, mirrored, through)
+            ray = _select_either(continues, mirrored, through)
             if dr.hint(self._branches, mode="scalar"):
                 # Rays that do not wait go to a spare entry, because conditional writes to local memory lose lanes.
                 waits = continues & passes & (waiting < capacity)
@@ -126,7 +126,7 @@ class WhittedIntegrator:
                 waiting += dr.select(waits, mi.UInt32(1), mi.UInt32(0))
                 returns = active & ~continues & ~passes & (waiting > 0)
                 waiting -= dr.select(returns, mi.UInt32(1), mi.UInt32(0))
-                ray = _either(returns, _load(stack, waiting), ray)
+                ray = _select_either(returns, _load(stack, waiting), ray)
                 active &= continues | passes | returns
             else:
                 active &= continues | passes
@@ -158,7 +158,7 @@ class WhittedIntegrator:
         skipped = mi.Bool(False)
         if self._limited:
             skipped = on_surface & (finish.opacity < 1) & (ray.surfaces == 0)
-        alpha = self._opacity(surface, finish, ray.d)
+        alpha = self._find_opacity(surface, finish, ray.d)
         mirrors = on_surface & (finish.specular > (0 if self._nff else LEAST)) & ~skipped
         lets_through = on_surface & (finish.opacity < 1 - LEAST) & ~skipped
         local_share = dr.select(lets_through, alpha, 1) if shading.local_times_opacity else mi.Float(1)
@@ -177,7 +177,7 @@ class WhittedIntegrator:
             missing = dr.select(mirrors, local_share, 0) + dr.select(lets_through | skipped, 1, 0)
             local += dr.select(last & on_surface, background * missing, 0)
 
-        clear, haze = self._fog(hit, ray.d, on_surface, active & ~on_surface & ~is_light, skipped, primary)
+        clear, haze = self._blend_fog(hit, ray.d, on_surface, active & ~on_surface & ~is_light, skipped, primary)
         radiance = dr.select(on_surface, local, dr.select(is_light, light_color, background)) * clear + haze
         weight = dr.select(last | ~on_surface, 0, ray.weight * clear)
         mirrored_d = ray.d - surface.n * (2 * dr.dot(surface.n, ray.d))
@@ -197,13 +197,13 @@ class WhittedIntegrator:
             view_dependent |= on_surface & (finish.outline > 0)
         return radiance * ray.weight, shadow, view_dependent, (mirrored, through)
 
-    def _opacity(self, surface: Surface, finish: Finish, d: Vector3f) -> Float:
+    def _find_opacity(self, surface: Surface, finish: Finish, d: Vector3f) -> Float:
         if not self._raster3d:
             return finish.opacity
         by_angle = dr.square(1 + dr.cos(dr.pi * (1 - finish.opacity) * dr.dot(surface.n, d))) * 0.25
         return by_angle if self._scene.shading.raster3d else dr.select(finish.raster3d, by_angle, finish.opacity)
 
-    def _fog(
+    def _blend_fog(
         self, hit: Hit, d: Vector3f, on_surface: Bool, missed: Bool, skipped: Bool, primary: Bool
     ) -> tuple[Float, Color3f]:
         """Transmittance of the fog along a ray, and the radiance that the fog adds."""
@@ -240,7 +240,7 @@ def _drop_throughput(ray: _Ray) -> _Ray:
     return _Ray(ray.o, ray.d, mi.Float(0), ray.depth, ray.path, ray.surfaces)
 
 
-def _either(condition: Bool, a: _Ray, b: _Ray) -> _Ray:
+def _select_either(condition: Bool, a: _Ray, b: _Ray) -> _Ray:
     return _Ray(*(dr.select(condition, getattr(a, f.name), getattr(b, f.name)) for f in fields(_Ray)))
 
 
