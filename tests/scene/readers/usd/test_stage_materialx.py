@@ -100,3 +100,39 @@ def test_a_document_in_a_package(tmp_path):
     scene = load_scene(tmp_path / "s.usdz").description
     assert scene.materials[0].base_color_texture.image.pixels.shape == (*np.shape(PICTURE)[:2], 3)
     assert scene.notes == []
+
+
+SPACE = 'xmlns:xi="http://www.w3.org/2001/XInclude"'
+
+
+def split(name):
+    """The document in two: its graph, and what includes that by a name."""
+    start, end = DOCUMENT.index("<nodegraph"), DOCUMENT.index("<constant")
+    head = DOCUMENT[:start]
+    graph = head + DOCUMENT[start:end] + "</materialx>"
+    return graph, head.replace("version", f"{SPACE} version", 2).replace("xml " + SPACE, "xml") + (
+        f'<xi:include href="{name}"/>' + DOCUMENT[end:]
+    )
+
+
+def test_documents_that_include_others(read):
+    graph, rest = split("parts/graph.mtlx")
+    files = {"look/x.mtlx": rest, "look/parts/graph.mtlx": graph, "look/parts/tex/t.png": png(PICTURE)}
+    scene = read(looks("pictures"), files=files)
+    assert scene.materials[0].base_color_texture.image.pixels[..., 0].tolist() == np.array(PICTURE)[..., 0].tolist()
+    assert scene.notes == []
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("none.mtlx", "No such file"),
+        ("../../x.mtlx", "it lies outside the scene's folder"),
+        ("x.mtlx", "includes itself"),
+    ],
+)
+def test_what_cannot_be_included_is_named(read, name, why):
+    scene = read(looks("pictures"), files={"look/x.mtlx": split(name)[1]})
+    assert any(f"'{name}', which 'x.mtlx' includes, cannot be read" in note and why in note for note in scene.notes)
+    if "itself" not in why:
+        assert "'x.mtlx' has no node 'NG': its default is taken" in scene.notes

@@ -42,6 +42,10 @@ def check_layers(path: str, folder: str | None) -> tuple[list[Sdf.Layer], list[s
         A layer lies outside, or there are too many.
     """
     home = None if folder is None else os.path.realpath(folder)
+
+    def admits(name: str) -> bool:
+        return home is None or _lies_in(name, home)
+
     waiting, known, notes = [path], {path}, []
     layers: list[Sdf.Layer] = []
     documents: dict[str, Sdf.Layer] = {}
@@ -59,7 +63,7 @@ def check_layers(path: str, folder: str | None) -> tuple[list[Sdf.Layer], list[s
             known.add(layer_path)
             if len(known) > _MOST_LAYERS:
                 raise StageError(f"is made of more than {_MOST_LAYERS} layers")
-            if home is not None and not _lies_in(layer_path, home):
+            if not admits(layer_path):
                 raise StageError(
                     f"layer '{name}' lies outside the scene's folder",
                     rule="a scene file may name only files in its own folder and below",
@@ -71,7 +75,7 @@ def check_layers(path: str, folder: str | None) -> tuple[list[Sdf.Layer], list[s
                 waiting.append(layer_path)
             elif _is_materialx(layer_path):
                 try:
-                    documents[layer_path] = materialx_layer(layer_path)
+                    documents[layer_path] = materialx_layer(layer_path, admits, notes)
                 except ValueError as error:
                     notes.append(f"layer '{name}' is no MaterialX that can be read ({error}): left out")
                 else:

@@ -1,7 +1,7 @@
 """MaterialX documents (``.mtlx``) as layers, for the wheels of USD, which come without its plugin ``usdMtlx``.
 
 The layer has the plugin's paths: ``/MaterialX/Materials/NAME``, with the inputs of its surface on the material. By the
-MaterialX Specification 1.39; looks, variants and includes are not read.
+MaterialX Specification 1.39; looks and variants are not read.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import posixpath
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -33,10 +34,18 @@ _OTHERS = {"boolean": _TYPES.Bool, "filename": _TYPES.Asset, "surfaceshader": _T
 _FAULTS = (OSError, zipfile.BadZipFile, ElementTree.ParseError, KeyError, ValueError, TypeError, RuntimeError)
 #: Attributes that hold for all that stands in an element.
 _INHERITED = ("colorspace", "fileprefix")
+_INCLUDE = "{http://www.w3.org/2001/XInclude}include"
+#: Documents that include each other.
+_DEEPEST = 8
 
 
-def materialx_layer(path: str) -> Sdf.Layer:
+def materialx_layer(path: str, admits: Callable[[str], bool], notes: list[str]) -> Sdf.Layer:
     """The layer of a document: a file, or one in a package (``package.usdz[name.mtlx]``).
+
+    Parameters
+    ----------
+    admits:
+        Whether a document that it includes may be read; ``notes`` name those that are not, or cannot be.
 
     Raises
     ------
@@ -44,28 +53,57 @@ def materialx_layer(path: str) -> Sdf.Layer:
         It cannot be read, is no XML, or holds values that do not fit their types.
     """
     try:
-        return _read(path)
+        root = _read(path)
+        _include(root, path, admits, notes, _DEEPEST)
+        layer = Sdf.Layer.CreateAnonymous(f"{path}.usda")
+        _Document(root, Usd.Stage.Open(layer), path, notes).make_materials()
     except _FAULTS as error:
         raise ValueError(str(error)) from None
-
-
-def _read(path: str) -> Sdf.Layer:
-    outer, _, inner = path.rstrip("]").partition("[")
-    if inner:
-        with zipfile.ZipFile(outer) as package:
-            data = package.read(inner)
-    else:
-        data = Path(path).read_bytes()
-    layer = Sdf.Layer.CreateAnonymous(f"{path}.usda")
-    _Document(ElementTree.fromstring(data), Usd.Stage.Open(layer), path).make_materials()
     return layer
+
+
+def _read(path: str) -> Element:
+    outer, _, inner = path.rstrip("]").partition("[")
+    if not inner:
+        return ElementTree.fromstring(Path(path).read_bytes())
+    with zipfile.ZipFile(outer) as package:
+        return ElementTree.fromstring(package.read(inner))
+
+
+def _include(root: Element, path: str, admits: Callable[[str], bool], notes: list[str], depth: int) -> None:
+    """Put what included documents hold in the place of their names."""
+    for element in root.findall(_INCLUDE):
+        name = element.get("href", "")
+        inner = _beside(path, name)
+        try:
+            if depth == 0 or not admits(inner):
+                raise ValueError("it includes itself" if depth == 0 else "it lies outside the scene's folder")
+            held = _read(inner)
+        except _FAULTS as error:
+            notes.append(f"'{name}', which '{os.path.basename(path)}' includes, cannot be read ({error}): left out")
+            continue
+        _include(held, inner, admits, notes, depth - 1)
+        folder = posixpath.join(posixpath.dirname(name), "")
+        for child in held:
+            child.set("colorspace", child.get("colorspace", held.get("colorspace", "")))
+            child.set("fileprefix", folder + child.get("fileprefix", held.get("fileprefix", "")))
+        place = list(root).index(element)
+        root[place : place + 1] = list(held)
+
+
+def _beside(path: str, name: str) -> str:
+    """A file that a document names as seen from its folder."""
+    if "[" in path:
+        package, inner = Ar.SplitPackageRelativePathInner(path)
+        return str(Ar.JoinPackageRelativePath(package, posixpath.normpath(f"{posixpath.dirname(inner)}/{name}")))
+    return os.path.normpath(os.path.join(os.path.dirname(path), name))
 
 
 class _Document:
     """Makes prims of the elements of a document, which are ``root`` and what it holds."""
 
-    def __init__(self, root: Element, stage: Usd.Stage, path: str) -> None:
-        self._root, self._stage, self._path = root, stage, path
+    def __init__(self, root: Element, stage: Usd.Stage, path: str, notes: list[str]) -> None:
+        self._root, self._stage, self._path, self._notes = root, stage, path, notes
         self._inherited = {root: {name: root.get(name, "") for name in _INHERITED}}
 
     def make_materials(self) -> None:
@@ -143,6 +181,8 @@ class _Document:
             return self._graph(parent, graph).GetOutput(output) or None
         node = self._find(scope, given.get("nodename"))
         if node is None:
+            if absent := given.get("nodegraph", given.get("nodename")):
+                self._notes.append(f"'{os.path.basename(self._path)}' has no node '{absent}': its default is taken")
             return None
         return self._shader(parent, scope, node).CreateOutput(output, _type_of(node))
 
@@ -156,15 +196,8 @@ class _Document:
             numbers = [float(number) for number in text.replace(",", " ").split()]
             return _NUMBERS[kind][1](*numbers)
         if kind == "filename":
-            return Sdf.AssetPath(self._anchored(self._inherited[given]["fileprefix"] + text))
+            return Sdf.AssetPath(_beside(self._path, self._inherited[given]["fileprefix"] + text))
         return text == "true" if kind == "boolean" else text
-
-    def _anchored(self, name: str) -> str:
-        """A file's name, as seen from the document's folder."""
-        if "[" in self._path:
-            package, inner = Ar.SplitPackageRelativePathInner(self._path)
-            return str(Ar.JoinPackageRelativePath(package, posixpath.normpath(f"{posixpath.dirname(inner)}/{name}")))
-        return os.path.normpath(os.path.join(os.path.dirname(self._path), name))
 
 
 def _below(path: Sdf.Path, element: Element) -> Sdf.Path:
