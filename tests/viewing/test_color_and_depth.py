@@ -53,6 +53,12 @@ def test_codes_are_linear_in_inverse_depth():
     assert depth_codes(distance, 500, 1000, 16, "near").tolist() == [[65535, 43690, 21845, 0, 0]]
 
 
+def test_what_is_not_seen_is_far_where_all_else_is_at_one_distance():
+    distance = np.array([[600, np.inf]], np.float32)
+    assert depth_codes(distance, 600, 600, 8, "near").tolist() == [[255, 0]]
+    assert depth_codes(distance, 600, 600, 8, "far").tolist() == [[0, 255]]
+
+
 def test_distance_is_from_the_eye_and_infinite_where_nothing_is_hit(slope):
     distance = visible_distance(slope, EYE, (64, 64))
     assert np.isinf(distance[:10]).all()

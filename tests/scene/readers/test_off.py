@@ -49,7 +49,7 @@ def test_what_vertices_have_is_told_by_the_first_word(read):
     assert np.allclose(mesh.uvs[0], (0.25, 0.25))  # v runs upwards
 
 
-@pytest.mark.parametrize("color", ["255 0 0", "255 0 0 255", "1.0 0 0", "1. 0. 0. 1."])
+@pytest.mark.parametrize("color", ["255 0 0", "255 0 0 255", "1.0 0 0", "1. 0. 0. 1.", "1 0 0 1"])
 @pytest.mark.parametrize("key", ["COFF", "OFF"])  # not all programs change the first word
 def test_colors_of_vertices(read, key, color):
     (mesh,) = read(f"{key}\n3 1 0\n0 0 0 {color}\n1 0 0 {color}\n0 1 0 {color}\n3 0 1 2\n").meshes

@@ -60,6 +60,27 @@ def test_colours_as_the_bits_of_floats_and_points_that_are_none(tmp_path):
     assert "1 points without finite coordinates are left out" in scene.notes
 
 
+@pytest.mark.parametrize("kind", ["F8", "U8", "I4", "U1"])
+def test_colours_of_any_width(tmp_path, kind):
+    codes = CODES.view("<f4") if kind == "F8" else CODES
+    rows = "".join(f"{' '.join(map(str, place))} {code:.9g}\n" for place, code in zip(PLACES, codes, strict=True))
+    head = f"FIELDS x y z rgb\nSIZE 4 4 4 {kind[1]}\nTYPE F F F {kind[0]}\nPOINTS 4\nDATA ascii\n"
+    if kind == "U1":
+        rows = rows.replace(" 16744448", " 1").replace(" 65280", " 2").replace(" 1056816", " 3")
+    (tmp_path / "a.pcd").write_text(head + rows)
+    (mesh,) = load_scene(tmp_path / "a.pcd").description.meshes
+    colors = mesh.colors.reshape(4, -1, mesh.colors.shape[1])[:, 0, :3]
+    assert colors[1].tolist() == [0, 0, 1]
+    assert kind == "U1" or colors[2].tolist() == [0, 1, 0]
+
+
+def test_fewer_points_than_none_are_refused(tmp_path):
+    head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS -1\nDATA binary\n"
+    (tmp_path / "a.pcd").write_bytes(head.encode() + PLACES.tobytes())
+    with pytest.raises(SceneError, match=r"\(-1 points\)"):
+        load_scene(tmp_path / "a.pcd")
+
+
 @pytest.mark.parametrize("form", ["ascii", "binary", "binary_compressed", "packed"])
 def test_files_that_are_cut_short_or_of_another_form_are_one_line(tmp_path, form):
     body = body_of("binary" if form == "packed" else form)[:-9]

@@ -70,8 +70,9 @@ def read_off(path: Path) -> SceneDescription:
 
 
 def _properties(names: tuple[str, ...], colors: list[Row]) -> list[Property]:
-    """Properties of colours; these are whole numbers up to 255, or have points and count to 1."""
-    is_real = any(b"." in word for color in colors for word in color)
+    """Properties of colours: whole numbers up to 255, or parts of 1, which have points or are 0 and 1 alone."""
+    words = {word for color in colors for word in color}
+    is_real = words <= {b"0", b"1"} or any(b"." in word for word in words)
     return [Property(name, "f8" if is_real else "u1", None) for name in names]
 
 

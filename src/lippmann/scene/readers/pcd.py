@@ -52,13 +52,17 @@ def read_pcd(path: Path) -> SceneDescription:
             (f"_{place}" if name == "_" else name, kind, (count,)) for place, (name, kind, count) in enumerate(listed)
         ]
         number, dtype = int(entries["POINTS"][0]), np.dtype(fields)
+        if number < 0:
+            raise ValueError(f"{number} points")
         check_input(2 * number * dtype.itemsize, f"{number} points", where=where)
         table = _columns(data[mark.end() :], mark[1].decode().lower(), dtype, number)
     except (KeyError, ValueError, TypeError, IndexError, struct.error) as error:
         raise SceneError(f"is no PCD file that makes sense ({error})", where=where, fix="is it whole?") from None
     vertex = {_NORMALS.get(name, name): column for name, column in table.items() if not name.startswith("_")}
     for name in {"rgb", "rgba"} & {*vertex}:
-        codes = np.ascontiguousarray(vertex.pop(name)).view(np.uint32)
+        column = vertex.pop(name)
+        # Three bytes of a whole number, or of the bits of a single float; some programs store it wider.
+        codes = column.astype("<f4" if column.dtype.kind == "f" else "<u4").view("<u4")
         vertex |= {color: (codes >> shift & 255).astype(np.uint8) for color, shift in _SHIFTS.items()}
     properties = [Property(name, column.dtype.str[1:], None) for name, column in vertex.items()]
     columns = {name: column.astype(np.float64) for name, column in vertex.items()}
