@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import struct
 
 import av
@@ -76,6 +77,22 @@ def test_jps_of_half_width_and_without_a_word_of_its_own(tmp_path):
     Image.fromarray(np.concatenate([RIGHT, LEFT], axis=1)).save(held, "JPEG", quality=95, subsampling=0)
     left, _ = read_back(tmp_path, "plain.jps", held.getvalue())
     assert near(left, LEFT)
+
+
+def test_of_an_mpo_that_holds_more_the_first_two_views_are_taken(tmp_path):
+    path, kinds = tmp_path / "camera.mpo", (0x030000, 0x010001, 0x020002, 0x020002)
+    pictures = [Image.fromarray(each) for each in (LEFT, LEFT[::4, ::4], RIGHT, LEFT)]
+    pictures[0].save(path, "MPO", save_all=True, append_images=pictures[1:])
+    data = bytearray(path.read_bytes())
+    # Of each picture: attribute, size, offset (0 for the first), no others.
+    first = re.search(re.escape(struct.pack("<L", kinds[0])) + b".{4}" + bytes(8), data, re.DOTALL).start()
+    for number, kind in enumerate(kinds):
+        struct.pack_into("<L", data, first + 16 * number, kind)
+    path.write_bytes(data)
+    left, right = read_pair(path)
+    assert np.abs(left.codes().astype(int) - LEFT).mean() < 8
+    assert np.abs(right.codes().astype(int) - RIGHT).mean() < 8
+    assert left.notes == ("it holds 3 views: the first two are shown",)
 
 
 def test_mpo_as_pillow_reads_it(tmp_path):

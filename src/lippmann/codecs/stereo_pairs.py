@@ -31,6 +31,8 @@ _STEREO, _SIDE_BY_SIDE, _OVER_UNDER = 1, 2, 3
 _HALF_HEIGHT, _HALF_WIDTH, _LEFT_FIRST = 1, 2, 4
 #: Of an MPO's pictures: what Pillow writes of the first, and those of a stereo pair, the first of which represents it.
 _PILLOWS, _DISPARITY, _REPRESENTS = 0x030000, 0x020002, 0x20000000
+#: The tag of the list of an MPO's pictures, and Pillow's name of those that show another one of them in small.
+_MP_ENTRIES, _SMALL = 0xB002, "Large Thumbnail"
 #: JPEG: nearly without loss, all colours.
 _JPEG = {"quality": 95, "subsampling": 0}
 
@@ -121,11 +123,15 @@ def _descriptor(data: bytes) -> tuple[int, int, int]:
 
 def _read_mpo(path: Path) -> tuple[Photograph, Photograph]:
     with open_picture(path, ("JPEG",)) as picture:
-        if getattr(picture, "n_frames", 1) < 2:
+        entries = getattr(picture, "mpinfo", {}).get(_MP_ENTRIES, ())
+        kinds = [entry["Attribute"]["MPType"] for entry in entries]
+        numbers = [number for number, kind in enumerate(kinds) if not kind.startswith(_SMALL)]
+        if len(numbers) < 2:
             raise PictureError("holds one picture", where=str(path), rule="an MPO file of a pair holds two")
+        notes = (f"it holds {len(numbers)} views: the first two are shown",) if len(numbers) > 2 else ()
         views = []
-        for number in range(2):
+        for number in numbers[:2]:
             picture.seek(number)
             codes = orientations.upright(codes_of(picture), orientations.of_picture(picture))
-            views.append(Photograph.of_codes(codes, picture.info.get("icc_profile") or b""))
+            views.append(Photograph.of_codes(codes, picture.info.get("icc_profile") or b"", notes))
     return views[0], views[1]
