@@ -130,7 +130,7 @@ def report_errors(path: Path) -> Iterator[None]:
         raise PictureError("is no picture that is read here", where=str(path), rule=RULE) from None
     except OSError as error:
         raise unreadable(path, error, PictureError) from None
-    except (SyntaxError, ValueError, RuntimeError) as error:  # the last of AVIF's decoder
+    except (SyntaxError, ValueError, RuntimeError, EOFError) as error:  # the last two of AVIF's and HEIF's decoders
         raise PictureError(f"cannot be read ({error})", where=str(path)) from None
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 Fit = Literal["cover", "contain", "stretch"]
 
 #: Endings of the pictures in a folder of photographs.
-ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".avif", ".bmp", ".ppm", ".gif", ".tga", *PAIRS)
+ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".avif", ".bmp", ".ppm", ".gif", ".tga", *PAIRS, *HEIF)
 
 #: The code of white paper.
 _PAPER = 255
@@ -292,6 +292,12 @@ def _open_source(source: _Source) -> Iterator[Photograph]:
         yield source.view
         return
     path = source.path
+    if path.suffix.lower() in HEIF:
+        from lippmann.scene.readers.heif import open_heif_photograph
+
+        with report_errors(path):
+            yield open_heif_photograph(path)
+        return
     with report_errors(path), path.open("rb") as file, open_photograph(file, path) as photograph:
         yield photograph
 

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from PIL import Image as Pillow
 
-from lippmann.codecs.icc import rgb_profile
+from lippmann.codecs.icc import convert_codes, rgb_profile
 from lippmann.errors import MemoryLimitError, PictureError, SceneError
 from lippmann.quilts.files import read_quilt
+from lippmann.quilts.photos import read_photos
 from lippmann.runtime import machine
 from lippmann.scene.readers.heif.photo import read_heif_photo
 from lippmann.scene.readers.load import load_scene
@@ -83,6 +84,23 @@ def test_a_portrait_that_is_asked_for_as_a_pair_says_what_it_is(tmp_path):
     path.write_bytes(heif(np.zeros((64, 64, 3), np.uint8), np.zeros((32, 32), np.uint8)))
     with pytest.raises(PictureError, match=r"portrait\.heic: is a photograph with depth, no .*'lippmann render'"):
         read_quilt(path)
+
+
+def test_photographs_for_a_print_are_upright_and_of_srgb(tmp_path):
+    exif = Pillow.Exif()
+    exif[0x112] = 6
+    picture = np.full((64, 96, 3), 40, np.uint8)
+    picture[:32] = (200, 90, 90)
+    for name in ("1.heic", "2.HEIC"):
+        turned = Pillow.fromarray(np.rot90(picture).copy())
+        (tmp_path / name).write_bytes(saved(turned, exif=exif.tobytes(), icc_profile=rgb_profile(P3)))
+    paths = sorted(tmp_path.iterdir())
+    view = read_photos(paths, (96, 64), (96.0, 64.0), keeps_profile=False).quilt.view_values(1)
+    assert view[10, 48] == pytest.approx(convert_codes(picture[:1, :1], rgb_profile(P3))[0, 0], abs=8)
+    assert view[50, 48] == pytest.approx((40, 40, 40), abs=8)
+    paths[0].write_bytes(b"no picture")
+    with pytest.raises(PictureError, match=r"1\.heic: cannot be "):
+        read_photos(paths, (96, 64), (96.0, 64.0))
 
 
 def test_depth_of_another_kind_is_named():

@@ -10,6 +10,9 @@ from typing import Any
 import numpy as np
 
 from lippmann.codecs.icc import convert_codes, profile_of_cicp
+from lippmann.codecs.photograph import Photograph
+from lippmann.codecs.picture_notes import pictures_note
+from lippmann.codecs.types import Pixels
 from lippmann.errors import PictureError, SceneError
 from lippmann.runtime.machine import check_input
 from lippmann.runtime.optional_import import check_installed
@@ -68,6 +71,32 @@ def read_heif_photo(data: bytes, where: str) -> tuple[Image, DepthMap | None]:
         rule = "inverse depth and disparity are read"
         raise SceneError(f"has depth of representation {kind}", where=where, rule=rule, fix="name a map: depth_map=...")
     return image, DepthMap(without_stairs(values))
+
+
+def open_heif_photograph(path: Path) -> Photograph:
+    """The first picture of a HEIF file, upright, not yet decoded.
+
+    Raises
+    ------
+    SceneError
+        ``pillow-heif`` is not installed.
+    MemoryLimitError
+        It takes more memory than is left.
+    ValueError, RuntimeError, EOFError, OSError
+        It is damaged, now or once it is decoded, or has more than 8 bits a channel.
+    """
+    check_installed("pillow_heif", "heif", "HEIF pictures need it", str(path))
+    file = open_pictures(path)
+    width, height = file.size
+    check_input(BYTES_PER_PIXEL * width * height, f"a picture of {width} x {height} pixels", where=str(path))
+
+    def decode() -> Pixels:
+        codes = np.array(file)
+        if codes.dtype != np.uint8:
+            raise ValueError(f"it holds {codes.dtype}: 8 bits a channel are read")
+        return codes if codes.ndim == 3 else codes[..., None]
+
+    return Photograph((width, height), profile_of(file.info), 1, pictures_note(len(file)), decode)
 
 
 def open_pictures(source: Path | io.BytesIO) -> Any:
