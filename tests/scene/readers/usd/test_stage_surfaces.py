@@ -319,3 +319,46 @@ def test_images_of_gltf(read):
 def test_panes_of_glass(read, kind, inputs, thickness):
     material = read(material_x(kind, inputs)).materials[0]
     assert (material.transmission, material.thickness) == (1.0, thickness)
+
+
+def test_reality_kit(read):
+    """As Reality Composer writes materials of visionOS."""
+    nodes = """
+    def Shader "i" {
+        uniform token info:id = "ND_RealityKitTexture2D_color3"
+        asset inputs:file = @t.png@
+        color3f outputs:out
+    }
+    def Shader "n" {
+        uniform token info:id = "ND_normal_map_decode"
+        float3 inputs:in.connect = </mat/i.outputs:out>
+        float3 outputs:out
+    }
+"""
+    inputs = """color3f inputs:baseColor = (0.5, 0.25, 1)
+        float3 inputs:normal.connect = </mat/n.outputs:out>
+        float inputs:metallic = 1
+        float inputs:roughness = 0.25
+        float inputs:opacity = 0.5
+        float inputs:opacityThreshold = 0.25"""
+    scene = read(material_x("ND_realitykit_pbr_surfaceshader", inputs, nodes), files={"t.png": png(PICTURE)})
+    material = scene.materials[0]
+    assert material.base_color == (0.5, 0.25, 1.0)
+    assert (material.metallic, material.roughness, material.unlit) == (1.0, 0.25, False)
+    assert (material.alpha, material.alpha_mode, material.alpha_cutoff) == (0.5, "mask", 0.25)
+    assert material.normal_texture is not None
+    assert scene.notes == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        ("ND_realitykit_unlit_surfaceshader", "color"),
+        ("ND_surface_unlit", "emission_color"),
+        ("arnold:flat", "color"),
+    ],
+)
+def test_surfaces_without_shading(read, kind, name):
+    scene = read(material_x(kind, f"color3f inputs:{name} = (0.5, 0.25, 1)"))
+    assert (scene.materials[0].base_color, scene.materials[0].unlit) == ((0.5, 0.25, 1.0), True)
+    assert scene.notes == []

@@ -81,6 +81,7 @@ class SurfaceReader:
             emission_texture=emission_texture,
             ior=max(self._number(inputs, "ior", 1.5), 1.0) or 1.5,
             double_sided=True,
+            unlit=self._number(inputs, "unlit", 0.0) > 0.0,
         )
         material = self._with_reflection(material, inputs)
         material = self._with_opacity(material, inputs)

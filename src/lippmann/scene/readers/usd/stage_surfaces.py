@@ -1,4 +1,4 @@
-"""Surfaces of other models by the inputs of ``UsdPreviewSurface``: MaterialX's, Arnold's, OmniPBR and OmniGlass.
+"""Surfaces of other models by the inputs of ``UsdPreviewSurface``: MaterialX's, Arnold's, RealityKit's, OmniPBR.
 
 Names and defaults are those of MaterialX's definitions of nodes (``libraries/bxdf``, 1.39), which also has the
 translation to ``UsdPreviewSurface``, and of NVIDIA's OmniPBR.mdl and OmniGlass.mdl. Arnold's are those of MaterialX.
@@ -126,6 +126,32 @@ _MODELS = {
 _MODELS |= {
     "arnold:standard_surface": _MODELS["ND_standard_surface_surfaceshader"],
     "arnold:openpbr_surface": _MODELS["ND_open_pbr_surface_surfaceshader"],
+    "ND_realitykit_pbr_surfaceshader": _Model(
+        {
+            "diffuseColor": ("baseColor", [0.18, 0.18, 0.18]),
+            "metallic": ("metallic", 0.0),
+            "roughness": ("roughness", 0.5),
+            "clearcoat": ("clearcoat", 0.0),
+            "clearcoatRoughness": ("clearcoatRoughness", 0.0),
+            "emissiveColor": ("emissiveColor", [0.0, 0.0, 0.0]),
+            "opacity": ("opacity", 1.0),
+            "opacityThreshold": ("opacityThreshold", 0.0),
+            "normal": ("normal", None),
+        }
+    ),
+    "ND_realitykit_unlit_surfaceshader": _Model(
+        {
+            "diffuseColor": ("color", _WHITE),
+            "opacity": ("opacity", 1.0),
+            "opacityThreshold": ("opacityThreshold", 0.0),
+            "unlit": ("", 1.0),
+        }
+    ),
+    "ND_surface_unlit": _Model(
+        {"diffuseColor": ("emission_color", _WHITE), "opacity": ("opacity", 1.0), "unlit": ("", 1.0)},
+        {"diffuseColor": ("emission", 1.0)},
+    ),
+    "arnold:flat": _Model({"diffuseColor": ("color", _WHITE), "unlit": ("", 1.0)}),
     "OmniPBR_Opacity": _MODELS["OmniPBR"],
     "OmniPBR_ClearCoat": replace(
         _MODELS["OmniPBR"],
@@ -403,6 +429,8 @@ _NODES: dict[str, Callable[[str, str, Record, Usd.Prim], Record | None]] = {
     "ND_image_": _image,
     "ND_tiledimage_": _image,
     "ND_normalmap": _normal_map,
+    "ND_normal_map_decode": _normal_map,
+    "ND_RealityKitTexture2D_": _image,
     "ND_convert_": _passed_on,
     "ND_dot_": _passed_on,
     "ND_constant_": _passed_on,
