@@ -20,7 +20,7 @@ main()
 #: Packages beside Python's own that each command may load, and the most modules of this program. Raised by hand alone:
 #: first see whether a module is needed before the command uses it.
 HELP = {"annotated_doc", "lippmann", "shellingham", "typer"}
-RENDER = HELP | {"cython_runtime", "drjit", "imagecodecs", "mitsuba", "numpy", "psutil"}
+RENDER = HELP | {"cython_runtime", "drjit", "imagecodecs", "mitsuba", "numpy"}
 BUDGETS = {
     "--help": (HELP, 21),
     "preview teapot": (RENDER, 197),

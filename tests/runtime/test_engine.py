@@ -165,15 +165,17 @@ def test_kernels_of_mitsuba_are_transformed_when_they_are_first_called():
 
 @needs_good
 @needs_cpu_only
-def test_texts_of_type_hints_are_compiled_once_while_dr_jit_is_loaded(monkeypatch):
-    counted = []
-    monkeypatch.setattr(engine, "compile", lambda *arguments: counted.append(arguments) or compile(*arguments), False)
-    with engine._each_type_compiled_once():
-        hints = [typing.Union["First", other] for other in (int, float, str)]  # noqa: F821
-    assert [hint.__args__[0].__forward_arg__ for hint in hints] == ["First"] * 3
-    if sys.version_info < (3, 14):  # later ones compile none
-        assert len(counted) == 1
+def test_type_hints_are_compiled_when_they_are_evaluated(monkeypatch):
+    monkeypatch.setattr("builtins.compile", lambda *_: pytest.fail("a hint is compiled"))
+    with engine._hints_compiled_at_use():
+        hint = typing.Union["First", None]  # noqa: F821
+    monkeypatch.undo()
     assert "compile" not in vars(typing)
+
+    def takes(value): ...
+
+    takes.__annotations__["value"] = hint
+    assert typing.get_type_hints(takes, {"First": int}) == {"value": int | None}
 
 
 def test_device_of_choice_without_a_gpu_is_the_cpu_and_the_gpu_is_an_error():

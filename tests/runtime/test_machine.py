@@ -1,4 +1,5 @@
 import os
+from pathlib import Path
 from types import SimpleNamespace
 
 import psutil
@@ -16,6 +17,7 @@ def memory_of_machine(monkeypatch):
         available = 8 * GIB
 
     monkeypatch.setattr(psutil, "virtual_memory", Memory)
+    monkeypatch.setattr(machine, "_MEMORY_TABLE", Path("no table"))
 
 
 @pytest.fixture
@@ -40,6 +42,16 @@ def test_cores_are_those_the_process_may_use():
     finally:
         os.sched_setaffinity(0, allowed)
     assert machine.usable_cores() == len(allowed)
+
+
+def test_memory_as_linux_tells_it(control_group, tmp_path, monkeypatch):
+    table = tmp_path / "meminfo"
+    table.write_text(
+        "MemTotal:       4194304 kB\nMemFree:         11 kB\nMemAvailable:    2097152 kB\nHugePages_Total: 0\n"
+    )
+    monkeypatch.setattr(machine, "_MEMORY_TABLE", table)
+    assert machine.total_memory() == 4 * GIB
+    assert machine.available_memory() == 2 * GIB
 
 
 def test_memory_without_a_container(control_group):

@@ -110,7 +110,10 @@ def _size(picture: Image.Image) -> str:
 
 
 def codes_of(picture: Image.Image) -> Pixels:
-    """Codes ``(h, w, 1 | 3 | 4)`` of an open picture: uint8, or uint16 or float32 where the file holds such greys."""
+    """Codes ``(h, w, 1 | 3 | 4)`` of an open picture: uint8, or uint16 or float32 where the file holds such greys.
+
+    They may be read-only.
+    """
     has_alpha = "A" in picture.getbands() or "transparency" in picture.info
     if picture.mode.startswith("I;16") or picture.mode == "I":
         codes = np.asarray(np.clip(np.asarray(picture), 0, 65535), np.uint16)[..., None]
@@ -123,7 +126,7 @@ def codes_of(picture: Image.Image) -> Pixels:
     if picture.mode in ("1", "L") and not has_alpha:
         return np.array(picture.convert("L"))[..., None]
     mode = "RGBA" if has_alpha else "RGB"
-    return np.array(picture if picture.mode == mode else picture.convert(mode))
+    return np.asarray(picture if picture.mode == mode else picture.convert(mode))
 
 
 def _is_white_zero(picture: Image.Image) -> bool:

@@ -8,16 +8,17 @@ import importlib.util
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import cast
+from typing import Literal, cast
 
 from lippmann.errors import MemoryLimitError
 
 _CONTROL_GROUP = Path("/sys/fs/cgroup")
+_MEMORY_TABLE = Path("/proc/meminfo")
 
 
 def usable_cores() -> int:
@@ -29,22 +30,26 @@ def usable_cores() -> int:
 
 def total_memory() -> int:
     """Memory in bytes: that of the machine, or the container's limit if that is lower."""
-    import psutil
-
-    limit = _limit()
-    total = int(psutil.virtual_memory().total)
+    limit, total = _limit(), _memory_of_machine("total")
     return total if limit is None else min(total, limit)
 
 
 def available_memory() -> int:
     """Memory in bytes that is available now without swapping, within the container's limit."""
-    import psutil
-
-    available = int(psutil.virtual_memory().available)
-    limit = _limit()
+    limit, available = _limit(), _memory_of_machine("available")
     if limit is None:
         return available
     return max(0, min(available, limit - _measure_used()))
+
+
+def _memory_of_machine(part: Literal["total", "available"]) -> int:
+    """Memory in bytes, from Linux itself where it tells it: psutil takes 20 ms to load."""
+    with suppress(OSError, KeyError):
+        table = dict(line.split(":") for line in _MEMORY_TABLE.read_text().splitlines())
+        return int(table[f"Mem{part.capitalize()}"].removesuffix("kB")) << 10
+    import psutil
+
+    return int(getattr(psutil.virtual_memory(), part))
 
 
 def _limit() -> int | None:

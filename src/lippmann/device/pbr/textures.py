@@ -333,9 +333,12 @@ class TextureStore:
             return np.ones(1)
         key = (self._identity(image), channels, texture.srgb)
         if key not in self._constants:
-            texels = _channels_of(image, channels).reshape(-1, len(channels))
             self._constants[key] = None
-            if (texels[:256] == texels[0]).all() and (texels == texels[0]).all():
+            for pixels in (image.pixels[:1], image.pixels):  # the first row tells most pictures
+                texels = _channels_of(pixels, channels).reshape(-1, len(channels))
+                if (texels != texels[0]).any():
+                    break
+            else:
                 value = texels[0] / 255.0 if texels.dtype == np.uint8 else texels[0].astype(np.float64)
                 self._constants[key] = decode_srgb(value) if _is_coded(texture, channels) else np.asarray(value)
         return self._constants[key]
@@ -384,7 +387,7 @@ class TextureStore:
             channel, channels = channels[0], (0, 1, 2)
         key = (self._identity(texture.image), channels, coded, texture.filter, wrap)
         if key not in self._bitmaps:
-            self._bitmaps[key] = _upload(_channels_of(texture.image, channels), coded, texture.filter, wrap)
+            self._bitmaps[key] = _upload(_channels_of(pixels, channels), coded, texture.filter, wrap)
         return Bitmap(self._bitmaps[key], len(channels), sampler, (width, height), channel)
 
     def _pooled_bitmap(self, textures: Sequence[Texture], channels: tuple[int, ...], sampler: Sampler) -> PooledBitmap:
@@ -450,9 +453,9 @@ def _is_coded(texture: Texture, channels: tuple[int, ...]) -> bool:
     return texture.srgb and channels != (3,)  # alpha is never sRGB-coded
 
 
-def _channels_of(image: Image, channels: tuple[int, ...]) -> NDArray[np.generic]:
+def _channels_of(pixels: NDArray[np.generic], channels: tuple[int, ...]) -> NDArray[np.generic]:
     """``(h, w, len(channels))`` uint8 or float32; grey serves as red, green and blue."""
-    pixels = image.pixels if image.pixels.dtype == np.uint8 else image.pixels.astype(np.float32, copy=False)
+    pixels = pixels if pixels.dtype == np.uint8 else pixels.astype(np.float32, copy=False)
     grey = pixels.shape[2] < 3
     chosen = [0 if grey and channel < 3 else channel for channel in channels]
     # Packed, as Mitsuba wants them: pixels[..., chosen] would be a transposed array, which has to be copied again.

@@ -186,21 +186,18 @@ class BatchedPicture:
         """The display's pixels from traced values ``(..., W, 3)``."""
         return values
 
-    def _keep(self, run: Run, sums: dict[str, Floats]) -> None:
-        """Add the sums of a run (:func:`~lippmann.rendering.film.wavefront.sum_samples`) to its batches."""
-        per_stream = self._batches_of_stream
-        pixels = slice(run.first, run.last)
-        for place, batch in enumerate(run.batches):
-            kept = {
-                "radiance": (self._sums, batch),
-                "specular": (self._specular, batch // per_stream),
-                "excess": (self._excess, 0),
-                "covered": (self._covered, batch // per_stream),
-            }
-            for name, part in sums.items():
-                total, at = kept[name]
-                assert total is not None
-                total[at, pixels] += part[place]
+    def _sums_of(self, run: Run) -> dict[str, list[Floats]]:
+        """The sums of a run's pixels by name, one for each of its batches."""
+        streams = [batch // self._batches_of_stream for batch in run.batches]
+        sums = {
+            "radiance": (self._sums, run.batches),
+            "specular": (self._specular, streams),
+            "excess": (self._excess, [0] * len(streams)),
+            "covered": (self._covered, streams),
+        }
+        return {
+            name: [part[k, run.first : run.last] for k in at] for name, (part, at) in sums.items() if part is not None
+        }
 
 
 def error_of_batches(sums: Floats, taken: Sequence[int], coding: Coding) -> tuple[Floats, Floats]:

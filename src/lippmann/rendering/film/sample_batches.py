@@ -30,12 +30,12 @@ from lippmann.rendering.film.wavefront import (
     STRIP_ROWS,
     Frame,
     RayTotals,
+    add_samples,
     compile_seconds,
     evaluate,
     in_strips,
     pixel_at,
     sample_pixels,
-    sum_samples,
 )
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
@@ -120,10 +120,9 @@ class FullInBatches(BatchedPicture):
             taken = list(self._taken)
             for run in self._runs(stretch):
                 with dr.scoped_set_flag(dr.JitFlag.KernelHistory, done == 0):
-                    sums = self._trace(integrator, run, together)
+                    self._trace(integrator, run, together)
                     if done == 0:
                         compiled = compile_seconds(started)
-                self._keep(run, sums)
                 if run.last == pixels:
                     for batch in run.batches:
                         taken[batch] += run.count
@@ -155,9 +154,8 @@ class FullInBatches(BatchedPicture):
                 strip = STRIP_ROWS * self._window.width
                 yield from cut_batches(pixels, batches, tuple(starts), count, lanes, strip)
 
-    def _trace(self, integrator: Integrator, run: Run, together: int) -> dict[str, Floats]:
-        """Sums of a run (:func:`~lippmann.rendering.film.wavefront.sum_samples`); every pixel then has ``together``
-        samples, by which excess is limited.
+    def _trace(self, integrator: Integrator, run: Run, together: int) -> None:
+        """Add the samples of a run; every pixel then has ``together`` samples, by which excess is limited.
 
         Lanes are ordered pixel (see :mod:`.wavefront`), channel, batch, sample. Values that differ from run to run are
         opaque to the compiler, so that all runs share a kernel.
@@ -181,7 +179,7 @@ class FullInBatches(BatchedPicture):
         samples = None if self._covered is None else dr.opaque(mi.Float, together)
         traced = sample_pixels(integrator, pixels, stream, samples)
         evaluate(traced, lanes, self.rays)
-        return sum_samples(traced, channels, number, run.count, window.width if run.in_strips else None)
+        add_samples(traced, self._sums_of(run), channels, run.count, window.width if run.in_strips else None)
 
 
 def _blur_after(

@@ -10,6 +10,7 @@ row by row. Lanes are *places* in this order; pictures are in rows.
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -131,16 +132,19 @@ def trace_frame(
             samples = dr.opaque(mi.Float, plan.samples) if for_denoiser else None
             sample = sample_pixels(integrator, pixels, stream, samples)
             evaluate(sample, lanes, frame.rays)
-            sums = sum_samples(sample, plan.channels, 1, run.count, plan.width)
             if done == 0:
                 frame.seconds_compile = compile_seconds(started)
-        for name, values in sums.items():
-            part = values.reshape(tile.rows, plan.width, -1) * np.float32(1 / plan.samples)
-            if name not in parts:
-                parts[name] = np.zeros((plan.height, plan.width, part.shape[2]), dtype=np.float32)
-            parts[name][tile.first_row : tile.first_row + tile.rows] += part
+        for name in ("specular", "excess", "covered"):
+            if name not in parts and getattr(sample, name) is not None:
+                layers = plan.channels if name == "covered" else 3
+                parts[name] = np.zeros((plan.height, plan.width, layers), dtype=np.float32)
+        rows = slice(tile.first_row, tile.first_row + tile.rows)
+        sums = {name: [part[rows].reshape(-1, part.shape[2])] for name, part in parts.items()}
+        add_samples(sample, sums, plan.channels, run.count, plan.width)
         done += lanes
         progress(Progress("trace", done, plan.work))
+    for part in parts.values():
+        part *= np.float32(1 / plan.samples)
     frame.specular, frame.excess = parts.get("specular"), parts.get("excess")
     frame.coverage = Coverage(parts["covered"], plan.samples) if "covered" in parts else None
     frame.seconds_trace = time.perf_counter() - started - frame.seconds_compile
@@ -211,10 +215,14 @@ def _total(values: Float, count: int) -> NDArray[np.float32]:
     return np.asarray(dr.block_sum(values, count) if count > 1 else values)
 
 
-def sum_samples(
-    sample: PixelSample, channels: int, batches: int, count: int, width: int | None
-) -> dict[str, NDArray[np.float32]]:
-    """Sums of evaluated samples ``(batches, pixels, 3)`` by name, and of coverage ``(batches, pixels, channels)``.
+def add_samples(
+    sample: PixelSample,
+    sums: Mapping[str, Sequence[NDArray[np.float32]]],
+    channels: int,
+    count: int,
+    width: int | None,
+) -> None:
+    """Add evaluated samples to ``sums``: by name, for each batch ``(pixels, 3)``, of coverage ``(pixels, channels)``.
 
     Lanes are ordered pixel, channel, batch, sample; pixels in strips of a picture of that ``width``, or where it is
     None in rows. The sums are in rows. The rays of a sub-pixel carry all three colours: it keeps the one that it shows.
@@ -223,13 +231,11 @@ def sum_samples(
     totals = {name: [_total(part, count) for part in light] for name, light in lights.items() if light is not None}
     if sample.covered is not None:
         totals["covered"] = [_total(sample.covered, count)] * channels
-    sums: dict[str, NDArray[np.float32]] = {}
     for name, components in totals.items():
-        sums[name] = np.empty((batches, components[0].size // (channels * batches), len(components)), dtype=np.float32)
         for index, total in enumerate(components):
-            lanes = total.reshape(-1, channels, batches)[:, index % channels]
-            to_rows(lanes, width, sums[name][..., index].T)
-    return sums
+            lanes = total.reshape(-1, channels, len(sums[name]))[:, index % channels]
+            for batch, sum_of_batch in enumerate(sums[name]):
+                sum_of_batch[:, index] += to_rows(lanes[:, batch], width)
 
 
 def select_colors(values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -284,15 +290,12 @@ def pixel_at(place: UInt32, width: int, strips: UInt32) -> tuple[UInt32, UInt32]
     return dr.select(stands, strip * STRIP_ROWS + strip_row, row), dr.select(stands, strip_column, column)
 
 
-def to_rows(values: NDArray[T], width: int | None, ordered: NDArray[T] | None = None) -> NDArray[T]:
-    """``values (pixels, ...)`` reordered from places, which begin with a strip, to rows; as they are without ``width``.
-
-    ``ordered`` is filled with them where it is given, else a new array.
-    """
-    ordered = np.empty_like(values) if ordered is None else ordered
-    whole = 0
-    if width is not None and (whole := in_strips(len(values), width)):
-        rows = ordered[:whole].reshape(-1, STRIP_ROWS, width, *values.shape[1:])
-        np.swapaxes(rows, 1, 2)[:] = values[:whole].reshape(-1, width, STRIP_ROWS, *values.shape[1:])
+def to_rows(values: NDArray[T], width: int | None) -> NDArray[T]:
+    """``values (pixels, ...)`` from places, which begin with a strip, to rows; as they are without ``width``."""
+    if width is None or not (whole := in_strips(len(values), width)):
+        return values
+    ordered = np.empty_like(values)
+    rows = ordered[:whole].reshape(-1, STRIP_ROWS, width, *values.shape[1:])
+    np.swapaxes(rows, 1, 2)[:] = values[:whole].reshape(-1, width, STRIP_ROWS, *values.shape[1:])
     ordered[whole:] = values[whole:]
     return ordered
