@@ -348,3 +348,15 @@ def test_rigid_leaves_a_right_handed_frame_that_looks_the_same_way(scale):
     np.testing.assert_array_equal(frame[:, 3], [1, 2, 3, 1])
     if scale[1]:
         np.testing.assert_allclose(frame[:3, 1], [-1, 0, 0])
+
+
+def test_avatars_of_vrm_0_turn_to_the_viewer(writer, read, world_points):
+    """Version 0 has them face -z, version 1 +z."""
+    writer.node(children=[1], translation=[0, 0, 1])
+    writer.node(mesh=writer.mesh(), translation=[1, 2, 0])
+    writer.json["extensions"] = {"VRMC_vrm": {}}
+    ahead = world_points(read(writer))
+    writer.json["extensions"] = {"VRM": {}}
+    scene = read(writer)
+    np.testing.assert_allclose(world_points(scene), ahead * (-1, 1, -1), atol=1e-12)
+    assert scene.notes == ("turned by 180 degrees: avatars of VRM 0 stand with their backs to the viewer",)

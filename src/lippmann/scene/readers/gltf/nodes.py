@@ -48,6 +48,10 @@ class Nodes:
                         rule="a node has one parent",
                     )
                 self._parents[child] = index
+        if document.root.extension("VRM") is not None:
+            document.notes.add("turned by 180 degrees: avatars of VRM 0 stand with their backs to the viewer")
+            roots = [index for index in range(len(self._locals)) if index not in self._parents]
+            self._locals[roots] = np.diag([-1.0, 1.0, -1.0, 1.0]) @ self._locals[roots]
 
     def traverse(self) -> Iterator[tuple[int, bool]]:
         """The nodes of the default scene, parents first, and whether each is visible.
