@@ -1,4 +1,4 @@
-"""The error map: a picture of the errors of another one."""
+"""Error maps: the errors of a picture's pixels in false colour."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ def check_display(display: object) -> None:
 
 
 def check_lens(lens: object) -> None:
-    """Refuse what is no :class:`Lens`, such as a display."""
+    """Raise UsageError for arguments other than a :class:`Lens`, such as a display."""
     check_kind(lens, Lens, "lens", "Lens.of(display) gives one")
 
 

@@ -75,7 +75,7 @@ class SequenceOptions(Options):
         Raises
         ------
         UsageError
-            An option is given that means nothing without one.
+            An option of sequences is given, but no sequence.
         """
         if self.turns:
             for name in ("animation", "camera_path"):

@@ -44,7 +44,7 @@ def render_picture(
     build:
         As of :func:`~lippmann.rendering.session.open_session`.
     stands_as:
-        A display of the same size, where this one is to stand where that one would.
+        The display by which the picture is placed instead, of the same size: the unrefined one of a finer display.
 
     Raises
     ------

@@ -103,7 +103,7 @@ class Session:
     depths: dict[bytes, VisibleDepth | None] = field(default_factory=dict)
 
     def place(self, display: Display) -> Placement:
-        """Where ``display`` stands in the scene, and what its edge cuts; light that follows the viewer is turned to it.
+        """Place ``display`` in the scene, warn of what its edge cuts, and turn light that follows the viewer.
 
         Raises
         ------
@@ -186,10 +186,9 @@ class Session:
         Parameters
         ----------
         source:
-            Rays of the whole picture, by which emitters are sampled: those who render parts of one picture must give
-            the same.
+            Rays of the whole picture, which the pilot traces to weigh emitters. All parts of one picture give the same.
         frame_from_world:
-            ``(4, 4)``: the frame in which surface properties are told.
+            ``(4, 4)``: to the frame of surface properties, such as normals.
         own_exposure:
             Stops of the camera from which the picture is taken.
         """
@@ -216,7 +215,7 @@ class Session:
         return integrator
 
     def count_exposure(self, own_exposure: float) -> float:
-        """A camera's own exposure if the light is the scene file's; 0 for the studio's light."""
+        """``own_exposure`` where the light is that of the scene's file; 0 for the built-in studio."""
         scene = self.scene
         is_lit = scene.has_physical_lights or (scene.environment is not None and not scene.in_studio)
         return own_exposure if is_lit else 0.0

@@ -126,7 +126,7 @@ def _promise(results: Results) -> list[Markup]:
 
 
 def _slowdowns(results: Results) -> Markup:
-    """The change in time by each way of reusing points, gains and losses alike."""
+    """Change in render time by each variant of reprojection, faster and slower ones alike."""
     lines = []
     for variant in COMPARED:
         shares = [results.of(scene, variant.key).time_share for scene in results.runs]

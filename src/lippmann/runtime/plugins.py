@@ -69,7 +69,7 @@ class Plugin(Generic[P]):
 
     @contextmanager
     def guard(self, error: type[LippmannError], where: str = "") -> Iterator[None]:
-        """A context in which code of another package runs: ``error`` is raised where that fails."""
+        """Context manager for code of another package: turns its exceptions into ``error``."""
         try:
             yield
         except LippmannError:

@@ -305,7 +305,7 @@ class Scene:
 
     @cached_property
     def _needs_surroundings(self) -> bool:
-        """Whether there are smooth metals or glass that only the point, spot or directional lights of a file light."""
+        """Whether smooth metals or glass have nothing to mirror: no sky, and light sources without a size alone."""
         if not (self.studio and self.has_physical_lights) or self.physical.environment is not None:
             return False
         assert isinstance(self.physical, SceneDescription)

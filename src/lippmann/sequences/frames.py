@@ -411,14 +411,14 @@ def hold_exposure(
 
 
 def _choose_key_light(motion: Motion, where: FramePlacements) -> KeyLight | None:
-    """What frames share of a key frame's light: none where the display goes round a scene and takes the light along."""
+    """How frames reuse a key frame's light; None where the display takes the light along, as on turntables."""
     if where.first_pose is not None:
         return LightOfSurfaces()
     return StillPixels() if np.array_equal(motion.display_turn(1), np.eye(4)) else None
 
 
 def give_seed(request: RenderRequest, number: int) -> RenderRequest:
-    """What one frame is asked for: a seed of its own, which its number alone decides, unless noise is to stand still.
+    """The request of one frame: with a seed that follows from its number, unless noise is to stand still.
 
     With the same seed in all frames, noise stands on the glass like dirt.
     """

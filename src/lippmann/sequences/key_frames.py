@@ -1,8 +1,9 @@
 """Key frames: every fourth frame of a film has half-buffers, which tell its error and how many samples are needed.
 
-The halves of a frame are denoised one by one, as each judges the other. Their mean is worse than a frame whose samples
-are of one stream and are denoised together: 0.3 to 0.7 dB (``docs/research/films.md``). So the frames after a key frame
-have no halves. They take three quarters of its samples, and the estimate of their error follows from the key frame's.
+The half-buffers of a frame are denoised separately, so that each measures the error of the other. Their mean has 0.3 to
+0.7 dB less than a frame whose samples are one stream, denoised together (``docs/research/films.md``). So the frames
+after a key frame have no half-buffers. They take three quarters of its samples, and the estimate of their error follows
+from the key frame's.
 
 Where nothing but a camera moves, and where the display is at rest, frames take a key frame's light
 (:mod:`lippmann.sequences.key_light`). Then every fourth frame passes on the light that it took, without halves, and
@@ -84,19 +85,19 @@ class KeyFrames:
         return own if self._shared is None else replace(own, trace_through=self._shared.trace_key)
 
     def noise_of(self, frame: int, request: RenderRequest) -> int:
-        """The number of the frame whose seed a frame has: its own, but the first's where noise would jump otherwise."""
+        """Number of the frame whose seed a frame takes: its own, or 0 where kept pixels would jump to new noise."""
         is_alike = self._shared is not None and self._shared.keeps_noise and _is_open(request)
         return 0 if is_alike and frame % TUNING.frames_of_light == 0 else frame
 
     def add(self, moment: Moment, made: Provenance, key: Key | None) -> Key:
-        """Remember how a frame was made, which followed a ``key`` frame or, None, had halves; its key frame."""
+        """Remember how a frame was made, and return its key frame: ``key``, or itself where that is None."""
         key = key or Key(moment, made)
         if moment.number % TUNING.frames_of_key == 0:
             self._last = moment, key
         return key
 
     def before(self, moment: Moment, request: RenderRequest) -> Key | None:
-        """The key frame that stands for the error of a frame; None where the frame tells its own.
+        """The key frame whose error a frame's estimate follows from; None for frames with half-buffers of their own.
 
         Frames tell their own error where the samples, a quality or a time were asked for, where noise stands still,
         where the key frame's picture is no denoised one, and after a cut. A frame to follow that is missing is

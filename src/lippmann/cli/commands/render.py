@@ -86,8 +86,7 @@ def render(
     from lippmann.rendering.request.render_request import RenderRequest
 
     console = Console(quiet, as_json)
-    target = display_of(display, printed)
-    target, finish = sheet_of(target, finishing, in_frames=bool(moving))
+    target, finish = sheet_of(display_of(display, printed), finishing, in_frames=bool(moving))
     moving, output = moving.with_film(output_of(output, scene, "-frames" if moving else ".png"))
     if opens and moving and moving.video is None:
         raise UsageError("shows a picture or a film", where="--open", fix="add --video film.mp4")
@@ -97,12 +96,12 @@ def render(
         began=None if moving else standard_streams.command_began(),
     ).for_file(output, bits)
     source = SceneSource(scene, asked, light, access)
-    rendered: Callable[..., IntegralImage] = render_picture
+    render_one: Callable[..., IntegralImage] = render_picture
     traced = target
     if correct != "none" or headroom:
         from lippmann.corrected import corrected_renderer, finer_display
 
-        rendered, traced = corrected_renderer(correct, headroom), finer_display(target)
+        render_one, traced = corrected_renderer(correct, headroom), finer_display(target)
         if moving or maps is not None:
             _refuse_correction("frames" if moving else "--maps", "leave one of them out")
     if moving:
@@ -131,7 +130,7 @@ def render(
         if finish is not None:
             finish.check_stored(stored, output)
         _render_whole(
-            source, target, request, rendered, output, console, bits=bits, stored=stored, maps=maps, finish=finish
+            source, target, request, render_one, output, console, bits=bits, stored=stored, maps=maps, finish=finish
         )
     if opens:
         from lippmann.cli.commands.view import view
@@ -140,7 +139,7 @@ def render(
 
 
 def _check_tiled(correct: str, maps: Path | None) -> None:
-    """Refuse for a picture in tiles what needs it as a whole."""
+    """Raise UsageError for options that need the whole picture at once, which tiles do not have."""
     if correct == "lens":
         fix = "render a quilt with 'lippmann quilt', then 'lippmann weave --correct lens'"
         _refuse_correction("tiles, as a cluster, --resume, Zarr and pictures beyond the memory have them", fix)
@@ -154,7 +153,7 @@ def _render_whole(
     source: SceneSource,
     display: Display,
     request: RenderRequest,
-    rendered: Callable[..., IntegralImage],
+    render_one: Callable[..., IntegralImage],
     output: Path,
     console: Console,
     *,
@@ -163,7 +162,7 @@ def _render_whole(
     maps: Path | None,
     finish: Finish | None,
 ) -> None:
-    """Render a picture in memory, write it with its ``maps``, and say what came of it."""
+    """Render a picture in memory, write it with its ``maps``, and print its figures."""
     from lippmann.runtime.atomic_write import check_folder_writable
 
     if maps is not None:
@@ -172,29 +171,32 @@ def _render_whole(
         started = time.perf_counter()
         scene = source.load()
         load_seconds = time.perf_counter() - started
-        image = rendered(scene, display, request, progress)
+        image = render_one(scene, display, request, progress)
         progress(Progress("write", 0, 1))
         writing = time.perf_counter()
-        image = _with_seconds(image, load=load_seconds)
+        image = _add_seconds(image, load=load_seconds)
         if maps is not None:
             from lippmann.viewing.diagnostic_maps import write_maps
 
             write_maps(image, maps)
-        image, remark = _readable(image, stored, output)
+        image, remark = _shade_depth(image, stored, output)
         if finish is not None:
             image = finish.image(image)
         image.save(output, bits=bits, icc=b"" if finish is None else finish.icc)
-    written = _with_seconds(image, write=time.perf_counter() - writing)
+    written = _add_seconds(image, write=time.perf_counter() - writing)
     remarks(console, image.provenance)
-    for line in (remark, _overtime(written, request.max_time)):
+    for line in (remark, _describe_overtime(written, request.max_time)):
         if line:
             console.remark(line)
     height, width = image.pixels.shape[:2]
-    console.result(report(output, (width, height), written.provenance), _sentence(output, written))
+    console.result(report(output, (width, height), written.provenance), _describe(output, written))
 
 
-def _readable(image: IntegralImage, stored: str, output: Path) -> tuple[IntegralImage, str]:
-    """Depth in a format of integers as shades, with a legend beside it and a line that says so; all else as it is."""
+def _shade_depth(image: IntegralImage, stored: str, output: Path) -> tuple[IntegralImage, str]:
+    """For depth in a format of integers: a picture in shades, and a remark. Writes their legend beside the picture.
+
+    Other pictures are returned as they are, with an empty remark.
+    """
     if image.provenance.integrator != "depth" or stored.startswith("float"):
         return image, ""
     from lippmann.image.write import write_plain_picture
@@ -221,7 +223,7 @@ def _check_layers(layers: bool, name: str, output: Path) -> None:
         )
 
 
-def _sentence(output: Path, image: IntegralImage) -> str:
+def _describe(output: Path, image: IntegralImage) -> str:
     height, width = image.pixels.shape[:2]
     rays = image.provenance.rays
     millions = sum(rays.values()) / 1e6
@@ -232,8 +234,8 @@ def _sentence(output: Path, image: IntegralImage) -> str:
     )
 
 
-def _overtime(image: IntegralImage, max_time: float | None) -> str:
-    """One line if a picture took longer than it was to; by up to a tenth nothing is said."""
+def _describe_overtime(image: IntegralImage, max_time: float | None) -> str:
+    """A line on a picture that took over 110 % of ``--max-time``; empty for others."""
     seconds = image.provenance.seconds["total"]
     if max_time is None or seconds <= 1.1 * max_time:
         return ""
@@ -241,12 +243,12 @@ def _overtime(image: IntegralImage, max_time: float | None) -> str:
     return f"{seconds:.1f} s instead of --max-time {max_time:g}: a picture of {samples} takes that long"
 
 
-def _with_seconds(image: IntegralImage, **seconds: float) -> IntegralImage:
+def _add_seconds(image: IntegralImage, **seconds: float) -> IntegralImage:
     return replace(image, provenance=add_seconds(image.provenance, **seconds))
 
 
 def is_tiled(name: FormatName, display: Display, request: RenderRequest, *, resume: bool) -> bool:
-    """Whether a picture has to be rendered in tiles: where that is asked for, or is the only way."""
+    """Whether a picture is rendered in tiles: on ``--resume``, for Zarr, and for TIFFs that do not fit the memory."""
     if resume or name != "tiff":
         return resume or name == "zarr"
     from lippmann.tiles.tiled_render import fits_whole
@@ -266,7 +268,7 @@ def _render_tiled(
     finish: Finish | None,
     runner: Runner | None,
 ) -> None:
-    """Render into a file tile by tile, and say what came of it."""
+    """Render into a file tile by tile, and print its figures."""
     from lippmann.calibration.finish import NO_FINISH
     from lippmann.tiles.tiled_render import render_to_file
 

@@ -285,7 +285,7 @@ def name_frames(output: Path, frames: int, ending: str = "") -> Callable[[int], 
 
 @contextmanager
 def _places(output: Path, first: Path, video: Path | None) -> Iterator[None]:
-    """See that frames and film can be written, in a new folder that goes again if no frame comes to lie in it."""
+    """Check that frames and film can be written. A folder that is made for them is removed again if it stays empty."""
     from lippmann.runtime.atomic_write import check_writable, output_error, undone
 
     is_new = first.parent == output and not output.is_dir()

@@ -94,7 +94,7 @@ class DiffusePixels:
         return dr.gather(self.color, self.all_albedo, pixel)
 
     def is_diffuse(self, ray: Ray3f, normal: Normal3f) -> Bool:
-        """Whether pixels show one surface that looks alike from all sides, and emits no light."""
+        """Whether each pixel shows a single surface, which is diffuse and emits no light."""
         si = self._scene.ray_intersect(ray)
         flags = si.bsdf(ray).flags()
         directional = (flags & int(mi.BSDFFlags.Glossy | mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class DenoiseTuning:
-    """Constants of the network's use, and of what goes past it.
+    """Constants of the denoising network, and of the light that bypasses it.
 
     Attributes
     ----------
     runs:
-        Times of a run of the network that a picture of two halves takes, guides and shared light included.
+        Cost of denoising two half-buffers over that of one run of the network, feature buffers and sharing included.
     guide_samples:
         Samples of a pixel for the guides. With 8 a textured or glossy surface may lose 0.3 dB, and 0.6 dB behind a
         ``[lens]``, where a pixel holds more of the scene; 16 gain up to 0.1 and 0.4 dB.

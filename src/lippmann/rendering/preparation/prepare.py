@@ -161,7 +161,7 @@ def _sample_contributions(
     hit, point = mi.Bool(False), mi.Point3f(0)
     surface = mi.UInt32(0)
     active = mi.Bool(True)
-    # What does not change is no state: else Dr.Jit would record the loop a second time, without it.
+    # Constants are excluded from the loop's state: else Dr.Jit would record the loop a second time, without them.
     while dr.hint(active, label="pilot paths", exclude=[integrator, scene, context, stream, emitter, emitters]):
         toward = mi.Ray3f(o, d)
         si = scene.ray_intersect(toward, mi.RayFlags.All, False, active)

@@ -29,7 +29,7 @@ _FULL = 'use method="full"'
 
 
 def check(request: RenderRequest, form: Form, display: Display | None) -> None:
-    """Refuse a request that cannot be rendered as it asks.
+    """Check that the options of a request fit each other, the form of picture and the display.
 
     Raises
     ------

@@ -196,7 +196,7 @@ class RenderRequest(MachineOptions, QualityOptions):
 
     @property
     def spp_reserve(self) -> int | None:
-        """Most samples per pixel of a picture that is not clean with ``spp``; None for no more."""
+        """Sample budget per pixel where the estimate after ``spp`` samples is too low; None: rendering stops there."""
         return None if self.plan is None else self.plan.reserve.value
 
     @property

@@ -127,7 +127,7 @@ class PathIntegrator:
     name:
         Name of the integrator in a request.
     light:
-        What is known of the picture's light.
+        Prepared light of the picture; None to sample emitters by the scene's own weights.
     shadow_rays:
         Those of another integrator of the scene; None to make them.
     """

@@ -315,7 +315,7 @@ def _from_name(source: str | Path, allow_outside: bool, asked: SceneOptions) -> 
 
 
 def _of_other_kind(content: object) -> Scene | None:
-    """The scene of a classic one or of one of Mitsuba's; None of all else."""
+    """A :class:`Scene` of a Whitted scene or of an object of Mitsuba; None for other objects."""
     from lippmann.scene.mitsuba_source import MitsubaSource
     from lippmann.scene.values.whitted_scene import ClassicScene
     from lippmann.scene.whitted.world_frame import world_camera
@@ -556,7 +556,7 @@ def _from_object(source: object) -> Scene:
 
 
 def _adapter_for(source: object) -> Callable[[object], SceneDescription] | None:
-    """The function that reads an object of another library, by the library it or a base of its class comes from."""
+    """The adapter of an object of another library: that of the library which its class, or a base class, comes from."""
     libraries = {kind.__module__.partition(".")[0] for kind in type(source).__mro__}
     home = next((each for library, each in _LIBRARIES.items() if library in libraries), None)
     adapter: Callable[[object], SceneDescription] | None = None if home is None else function_of(home)(source)

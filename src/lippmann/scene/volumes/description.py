@@ -1,4 +1,4 @@
-"""From a grid that was read to a scene."""
+"""Makes the description of a scene from the grid of a volume."""
 
 from __future__ import annotations
 

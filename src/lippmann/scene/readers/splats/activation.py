@@ -1,4 +1,4 @@
-"""From the numbers that trainers optimize to splats: exponents, sigmoids, and quaternions of unit length."""
+"""Makes splats of trained parameters: exponents of log scales, sigmoids of logits, and unit quaternions."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def mesh_record(
 
 
 def primitive_record(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays, materials: MaterialTable) -> Record:
-    """A shape that is given by numbers."""
+    """Record of a primitive (cube, sphere, cylinder, ...): its kind, and its sizes at a time."""
     kind = str(prim.GetTypeName())
     values = {name: prim.GetAttribute(name).Get(time) for name in PRIMITIVES[kind]}
     numbers = {name: str(value) if name == "axis" else float(value) for name, value in values.items()}

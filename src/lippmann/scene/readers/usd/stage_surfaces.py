@@ -310,7 +310,7 @@ _WRAPS = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror", "constant"
 
 
 def materialx_node(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
-    """What a node of MaterialX gives, in terms of the nodes of ``UsdPreviewSurface``; None of one that is not read."""
+    """The node of ``UsdPreviewSurface`` that equals a node of MaterialX; None for nodes that are not read."""
     for beginning, read in _NODES.items():
         if kind.startswith(beginning):
             return read(kind, channel, given, node)
