@@ -28,6 +28,14 @@ def test_every_layout_is_recognize_and_comes_back(display, picture, same, tmp_pa
     assert any("depth" in note for note in done.notes) == (layout in ("lftoolbox", "eslf", "views"))
 
 
+def test_a_png_of_another_program_is_said_to_be_taken_for_eslf(display, tmp_path):
+    shown = display(distance=300)
+    Image.new("RGB", (shown.panel.width, shown.panel.height)).save(tmp_path / "x.png")
+    assert import_image(tmp_path / "x.png", "eslf", display=shown)[1] == ()
+    (note,) = import_image(tmp_path / "x.png", display=shown)[1]
+    assert note.startswith("taken for ESLF, micro-images side by side; whole views")
+
+
 @pytest.mark.parametrize("write", [write_views, write_micro_images])
 def test_our_own_folders_are_composed(display, picture, same, tmp_path, write):
     image = picture(display(), stored="uint8")
@@ -92,6 +100,9 @@ def test_what_is_not_meant_is_refused(display, picture, tmp_path):
     (tmp_path / "IMG_0001.LFR").write_bytes(b"\x89LFP\r\n\x1a\n")
     with pytest.raises(PictureError, match="raw light fields are not read; decode them with the Light Field Toolbox"):
         import_image(tmp_path / "IMG_0001.LFR")
+    (tmp_path / "lf.h5").write_bytes(b"\x89HDF\r\n\x1a\n")
+    with pytest.raises(PictureError, match=r"HDF5 files are not read; save its views as pictures named by row"):
+        import_image(tmp_path / "lf.h5")
 
 
 @pytest.mark.parametrize(("layout", "library"), [("lftoolbox", "h5py"), ("zarr", "zarr")])

@@ -24,6 +24,8 @@ from lippmann.runtime.regular_file import unreadable
 
 #: Raw files of Lytro's cameras: micro-images before demosaicing and calibration.
 _LYTRO = (".lfp", ".lfr", ".lfx")
+#: Such files are as their makers like, those of the 4D Light Field Benchmark's predecessor (2013) among them.
+_HDF5 = (".h5", ".hdf5")
 
 
 @dataclass(frozen=True)
@@ -210,7 +212,12 @@ def import_image(
             raise PictureError("names its own display", where=str(path), fix="leave display=... out")
         return compose(path, progress=progress), ()
     light_field = _read(path, name, display, progress)
-    return light_field.image(display, where=str(path), layout=name), light_field.notes
+    notes = light_field.notes
+    if layout is None and name == "eslf" and light_field.metadata is None:
+        notes += (
+            "taken for ESLF, micro-images side by side; whole views side by side are for 'lippmann weave --layout'",
+        )
+    return light_field.image(display, where=str(path), layout=name), notes
 
 
 def recognize(path: Path) -> str:
@@ -236,6 +243,9 @@ def recognize(path: Path) -> str:
     if ending in _LYTRO:
         fix = "decode them with the Light Field Toolbox or PlenoptiCam, and import the .mat file or the folder of views"
         raise PictureError("raw light fields are not read", where=str(path), fix=fix)
+    if ending in _HDF5:
+        fix = "save its views as pictures named by row and column, and import their folder"
+        raise PictureError("HDF5 files are not read", where=str(path), fix=fix)
     raise PictureError("the layout is not recognized", where=str(path), fix="say layout=...")
 
 
