@@ -50,6 +50,21 @@ def test_voxels_in_a_file_of_their_own(tmp_path):
     assert (volume_of(tmp_path / "a.nhdr").grid == GRID).all()
 
 
+@pytest.mark.parametrize(("encoding", "pack"), [("raw", bytes), ("gzip", gzip.compress)])
+def test_lines_and_then_bytes_before_the_voxels_are_skipped(tmp_path, encoding, pack):
+    more = "line skip: 2\nbyte skip: 3\n"
+    header = NRRD.format(kind="int16", endian="little", encoding=encoding, more=more, **LPS).encode()
+    body = b"a title\nand more\n" + pack(b"123" + GRID.tobytes())
+    (tmp_path / "a.nrrd").write_bytes(header + body)
+    assert (volume_of(tmp_path / "a.nrrd").grid == GRID).all()
+    (tmp_path / "a.nhdr").write_bytes(header.replace(b"line skip", b"data file: a.raw\nline skip"))
+    (tmp_path / "a.raw").write_bytes(body)
+    assert (volume_of(tmp_path / "a.nhdr").grid == GRID).all()
+    (tmp_path / "a.raw").write_bytes(b"a title\n")
+    with pytest.raises(SceneError, match=r"has no 2 lines before its voxels"):
+        volume_of(tmp_path / "a.nhdr")
+
+
 def test_nrrd_without_a_patient_has_slice_0_in_front(tmp_path):
     header = "NRRD0004\ntype: int16\ndimension: 3\nsizes: 2 3 4\nspacings: 1 2 3\nencoding: raw\nendian: little\n\n"
     (tmp_path / "a.nrrd").write_bytes(header.encode() + GRID.tobytes())

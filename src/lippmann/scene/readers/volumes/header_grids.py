@@ -48,7 +48,10 @@ _LINE = re.compile(r"\s*([^:=#]+?)\s*[:=]\s*(.*?)\s*")
 
 @dataclass(frozen=True)
 class _Grid:
-    """Voxels of ``dtype``, ``sizes`` along each axis (the fastest first), in ``file`` (None: behind the header)."""
+    """Voxels of ``dtype``, ``sizes`` along each axis (the fastest first), in ``file`` (None: behind the header).
+
+    ``lines`` and then ``skip`` bytes stand before them, the bytes within what is packed; -1: they end the file.
+    """
 
     sizes: list[int]
     dtype: np.dtype[np.generic]
@@ -57,6 +60,7 @@ class _Grid:
     skip: int
     is_packed: bool
     notes: list[str]
+    lines: int = 0
 
 
 def read_header_grid(path: Path, *, files: NamedFiles) -> SceneDescription:
@@ -90,14 +94,18 @@ def read_header_grid(path: Path, *, files: NamedFiles) -> SceneDescription:
         if "%" in grid.file or grid.file.startswith("LIST"):
             raise SceneError("names a file for each slice", where=where, rule="voxels in one file are read")
         data = read_bytes(files.find(grid.file, where=where, what="file of voxels"))
-    start = grid.skip if grid.file is not None or end is None else end.end() + max(grid.skip, 0)
+    start = 0 if grid.file is not None or end is None else end.end()
+    for _ in range(grid.lines):
+        if (start := data.find(b"\n", start) + 1) == 0:
+            raise SceneError(f"has no {grid.lines} lines before its voxels", where=where, fix="is it whole?")
+    skip = max(grid.skip, 0)
     if grid.is_packed:
         try:
-            body = zlib.decompressobj(47).decompress(data[max(start, 0) :], size)  # of zlib or gzip
+            body = zlib.decompressobj(47).decompress(data[start:], skip + size)[skip:]  # of zlib or gzip
         except zlib.error as error:
             raise SceneError(f"cannot be unpacked ({error})", where=where, fix="is it whole?") from None
     else:
-        body = data[-size:] if grid.skip < 0 else data[start : start + size]
+        body = data[-size:] if grid.skip < 0 else data[start + skip : start + skip + size]
     if len(body) < size:
         raise SceneError(f"holds {len(body)} of {size} bytes of voxels", where=where, fix="is it whole?")
     return describe_volume(path.stem, np.frombuffer(body, grid.dtype).reshape(shape), grid.matrix, notes=grid.notes)
@@ -143,7 +151,8 @@ def _nrrd(entries: Mapping[str, str]) -> _Grid:
         spacings = _numbers(entries.get("spacings", "1 1 1"))
         matrix = _matrix(np.diag(spacings[np.isfinite(spacings)][:3]), np.zeros(3))
     file = entries.get("data file", entries.get("datafile"))
-    return _Grid(sizes, dtype, world @ matrix, file, int(entries.get("byte skip", 0)), encoding != "raw", notes)
+    skip, lines = (int(entries.get(f"{unit} skip", 0)) for unit in ("byte", "line"))
+    return _Grid(sizes, dtype, world @ matrix, file, skip, encoding != "raw", notes, lines)
 
 
 def _metaimage(entries: Mapping[str, str]) -> _Grid:
