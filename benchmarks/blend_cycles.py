@@ -54,7 +54,7 @@ def _compare(path: Path) -> dict[str, Any]:
     cycles = np.stack([channels[color] for color in "RGB"], axis=-1)
     options = {"spp": 64, "depth": 9, "pixel_filter": "box", "tone_map": "none", "denoise": "none", "exposure": 0}
     scene = lippmann.load_scene(path.with_suffix(".blend"))
-    seen = lippmann.preview(scene, (cycles.shape[1], cycles.shape[0]), camera="Camera", **options).pixels
+    seen = lippmann.preview(scene, size=(cycles.shape[1], cycles.shape[0]), camera="Camera", **options).pixels
     ratio = seen.mean(axis=(0, 1)) / cycles.mean(axis=(0, 1))
     codes = [encode_srgb(np.clip(picture, 0.0, 1.0)) for picture in (seen, cycles)]
     return {

@@ -49,7 +49,7 @@ def _render(request: dict[str, Any], display: lippmann.Display, memory: int) -> 
         light = image.pixels[shown]
         if request["picture"] is not None:
             seen = lippmann.preview(
-                scene, (PICTURE, PICTURE), spp=PICTURE_SAMPLES, memory=memory, tone_map="none"
+                scene, size=(PICTURE, PICTURE), spp=PICTURE_SAMPLES, memory=memory, tone_map="none"
             ).pixels
             write_plain_picture(seen, Path(request["picture"]))
         return {

@@ -27,7 +27,7 @@ def cell(path: Path) -> Image.Image:
         scene = api.load_scene(path)
         if not scene.has_lights:
             scene = api.load_scene(path, environment="studio")
-        pixels = api.preview(scene, (SIZE, SIZE), spp=SPP).pixels
+        pixels = api.preview(scene, size=(SIZE, SIZE), spp=SPP).pixels
         sheet.paste(Image.fromarray(quantize(pixels, 8, "srgb")), (0, 0))
     except LippmannError as error:
         words = str(error)

@@ -69,7 +69,7 @@ def main() -> None:
     camera = Camera("sheet", frame, fov_y=2 * math.atan(height / 2 / 40.0), aspect=COLUMNS / len(rows()))
     description = SceneDescription("materials", meshes, materials, instances, cameras=[camera])
     scene = api.load_scene(description, environment="studio")
-    picture = api.preview(scene, (COLUMNS * SIZE, len(rows()) * SIZE), spp=SPP, camera="sheet")
+    picture = api.preview(scene, size=(COLUMNS * SIZE, len(rows()) * SIZE), spp=SPP, camera="sheet")
     Image.fromarray(quantize(picture.pixels, 8, "srgb")).save(PICTURE, optimize=True)
 
 

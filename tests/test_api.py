@@ -27,6 +27,24 @@ def test_unknown_keywords_are_refused(small):
         lippmann.render_to_file("teapot", "x.png", tilt=3)
 
 
+def test_a_preview_takes_scene_and_display_in_the_order_of_a_render(small):
+    first, second = (list(inspect.signature(call).parameters)[:2] for call in (lippmann.render, lippmann.preview))
+    assert first == second == ["scene", "display"]
+
+
+@pytest.mark.parametrize(
+    ("option", "fix"),
+    [
+        ("turn", r'turn: .* use placement=\{"turn": \.\.\.\}'),
+        ("light_strength", r'use load_scene\(\.\.\., light=\{"light_strength": \.\.\.\}\)'),
+        ("environment", r"use load_scene\(\.\.\., environment=\.\.\.\)"),
+    ],
+)
+def test_an_option_of_another_call_names_that_call(small, option, fix):
+    with pytest.raises(UsageError, match=fix):
+        lippmann.render("teapot", small, **{option: 1})
+
+
 def test_the_options_that_are_known_are_those_of_people(small):
     with pytest.raises(UsageError, match="known are integrator, ") as caught:
         lippmann.plan("teapot", small, zzz=3)

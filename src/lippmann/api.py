@@ -24,7 +24,7 @@ from lippmann.errors import UsageError
 from lippmann.options.choices import Correction
 from lippmann.options.forms import LEFT_OUT
 from lippmann.options.light import LightOptions
-from lippmann.options.option import takes
+from lippmann.options.option import Options, options_of, takes
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.quality import MachineOptions, QualityOptions, RenderKeywords
 from lippmann.options.scene import SceneOptions
@@ -187,9 +187,9 @@ def render_to_file(
 @takes(QualityOptions, MachineOptions, without=LEFT_OUT["preview"])
 def preview(
     scene: Scene | object,
-    size: tuple[int, int] = (512, 512),
-    *,
     display: Display | str | Path | None = None,
+    *,
+    size: tuple[int, int] = (512, 512),
     eye: tuple[float, float, float] | None = None,
     placement: PlacementOptions | Placement | Mapping[str, object] | None = None,
     camera: str | None = None,
@@ -204,10 +204,11 @@ def preview(
     ----------
     scene, progress:
         As for :func:`render`.
-    size:
-        Width and height in pixels, which a display's picture keeps to. Default 512 x 512.
     display, placement:
         The display and where it stands in the scene, as for :func:`render`. Default None: no display.
+    size:
+        Width and height in pixels, 1 to 65535; a display's picture is the largest of its shape within. Default 512 x
+        512.
     eye:
         The eye's place ``(x, y, z)`` before a display in mm, as for :meth:`IntegralImage.replay`. By default in front
         of the middle.
@@ -228,9 +229,9 @@ def preview(
 
     Examples
     --------
-    >>> lippmann.preview("teapot", (16, 8), integrator="normal").pixels.shape
+    >>> lippmann.preview("teapot", size=(16, 8), integrator="normal").pixels.shape
     (8, 16, 3)
-    >>> lippmann.preview("teapot", (16, 16), display="seed-lenticular", integrator="normal").pixels.shape
+    >>> lippmann.preview("teapot", "seed-lenticular", size=(16, 16), integrator="normal").pixels.shape
     (16, 16, 3)
     """
     from lippmann.viewing.replay import check_size, eye_before
@@ -509,7 +510,20 @@ def _display(source: Display | str | Path) -> Display:
     return source if isinstance(source, Display) else load_display(source)
 
 
+#: How a call is given the options that renders do not take themselves.
+_GIVEN_OTHERWISE: Mapping[type[Options], str] = {
+    PlacementOptions: 'placement={{"{0}": ...}}',
+    LightOptions: 'load_scene(..., light={{"{0}": ...}})',
+    SceneOptions: "load_scene(..., {0}=...)",
+}
+
+
 def _request(placement: object, options: Mapping[str, object]) -> RenderRequest:
+    for kind, way in _GIVEN_OTHERWISE.items():
+        for each, _ in options_of(kind):
+            if each.name in options:
+                what = f"is an option of a {kind.noun}, not of a render"
+                raise UsageError(what, parameter=each.name, fix=f"use {way.format(each.name)}")
     return RenderRequest.of({**options, "placement": placement})
 
 

@@ -105,7 +105,10 @@ class LippmannError(Exception):
 
 def suggestion(name: object, known: Iterable[str]) -> str:
     """``, did you mean 'x'?`` with the known names that are most like ``name``; empty if none is."""
-    near = difflib.get_close_matches(str(name), list(known), n=3)
+    names = list(known)
+    near = [each for each in names if each.lower() == str(name).lower()] or difflib.get_close_matches(
+        str(name), names, n=3
+    )
     return f", did you mean {' or '.join(repr(each) for each in near)}?" if near else ""
 
 

@@ -36,13 +36,26 @@ def kept(tmp_path):
 
 
 def test_an_output_without_its_option_is_told_of_it(lippmann, kept):
-    refuse(lippmann("render", "teapot", kept.name), f"{kept.name}; outputs are named by -o: -o {kept.name}. See")
+    refuse(lippmann("render", "teapot", kept.name), f"{kept.name}; outputs are named by -o: -o {kept.name}; see")
+
+
+@pytest.mark.parametrize(
+    ("words", "where"),
+    [
+        (("render", ""), "an argument"),
+        (("render", "teapot", "--display", ""), "--display"),
+        (("render", "teapot", "-o", ""), "-o"),
+        (("quilt", "render", "teapot", "--display="), "--display"),
+    ],
+)
+def test_nothing_is_not_taken_for_this_folder(lippmann, words, where):
+    refuse(lippmann(*words), f"{where}: is empty; give it a value, or leave it out")
 
 
 @pytest.mark.parametrize("words", [("quilt",), ("quilt", "model.glb"), ("calibrate",)])
 def test_a_group_of_commands_names_them(lippmann, words):
     known = {"quilt": "render, pack, unpack, sizes", "calibrate": "pattern, page"}[words[0]]
-    refuse(lippmann(*words), "command", f"Known are {known}.")
+    refuse(lippmann(*words), "command", f"Known are {known}; see")
 
 
 @pytest.mark.slow
@@ -135,14 +148,15 @@ def test_an_unknown_display_suggests_a_known_one(lippmann, kept):
         (("--background", "1,2"), "--background"),
         (
             ("--background", "255,255,255"),
-            "--background: (255.0, 255.0, 255.0); three numbers from 0 to 1, linear: 1,1,1 is white",
+            "--background: (255.0, 255.0, 255.0); must be three numbers from 0 to 1, linear: 1,1,1 is white",
         ),
         (("--pop-out", "2"), "pop"),
         (("--scale", "0"), "scale"),
         (("--turn", "a"), "--turn"),
-        (("--camera", "nobody"), "nobody"),
+        (("--camera", "nobody"), "unknown camera 'nobody'; known are main"),
         (("--device", "abacus"), "abacus"),
         (("--environment", "gone.exr"), "gone.exr"),
+        (("--environment", str(Path(__file__).parent)), "is a folder, no picture; OpenEXR"),
         (("--display", "d" * 300 + ".toml"), "dddd"),
         (("--frobnicate",), "--frobnicate"),
     ],
@@ -154,8 +168,8 @@ def test_options_that_will_not_do(lippmann, kept, engine, words, named):
 @pytest.mark.parametrize(
     ("words", "named"),
     [
-        (("--eye", "0,0,-600"), "the eye is at 0,0,-600; it must be in front of the lens plane"),
-        (("--pixels", "99999x9"), "the size is (99999, 9)"),
+        (("--eye", "0,0,-600"), "--eye: 0,0,-600; must be in front of the lens plane"),
+        (("--pixels", "99999x9"), "--pixels: 99999x9; both sides must be 1 to 65535"),
     ],
 )
 def test_no_eye_behind_the_display_and_no_endless_preview(lippmann, kept, words, named):

@@ -124,7 +124,8 @@ class TestOutputsThatNobodyNamed:
         (tmp_path / "teapot.png").write_bytes(b"a texture")
         done = lippmann("render", "teapot", "--spp", 1)
         assert done.code == 2
-        assert done.err == "lippmann: teapot.png: is there, and no picture of Lippmann's; say -o FILE\n"
+        said = "teapot.png: exists, and is no picture that Lippmann wrote; name another file: -o FILE"
+        assert done.err == f"lippmann: {said}\n"
         assert (tmp_path / "teapot.png").read_bytes() == b"a texture"
 
     def test_the_picture_of_a_photograph_has_a_name_of_its_own(self, tmp_path, monkeypatch):
@@ -151,6 +152,11 @@ def test_the_first_help_tells_of_each_command_what_its_own_does():
     assert {name: each.help.strip().split("\n")[0] for name, each in whole.items()} == {
         name: each.help for name, each in outline.items()
     }
+
+
+def test_a_group_tells_of_each_command_its_whole_line(lippmann):
+    for group in ("quilt", "calibrate"):
+        assert "..." not in lippmann(group, "--help").out.partition("Commands:")[2]
 
 
 def test_a_command_comes_without_the_others_and_a_wrong_word_with_all(monkeypatch):

@@ -176,7 +176,7 @@ def test_a_plan_is_of_the_pair_that_is_asked_for(lippmann, balls):
     ("words", "said"),
     [
         (("plan", "--target", "odyssey-3d", "--size", "999x999"), "it is 999 x 999 pixels; pairs for"),
-        (("plan", "--target", "odyssey-3d", "--size", "20x30cm"), "--size: '20x30cm' is no size"),
+        (("plan", "--target", "odyssey-3d", "--size", "20x30cm"), "--size: '20x30cm'; must be width x height"),
         (("plan", "--target", "odyssey-3d", "--size", "3840x2160", "--lpi", "60"), "--lpi: does not apply to the"),
         (("plan", "--target", "portrait", "--size", "3360x3360"), "--size: does not apply to the display portrait"),
         (("render", "--target", "odyssey-3d"), "--target: odyssey-3d takes no native pixels; an eye-tracked monitor"),

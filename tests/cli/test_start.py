@@ -79,4 +79,4 @@ def test_pythons_module_is_the_command():
     command = [sys.executable, "-m", "lippmann", "bogus"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == "lippmann: No such command 'bogus'. See 'lippmann --help'.\n"
+    assert done.stderr == "lippmann: No such command 'bogus'; see 'lippmann --help'\n"

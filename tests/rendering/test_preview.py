@@ -14,7 +14,7 @@ pytestmark = pytest.mark.usefixtures("engine")
 @pytest.mark.slow
 def test_noise_is_taken_out_where_that_is_asked_for():
     def shown(**options):
-        return lippmann.preview("teapot", (64, 64), **options)
+        return lippmann.preview("teapot", size=(64, 64), **options)
 
     many = shown(spp=256).pixels
     noisy, clean = shown(spp=4, seed=3), shown(spp=4, seed=3, denoise="oidn")
@@ -28,12 +28,12 @@ def test_a_display_shows_what_its_whole_picture_shows_to_the_eye():
     small = lippmann.load_display("seed-lenticular").resized(96, 64)
     exact = {"integrator": "albedo", "spp": 1, "pixel_filter": "point", "placement": {"turn": 20}}
     eye = (30.0, 0.0, 600.0)
-    shown = lippmann.preview("teapot", (48, 48), display=small, eye=eye, **exact).pixels
+    shown = lippmann.preview("teapot", small, size=(48, 48), eye=eye, **exact).pixels
     replayed = lippmann.render("teapot", small, method="full", **exact).replay(eye, size=(48, 32), filter="nearest")
     assert shown.shape == (32, 48, 3)
     assert (np.abs(shown - replayed).max(axis=2) > 1e-4).mean() < 0.02
     assert replayed.std() > 0.05
-    assert np.abs(shown - lippmann.preview("teapot", (48, 48), display=small, **exact).pixels).max() > 0.1
+    assert np.abs(shown - lippmann.preview("teapot", small, size=(48, 48), **exact).pixels).max() > 0.1
 
 
 @pytest.mark.parametrize(
@@ -47,4 +47,4 @@ def test_a_display_shows_what_its_whole_picture_shows_to_the_eye():
 )
 def test_what_does_not_go_together_is_refused(options, what):
     with pytest.raises(UsageError, match=what):
-        lippmann.preview("teapot", (16, 16), **options)
+        lippmann.preview("teapot", size=(16, 16), **options)

@@ -39,7 +39,7 @@ def test_glowing_surfaces_before_black_are_something(engine):
 
     glow = {"type": "rectangle", "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 3.0}}}
     scene = api.load_scene({"type": "scene", "glow": glow}, environment="none")
-    preview = api.preview(scene, (32, 32), spp=1, tone_map="none")
+    preview = api.preview(scene, size=(32, 32), spp=1, tone_map="none")
     assert preview.pixels.max() > 1
     assert not any("empty" in note for note in preview.provenance.notes)
 

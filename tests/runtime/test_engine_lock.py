@@ -132,7 +132,7 @@ def test_calls_of_eight_threads_give_the_bytes_of_single_ones(tmp_path):
         "lens-view": (2, lambda: render(method="lens-view")),
         "pooled": (4, lambda: render(method="pooled", denoise="oidn-fast", spp=2)),
         "quilt": (2, lambda: lippmann.render_quilt(ball, display, **quilt).pixels.tobytes()),
-        "preview": (5, lambda: lippmann.preview(ball, (12, 9), spp=1, integrator="direct").pixels.tobytes()),
+        "preview": (5, lambda: lippmann.preview(ball, size=(12, 9), spp=1, integrator="direct").pixels.tobytes()),
         "plan": (2, planned),
         "file": (2, to_file),
     }}
@@ -250,7 +250,7 @@ def test_the_engine_stays_with_the_thread_that_renders():
     first.start()
     began.wait(60)
     from lippmann.runtime import engine
-    calls = [render, lambda: lippmann.preview(ball, (4, 4), spp=1), lambda: engine.start("cpu", 1)]
+    calls = [render, lambda: lippmann.preview(ball, size=(4, 4), spp=1), lambda: engine.start("cpu", 1)]
     others = [threading.Thread(target=lambda call=call: (call(), order.append("other"))) for call in calls]
     for thread in others: thread.start()
     time.sleep(0.5)
@@ -323,7 +323,7 @@ def test_a_child_of_a_fork_after_a_render_is_refused(end):
         "a scene of Mitsuba's": lambda: native().bounds,
         "a loaded scene": lambda: render(mitsubas),
         "plan": lambda: lippmann.plan(ball, display, **plain),
-        "preview": lambda: lippmann.preview(ball, (4, 4), spp=1),
+        "preview": lambda: lippmann.preview(ball, size=(4, 4), spp=1),
         "quilt": lambda: lippmann.render_quilt(ball, display, views=(2, 2), size=(256, 256), **plain),
         "file": lambda: lippmann.render_to_file(ball, "never.png", display, **plain),
     }}

@@ -227,7 +227,7 @@ def test_an_orthographic_sensor_with_a_scale_sees_what_mitsuba_sees(save, engine
     reference = np.array(mi.render(loaded, integrator=mi.load_dict({"type": "path"}), spp=64))
     (camera,) = scene.cameras
     width = 96 * camera.aspect  # our pixels are square
-    ours = api.preview(scene, (round(width), 96), spp=16, tone_map="none").pixels
+    ours = api.preview(scene, size=(round(width), 96), spp=16, tone_map="none").pixels
     lit = (reference[..., 0] > 1.5).mean(), (ours[..., 0] > 1.5).mean()
     assert lit[1] == pytest.approx(lit[0], abs=0.02)
     assert lit[0] == pytest.approx(4 / (4 * x * y * 1.5), abs=0.02)

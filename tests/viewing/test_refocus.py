@@ -169,5 +169,7 @@ def test_the_method_of_the_picture():
 def test_planes_that_cannot_be(plane):
     with pytest.raises(UsageError, match=r"plane: .* below the viewing distance of 300 mm"):
         refocus(random_picture(square(3, 3, 300.0)), plane)
-    with pytest.raises(UsageError, match="the size is"):
+    with pytest.raises(UsageError, match=r"plane: .* must be above -1e\+12 mm and below 1e\+12 mm"):
+        refocus(random_picture(square(3, 3)), 1e12)
+    with pytest.raises(UsageError, match="size: "):
         refocus(random_picture(square(3, 3)), 0.0, size=(0, 3))

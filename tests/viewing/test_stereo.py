@@ -129,8 +129,8 @@ def test_a_head_path_is_read(tmp_path):
     ("text", "said"),
     [
         ("0,0,600\n1,2\n", r":2: '1,2' is no position; each line is X,Y,Z in mm, z above 0"),
-        ("0,0,-5\n", r":1: the eye is at 0,0,-5"),
-        ("0,0,nan\n", r":1: the eye is at 0,0,nan"),
+        ("0,0,-5\n", r":1: '0,0,-5' is no position"),
+        ("0,0,nan\n", r":1: '0,0,nan' is no position"),
         ("x,y,z\n", r":1: 'x,y,z' is no position"),
         ("# nothing\n", r"there is no position in it"),
         ("\x00\xff", r":1: .* is no position"),

@@ -55,7 +55,7 @@ GROUPS: Mapping[str, Mapping[str, tuple[str, str, str]]] = {
         "proof": (
             "proof",
             "proof",
-            "Prove a display: directions, crosstalk, depth, field, viewing zone and moire of its lenses and pixels.",
+            "Say what a display's lenses can show: directions, crosstalk, depth, field, viewing zone and moire.",
         ),
         "quilt": ("quilt", "quilt", "Quilts: all views side by side in one picture."),
     },
@@ -306,7 +306,7 @@ def _usage(error: BaseException) -> str:
     command = getattr(context, "command_path", "lippmann")
     if " " in command and _NO_COMMAND.fullmatch(message):
         message += f" Known are {', '.join(context.command.commands)}."
-    return f"{message} See '{command} --help'."
+    return f"{message.rstrip('.')}; see '{command} --help'"
 
 
 def _leave(line: str, code: int) -> int:

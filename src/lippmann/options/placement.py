@@ -67,16 +67,28 @@ class PlacementOptions(Options):
     noun = "placement"
     keyword = "placement"
 
-    camera: str | None = _placement(None, "Place the display by this camera of the scene file.", first=True)
+    camera: str | None = _placement(
+        None, "Place the display by this camera of the scene file.", first=True, metavar="NAME"
+    )
     place: Mode | None = _placement(
         None,
         "fit: the scene fills the panel; camera: as the scene's camera looks; display: scene units are its mm. By "
         "default a bundled scene's own camera, else fit.",
     )
     turn: Vector = _placement(
-        (0.0, 0.0, 0.0), "Turn the scene: YAW[,PITCH[,ROLL]] in degrees.", first=True, read=texts.turn
+        (0.0, 0.0, 0.0),
+        "Turn the scene, in degrees: about the upright axis, then tip it, then roll it.",
+        first=True,
+        metavar="YAW[,PITCH[,ROLL]]",
+        read=texts.turn,
     )
-    shift: Vector = _placement((0.0, 0.0, 0.0), "Move the scene: X,Y,Z in mm.", first=True, read=texts.triple)
+    shift: Vector = _placement(
+        (0.0, 0.0, 0.0),
+        "Move the scene, in mm: right, up, toward the viewer.",
+        first=True,
+        metavar="X,Y,Z",
+        read=texts.triple,
+    )
     scale: float = _placement(1.0, "Enlarge the scene about the display's centre.", first=True, **_factor(1.0 / _MOST))
     depth_scale: float | None = _placement(
         None,

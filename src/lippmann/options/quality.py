@@ -57,8 +57,8 @@ class QualityOptions(Options):
     )
     exposure: float | Literal["auto"] = _light(
         "auto",
-        "Stops (EV) by which light is raised or lowered. auto: 0; for files with physical light sources what brings "
-        "the median of what is lit to mid-grey.",
+        "Stops (EV) by which light is raised or lowered. auto: 0; for files with physical light sources as many as "
+        "bring the median of what is lit to mid-grey.",
         first=True,
         low=-MOST_EXPOSURE,
         high=MOST_EXPOSURE,
@@ -180,6 +180,7 @@ class MachineOptions(Options):
         "Memory to use, such as 2G; 60 % of the free by default. What is read from files counts, too.",
         low=1,
         high=2**63,
+        rule="must be a whole number of bytes, 1 or more",
         read=texts.memory,
     )
 

@@ -96,11 +96,12 @@ class SceneOptions(Options):
     )
     background: tuple[float, float, float] | None = _light(
         None,
-        "Colour seen where nothing is hit: R,G,B, linear, 0 to 1.",
+        "Colour seen where nothing is hit: three numbers from 0 to 1, linear.",
         first=True,
+        metavar="R,G,B",
         low=0.0,
         high=1.0,
-        rule="three numbers from 0 to 1, linear: 1,1,1 is white",
+        rule="must be three numbers from 0 to 1, linear: 1,1,1 is white",
         read=texts.triple,
     )
     single_scattering: bool = _scene(

@@ -114,7 +114,7 @@ _MEMORY_UNITS = {"k": 2**10, "m": 2**20, "g": 2**30, "t": 2**40}
 def numbers(text: str, option: str, counts: tuple[int, ...] = (3,)) -> tuple[float, ...]:
     """Numbers separated by commas; ``counts`` says how many there may be."""
     parts = text.split(",")
-    expected = " or ".join(str(count) for count in counts)
+    expected = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else counts[0]
     rule = f"{expected} numbers separated by commas" if counts != (1,) else "a number"
     try:
         values = tuple(float(part) for part in parts)

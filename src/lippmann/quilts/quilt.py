@@ -308,7 +308,8 @@ def quilt_of_display(
     matching = [device for device in known if layout is None or device.layout[:2] == layout]
     if size is None and not matching:
         what = "no quilt is known" if layout is None else f"no quilt of {layout[0]}x{layout[1]} views is known"
-        rule = f"known are those of {', '.join(sorted({device.display for device in DEVICE_QUILTS}))}"
+        own = ", ".join(f"{device.layout[0]}x{device.layout[1]}" for device in known)
+        rule = f"its own have {own}" if known else "'lippmann quilt sizes' lists those of devices"
         fix = "say views=... and size=..." if layout is None else "say size=..., too"
         raise UsageError(what, where=display.name, rule=rule, fix=fix)
     if layout is None:
@@ -421,7 +422,9 @@ def checked_layout(columns: int, rows: int, aspect: float | None, *, where: str)
         rule = f"there are 1 to {MOST_TILES} of both"
         raise PictureError(f"it says {columns} columns and {rows} rows", where=where, rule=rule)
     if aspect is not None and not 0.05 <= aspect <= 20:
-        raise PictureError(f"it says the aspect {aspect:g}", where=where, rule="it is width over height, 0.05 to 20")
+        # The command line has an option of its own for it.
+        where = where.replace("--layout", "--aspect")
+        raise PictureError(f"the aspect is {aspect:g}", where=where, rule="it is width over height, 0.05 to 20")
     return QuiltLayout(columns, rows, aspect)
 
 

@@ -346,7 +346,7 @@ def view_fraction(display: Display, x: Real, y: Real) -> Real:
 def check_weave(quilt: Quilt, display: Display, choice: str) -> None:
     """Raise the errors of :func:`weave`."""
     if choice not in get_args(ViewChoice):
-        raise UsageError.unknown("choice of views", choice, get_args(ViewChoice))
+        raise UsageError.unknown("choice of views", choice, get_args(ViewChoice), parameter="views")
     display.check_native()
     _check_fit(quilt, display)
 

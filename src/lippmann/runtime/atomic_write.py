@@ -285,7 +285,7 @@ def _place(path: Path, *, folder: bool = False) -> Path:
         raise output_error(path, error) from None
     if parent is None:
         raise OutputError(
-            f"the folder '{path.parent}' not found", where=str(path), fix=f"create it: mkdir -p '{path.parent}'"
+            f"there is no folder '{path.parent}'", where=str(path), fix=f"create it: mkdir -p '{path.parent}'"
         )
     if not stat.S_ISDIR(parent):
         raise OutputError(f"'{path.parent}' is not a folder", where=str(path), fix="choose another place")

@@ -352,7 +352,8 @@ def find_camera(cameras: Sequence[Camera], name: str) -> Camera:
     for camera in cameras:
         if camera.name == name:
             return camera
-    raise SceneError.unknown("camera", name, [camera.name for camera in cameras], parameter="camera")
+    fix = "" if cameras else "leave it out"
+    raise SceneError.unknown("camera", name, [camera.name for camera in cameras], parameter="camera", fix=fix)
 
 
 def framing_camera(bounds: Bounds) -> Camera:

@@ -85,7 +85,7 @@ class FrameRange:
                 f"there is no frame {last}",
                 parameter="frames",
                 rule=f"there are {motion.count}, counted from 0",
-                fix=f"ask for {min(self.first, motion.count - 1)}:{motion.count}",
+                fix=f"ask for {self.first if self.first < motion.count else 0}:{motion.count}",
             )
         return frames
 

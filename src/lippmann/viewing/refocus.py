@@ -10,7 +10,6 @@ lens plane, z = 0, it is the mean of each micro-image.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -25,7 +24,7 @@ from lippmann.image.views import pixels_of_view, view_grid
 from lippmann.options.option import checked
 from lippmann.runtime.machine import usable_cores
 from lippmann.runtime.row_threads import Bands
-from lippmann.viewing.replay import Eye, Real, check_size, default_size, eye_of_offset, lens_plane_points, pixel_at
+from lippmann.viewing.replay import FAR, Eye, Real, check_size, default_size, eye_of_offset, lens_plane_points, pixel_at
 
 Index = NDArray[np.intp]
 Flags = NDArray[np.bool_]
@@ -64,8 +63,11 @@ def refocus(image: IntegralImage | LargePicture, plane: float, *, size: tuple[in
 def check_planes(planes: Sequence[float], display: Display) -> None:
     """Refuse a plane that is no finite height in mm below the viewing distance."""
     for plane in planes:
-        if not -math.inf < plane < display.viewing_distance:
-            rule = f"it must be finite mm below the viewing distance of {display.viewing_distance:g} mm"
+        # Parallel views are taken from FAR away.
+        if not -FAR < plane < min(display.viewing_distance, FAR):
+            is_far = display.viewing_distance > FAR
+            most = f"{FAR:g} mm" if is_far else f"the viewing distance of {display.viewing_distance:g} mm"
+            rule = f"must be above -{FAR:g} mm and below {most}"
             raise UsageError(f"{plane!r}", parameter="plane", rule=rule)
 
 

@@ -312,16 +312,16 @@ def check_eye(eye: Eye) -> Eye:
     try:
         x, y, z = (float(value) for value in eye)
     except (TypeError, ValueError):
-        raise UsageError(f"the eye is {eye!r}", rule="it must be three numbers x, y, z in mm") from None
+        raise UsageError(f"{eye!r}", parameter="eye", rule="must be three numbers x, y, z in mm") from None
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)) or z <= 0:
-        rule = "it must be in front of the lens plane: x, y, z in mm with z above 0"
-        raise UsageError(f"the eye is at {x:g},{y:g},{z:g}", rule=rule)
+        rule = "must be in front of the lens plane: x, y, z in mm with z above 0"
+        raise UsageError(f"{x:g},{y:g},{z:g}", parameter="eye", rule=rule)
     return x, y, z
 
 
-def check_size(size: tuple[int, int]) -> tuple[int, int]:
+def check_size(size: tuple[int, int], parameter: str = "size") -> tuple[int, int]:
     """``size`` itself; :class:`UsageError` unless both sides are 1 to 65535."""
     width, height = size
     if not (1 <= width <= 65535 and 1 <= height <= 65535):
-        raise UsageError(f"the size is {size!r}", rule="both sides must be 1 to 65535")
+        raise UsageError(f"{width}x{height}", parameter=parameter, rule="both sides must be 1 to 65535 pixels")
     return width, height

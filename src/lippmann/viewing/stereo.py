@@ -195,12 +195,9 @@ def _position(text: str, where: str) -> Eye:
     rule = "each line is X,Y,Z in mm, z above 0"
     try:
         x, y, z = (float(part) for part in text.split(","))
-    except ValueError:
-        raise UsageError(f"'{text[:40]}' is no position", where=where, rule=rule) from None
-    try:
         return check_eye((x, y, z))
-    except UsageError as error:
-        raise UsageError(error.what, where=where, rule=rule) from None
+    except (ValueError, UsageError):
+        raise UsageError(f"'{text[:40]}' is no position", where=where, rule=rule) from None
 
 
 def half_width(pixels: FloatArray) -> FloatArray:

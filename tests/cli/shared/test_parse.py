@@ -30,7 +30,7 @@ def test_a_size_is_told_by_either_letter():
     assert parse.size("512x384", "--size") == parse.size(" 512X384 ", "--size") == (512, 384)
 
 
-@pytest.mark.parametrize("text", ["512", "0x4", "4x00", "4x-4", "4.5x4", "1000000x1"])
+@pytest.mark.parametrize("text", ["512", "0x4", "4x00", "4x-4", "4.5x4", "1000000000x1"])
 def test_other_sizes_are_refused(text):
-    with pytest.raises(UsageError, match="is no size"):
+    with pytest.raises(UsageError, match="; must be width x height in pixels"):
         parse.size(text, "--size")

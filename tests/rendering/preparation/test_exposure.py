@@ -135,7 +135,7 @@ def test_the_background_keeps_its_colour():
 @pytest.mark.long
 def test_previews_quilts_tiles_and_reuse_choose_alike(tmp_path):
     whole = picture(scene())
-    preview = api.preview(scene(), (64, 64), spp=4, **LINEAR)
+    preview = api.preview(scene(), size=(64, 64), spp=4, **LINEAR)
     assert np.median(preview.pixels[preview.pixels.max(-1) > 0]) == pytest.approx(0.18, rel=0.05)
     reused = api.render(scene(), "mla-square", spp=1, method="lens-view", **LINEAR)
     assert reused.provenance.options["exposure"] == pytest.approx(whole.provenance.options["exposure"], abs=0.02)

@@ -49,7 +49,7 @@ class Tachyon:
 
     def ours(self, path, spp=1):
         """Our picture of the same file, from its camera."""
-        preview = api.preview(api.load_scene(path), (SIZE, SIZE), spp=spp)
+        preview = api.preview(api.load_scene(path), size=(SIZE, SIZE), spp=spp)
         assert preview.provenance.integrator == "classic"
         assert preview.provenance.transfer == "linear"
         return np.clip(preview.pixels, 0, 1)

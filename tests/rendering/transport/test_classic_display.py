@@ -40,7 +40,7 @@ ORANGE, BLUE, SKY = [1.0, 0.5, 0.0], [0.0, 0.5, 1.0], [0.1, 0.2, 0.3]
 
 
 def test_a_left_handed_file_is_shown_as_its_camera_sees_it(corners):
-    preview = api.preview(corners, (64, 64))
+    preview = api.preview(corners, size=(64, 64))
     assert quarters(preview.pixels) == [pytest.approx(c, abs=2e-3) for c in (SKY, ORANGE, BLUE, SKY)]
     image = api.render(corners, "seed-lenticular")
     assert image.provenance.options["placement"] == "camera"
@@ -50,8 +50,8 @@ def test_a_left_handed_file_is_shown_as_its_camera_sees_it(corners):
 
 
 def test_physically_based_light_sees_it_the_same_way_round(corners):
-    pixels = api.preview(corners, (64, 64), integrator="albedo", spp=1).pixels
-    normals = api.preview(corners, (64, 64), integrator="normal", spp=1).pixels
+    pixels = api.preview(corners, size=(64, 64), integrator="albedo", spp=1).pixels
+    normals = api.preview(corners, size=(64, 64), integrator="normal", spp=1).pixels
     assert pixels.shape == normals.shape
     hit = (normals != 0).any(axis=-1)
     assert [bool(hit[16 + 32 * y, 16 + 32 * x]) for y in (0, 1) for x in (0, 1)] == [False, True, True, False]
@@ -62,7 +62,7 @@ def test_every_bundled_scene_renders_by_the_classic_model(engine):
     from lippmann.scene import bundled
 
     for name in bundled.names():
-        preview = api.preview(name, (24, 24), integrator="classic")
+        preview = api.preview(name, size=(24, 24), integrator="classic")
         assert preview.provenance.depth == 2
         assert np.isfinite(preview.pixels).all()
         assert preview.pixels.std() > 0.02
@@ -94,9 +94,9 @@ def test_a_scene_without_a_classic_form_is_refused(tmp_path):
         "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
     )
     with pytest.raises(UsageError, match="no form for the classic light models"):
-        api.preview(path, (8, 8), integrator="classic")
+        api.preview(path, size=(8, 8), integrator="classic")
     with pytest.raises(UsageError, match="known are auto, classic, path"):
-        api.preview(path, (8, 8), integrator="magic")
+        api.preview(path, size=(8, 8), integrator="magic")
 
 
 def test_commands(corners, tmp_path, capsys):

@@ -358,7 +358,7 @@ def test_nff_highlight_and_mirror_share_their_factor(tmp_path):
         "b 0.2 0.4 0.6\nv\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 10\nhither 1\nresolution 3 3\nl 0 3 4\n"
         "f 0.5 0.25 1 0.6 0.3 4 0 0\np 4 -9 -9 0 9 -9 0 9 9 0 -9 9 0\n"
     )
-    middle = api.preview(path, (3, 3)).pixels[1, 1]
+    middle = api.preview(path, size=(3, 3)).pixels[1, 1]
     # Ambient 1/2 Kd; the lamp's cosine 4/5; the mirrored lamp direction lies at 4/5 from the eye as well.
     local = np.array([0.5, 0.25, 1.0]) * (0.6 * 0.5 + 0.6 * 0.8 * 0.5)
     close(middle, local + 0.3 * 0.5 * 0.8**4 + 0.3 * np.array([0.2, 0.4, 0.6]))

@@ -11,14 +11,16 @@ import typer
 
 from lippmann.cli.commands import view as viewing
 from lippmann.cli.shared import options
-from lippmann.cli.shared.command_options import HelpfulCommand
+from lippmann.cli.shared.command_options import HelpfulCommand, HelpfulGroup
 from lippmann.cli.shared.console import Console
 from lippmann.errors import OutputError, UsageError
 
 if TYPE_CHECKING:
     from lippmann.display.formats.monitor import Monitor
 
-calibrate = typer.Typer(help="Calibrate the pitch, slope and centre of a slanted monitor.", rich_markup_mode=None)
+calibrate = typer.Typer(
+    cls=HelpfulGroup, help="Calibrate the pitch, slope and centre of a slanted monitor.", rich_markup_mode=None
+)
 
 
 @calibrate.command("pattern", cls=HelpfulCommand)

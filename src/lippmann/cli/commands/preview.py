@@ -42,13 +42,19 @@ def preview(
     pixels: Annotated[
         str | None,
         typer.Option(
-            "--pixels", help="Width x height that the picture keeps to; 512x512 by default.", rich_help_panel="Display"
+            "--pixels",
+            metavar="WIDTHxHEIGHT",
+            help="Largest width and height of the picture. Default: 512x512.",
+            rich_help_panel="Display",
         ),
     ] = None,
     eye: Annotated[
         str | None,
         typer.Option(
-            "--eye", help="The eye's place: X,Y,Z in mm; by default in front of the middle.", rich_help_panel="Display"
+            "--eye",
+            metavar="X,Y,Z",
+            help="Position of the eye in mm: right, up, toward the viewer. Default: in front of the middle.",
+            rich_help_panel="Display",
         ),
     ] = None,
     state: options.State = None,
@@ -77,7 +83,7 @@ def preview(
     target = display_of(display, printed)
     request = RenderRequest.from_options(how, machine, placement=placement).for_file(output, bits)
     source = SceneSource(scene, asked, light, access)
-    size = check_size(parse.size(pixels or "512x512", "--pixels"))
+    size = check_size(parse.size(pixels or "512x512", "--pixels"), "pixels")
     at = eye_before(target, None if eye is None else triple(eye, "--eye"))
     with console.progress() as progress:
         started = time.perf_counter()

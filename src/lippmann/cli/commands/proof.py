@@ -22,7 +22,7 @@ def proof(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Prove a display: directions, crosstalk, depth, field, viewing zone and moire of its lenses and pixels."""
+    """Say what a display's lenses can show: directions, crosstalk, depth, field, viewing zone and moire."""
     from lippmann.display import load_display
     from lippmann.optics.proof import prove
     from lippmann.optics.proof_page import check_proof_page, write_proof_page

@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from lippmann.cli.commands.interlace import FitOption, fit_note
 from lippmann.cli.shared import options, parse
-from lippmann.cli.shared.command_options import HelpfulCommand, for_form, with_options
+from lippmann.cli.shared.command_options import HelpfulCommand, HelpfulGroup, for_form, with_options
 from lippmann.cli.shared.console import Console, add_seconds, depth_line, estimate_in_words, report
 from lippmann.cli.shared.scene_source import SceneSource, output_of, sheet_of
 from lippmann.errors import UsageError
@@ -27,7 +27,7 @@ from lippmann.wording import samples_in_words
 if TYPE_CHECKING:
     from lippmann.quilts.quilt import Quilt, QuiltLayout
 
-quilt = typer.Typer(help="Quilts: all views side by side in one picture.", rich_markup_mode=None)
+quilt = typer.Typer(cls=HelpfulGroup, help="Quilts: all views side by side in one picture.", rich_markup_mode=None)
 
 Device = Annotated[
     str,
@@ -70,7 +70,10 @@ Layout = Annotated[
 Aspect = Annotated[
     float | None, typer.Option("--aspect", help="With --layout: width over height of the displayed picture.")
 ]
-Format = Annotated[str | None, typer.Option("--format", help="png, exr or tiff; by default as the quilt is stored.")]
+Format = Annotated[
+    Literal["png", "exr", "tiff"] | None,
+    typer.Option("--format", help="Picture format. Default: as the quilt is stored."),
+]
 
 
 @quilt.command("render", cls=HelpfulCommand)
@@ -215,7 +218,7 @@ def unpack(
     quilt = read_quilt(picture, layout_of(layout, aspect))
     console.remark(*quilt.notes)
     with console.progress() as progress:
-        write_views(quilt, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
+        write_views(quilt, output, format=format, bits=bits, progress=progress)
     width, height = quilt.view_size
     result = {"output": str(output), "size": [width, height], "views": quilt.layout.views}
     console.result(result, f"{output}: {quilt.layout.views} views of {width}x{height} pixels")

@@ -33,7 +33,9 @@ Filter = Annotated[
 ]
 Size = Annotated[
     str | None,
-    typer.Option("--size", help="Size of the result, WIDTHxHEIGHT in pixels. Default: as the panel, reduced."),
+    typer.Option(
+        "--size", metavar="WIDTHxHEIGHT", help="Size of the result in pixels. Default: as the panel, reduced."
+    ),
 ]
 
 
@@ -45,13 +47,14 @@ def replay(
         str | None,
         typer.Option(
             "--eye",
-            help="Position of the eye, X,Y,Z in mm, z toward the viewer. Default: central.",
+            metavar="X,Y,Z",
+            help="Position of the eye in mm: right, up, toward the viewer. Default: in front of the middle.",
         ),
     ] = None,
     sweep: Annotated[
         bool, typer.Option("--sweep", help="Write an animation from left to right: .mp4 or .png (APNG).")
     ] = False,
-    frames: Annotated[int | None, typer.Option("--frames", help="Number of frames of the sweep; 48.")] = None,
+    frames: Annotated[int | None, typer.Option("--frames", help="Number of frames of the sweep. Default: 48.")] = None,
     width: Annotated[
         float | None,
         typer.Option(
@@ -69,7 +72,9 @@ def replay(
         typer.Option("--sbs", help="Two eyes side by side, the left one's picture on the left: full or half width."),
     ] = None,
     anaglyph: Annotated[bool, typer.Option("--anaglyph", help="Two eyes in one picture for red-cyan glasses.")] = False,
-    eyes: Annotated[float | None, typer.Option("--eyes", help="Distance between the two eyes in mm; 63.")] = None,
+    eyes: Annotated[
+        float | None, typer.Option("--eyes", help="Distance between the two eyes in mm. Default: 63.")
+    ] = None,
     rgbd: Annotated[
         Literal["full", "half", "depth"] | None,
         typer.Option(

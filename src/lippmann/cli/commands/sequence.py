@@ -279,7 +279,10 @@ def name_frames(output: Path, frames: int, ending: str = "") -> Callable[[int], 
     if frames == 1:
         return lambda number: output
     stem = output.stem.removesuffix(ending)
-    fix = f"{stem}_%04d{ending}{output.suffix}, or a folder"
+    from lippmann.image.encoding import FORMATS
+
+    picture = output.suffix if output.suffix.lower() in FORMATS else ".png"
+    fix = f"{stem}_%04d{ending}{picture}, a folder, or a film: {stem}{ending}.mp4"
     raise OutputError(f"this is one name for {frames} frames", where=str(output), fix=fix)
 
 

@@ -25,7 +25,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from lippmann.cli.shared.examples import EXAMPLES
-from lippmann.errors import LippmannError, OutputError
+from lippmann.errors import LippmannError, OutputError, UsageError
 from lippmann.options.choices import REUSING
 from lippmann.options.forms import LEFT_OUT, REUSES_NOTHING, Form
 from lippmann.options.option import Option, Options, default_of, kinds_of, options_of
@@ -63,6 +63,12 @@ _WRITTEN = frozenset({"--output", "--csv", "--map", "--maps", "--export", "--vid
 class HelpfulCommand(TyperCommand):
     """A command whose options stand in groups, those that few need left out of the first help, with examples below."""
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        if not ctx.resilient_parsing:
+            _refuse_empty(args)
+        rest: list[str] = super().parse_args(ctx, args)
+        return rest
+
     def format_options(self, ctx: Any, formatter: Any) -> None:
         known = getattr(self.callback, "options", {})
         parameters = self.get_params(ctx)
@@ -86,6 +92,16 @@ class HelpfulCommand(TyperCommand):
         if ctx.info_name not in _MAY_CHANGE:
             check_outputs((parameter.opts, ctx.params.get(parameter.name)) for parameter in self.params)
         return super().invoke(ctx)
+
+
+def _refuse_empty(words: Sequence[str]) -> None:
+    """Refuse words without a letter, which as a path would be this folder."""
+    for before, word in zip(["", *words], words, strict=False):
+        name, is_joined, value = word.partition("=")
+        if not word or (is_joined and not value and name.startswith("--")):
+            option = name or before
+            where = option if option.startswith("-") else "an argument"
+            raise UsageError("is empty", where=where, fix="give it a value, or leave it out")
 
 
 def check_outputs(values: Iterable[tuple[Iterable[str], object]]) -> None:
@@ -130,7 +146,7 @@ class HelpfulGroup(TyperGroup):
         for name in self.list_commands(ctx):
             command: Any = self.get_command(ctx, name)
             if command is not None and not command.hidden:
-                line = (command.help or "").strip().split("\n")[0]
+                line = " ".join((command.help or "").partition("\n\n")[0].split())
                 records.setdefault(command.rich_help_panel or "Commands", []).append((name, line))
         _write(formatter, records)
 

@@ -26,9 +26,9 @@ def steps(text: str, option: str) -> list[float]:
 
 def size(text: str, option: str, rule: str = "width x height in pixels, such as 512x512") -> tuple[int, int]:
     """Width and height in pixels, such as ``512x512``; or columns and rows, as ``rule`` says."""
-    match = re.fullmatch(r"(\d{1,6})[xX](\d{1,6})", text.strip())
+    match = re.fullmatch(r"(\d{1,9})[xX](\d{1,9})", text.strip())
     if match is None or "0" in (match[1].lstrip("0") or "0", match[2].lstrip("0") or "0"):
-        raise UsageError(f"'{text}' is no size", where=option, rule=rule)
+        raise UsageError(f"'{text}'", where=option, rule=f"must be {rule}")
     return int(match[1]), int(match[2])
 
 

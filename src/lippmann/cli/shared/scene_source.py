@@ -153,7 +153,9 @@ def output_of(given: Path | None, source: str | Path, ending: str) -> Path:
     if ending.startswith(".") and path.exists() and not _is_ours(path):
         if os.path.exists(source) and path.samefile(source):
             return path.with_stem(f"{path.stem}-native")
-        raise OutputError("is there, and no picture of Lippmann's", where=str(path), fix="say -o FILE")
+        raise OutputError(
+            "exists, and is no picture that Lippmann wrote", where=str(path), fix="name another file: -o FILE"
+        )
     return path
 
 

@@ -312,7 +312,7 @@ def _read_file(path: Path) -> Display:
     """The display of a TOML file, or of a Looking Glass's calibration."""
     rule = "a display is a preset's name, a TOML file or a Looking Glass's visual.json"
     text, where = read_small_text(path, _MAXIMUM_BYTES, DisplayError, rule), os.fspath(path)
-    if text.lstrip("\ufeff \t\r\n").startswith("{"):  # JSON
+    if text.lstrip("\ufeff \t\r\n").startswith("{") or path.suffix.lower() == ".json":
         return display_of_calibration(text, where=where)
     return _from_toml(text, where=where, stem=path.stem)
 

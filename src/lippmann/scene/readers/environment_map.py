@@ -62,6 +62,8 @@ def read_linear(
     SceneError
         The file is missing, damaged or neither EXR nor HDR, or has no three colours.
     """
+    if path.is_dir():
+        raise SceneError("is a folder, no picture", where=str(path), rule="OpenEXR (.exr) and Radiance (.hdr) are read")
     data, where = read_bytes(path), path.name
     if data.startswith(SIGNATURE):
         return _read_exr(path, where, check_size)

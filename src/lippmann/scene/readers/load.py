@@ -16,6 +16,7 @@ from lippmann.options.option import changed_options, takes
 from lippmann.options.outputs import AccessOptions
 from lippmann.options.scene import LoadKeywords, SceneOptions, Up
 from lippmann.options.texts import settings_of
+from lippmann.printable import shorten
 from lippmann.runtime.machine import keep_freed_memory
 from lippmann.runtime.plugins import Plugin, function_of
 from lippmann.scene.parsing.dicom_files import HEAD_LENGTH, begins_dicom, holds_dicom
@@ -545,7 +546,7 @@ def _from_object(source: object) -> Scene:
     adapter = _adapter_for(source)
     if adapter is None:
         raise UsageError(
-            f"a {type(source).__module__}.{type(source).__qualname__} is no scene",
+            f"{shorten(source)} is no scene",
             rule="a path, a bundled scene's name, or a scene of Mitsuba, trimesh or PyVista is",
         )
     description = adapter(source)

@@ -52,7 +52,7 @@ def notes_of(engine, real_blender, pictures):
         with pytest.MonkeyPatch.context() as patch:
             patch.setenv(VARIABLE, real_blender)
             scene = api.load_scene(path.with_suffix(".blend"))
-        seen = api.preview(scene, (width, height), camera="Camera", **options).pixels
+        seen = api.preview(scene, size=(width, height), camera="Camera", **options).pixels
         assert seen.mean(axis=(0, 1)) == pytest.approx(cycles.mean(axis=(0, 1)), rel=0.05)
         # Red light on red surfaces is a quarter brighter where it is multiplied in Rec. 709 than in ACEScg.
         assert off_share(seen, cycles) < (0.05 if name == "working_space" else 0.01)

@@ -72,7 +72,7 @@ def test_a_room_is_looked_into_from_outside_and_lit_from_there(writer, tmp_path,
     box(writer, 1, faces, **matte(0.5, 0.5, 0.5))
     box(writer, 0.4, INWARD[:, ::-1], **matte(0.8, 0.05, 0.05))
     (tmp_path / "room.glb").write_bytes(writer.glb())
-    pixels = lippmann.preview(tmp_path / "room.glb", (20, 20), spp=16, denoise="none").pixels
+    pixels = lippmann.preview(tmp_path / "room.glb", size=(20, 20), spp=16, denoise="none").pixels
     red, green, _ = pixels[8:12, 8:12].mean(axis=(0, 1))
     assert red > 0.1
     assert (red > 3 * green) == is_open

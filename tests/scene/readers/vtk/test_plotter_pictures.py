@@ -32,7 +32,7 @@ def windows(tmp_path_factory):
 def test_pictures_are_those_of_the_plotter(engine, windows, name):
     plotter = make(name)
     try:
-        seen = api.preview(plotter, SIZE, camera="plotter", spp=1, pixel_filter="point", tone_map="none")
+        seen = api.preview(plotter, size=SIZE, camera="plotter", spp=1, pixel_filter="point", tone_map="none")
     finally:
         plotter.close()
     codes = np.round(255 * encode_srgb(np.clip(seen.pixels, 0, 1)))

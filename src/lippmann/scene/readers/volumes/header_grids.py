@@ -78,6 +78,8 @@ def read_header_grid(path: Path, *, files: NamedFiles) -> SceneDescription:
     where, data = path.name, read_bytes(path)
     is_nrrd = data.startswith(b"NRRD")
     end = re.search(rb"\r?\n\r?\n" if is_nrrd else rb"ElementDataFile[^\n]*\n?", data[:_MOST_HEADER])
+    if end is None and not is_nrrd:
+        raise SceneError("is no volume", where=where, rule="NRRD begins with NRRD, MetaImage names its ElementDataFile")
     text = data[: end.end() if end else _MOST_HEADER].decode("latin-1")
     entries = {match[1].lower(): match[2] for line in text.splitlines() if (match := _LINE.fullmatch(line))}
     try:
