@@ -14,8 +14,8 @@ from lippmann.scene.parsing.files import MissingFileError
 from lippmann.scene.parsing.texture_maps import resize, unit
 from lippmann.scene.values.description import Image, Matrix
 
-#: What stands in a name for a tile's number.
-_MARK = re.compile("<UDIM>", re.IGNORECASE)
+#: What stands in a name for a tile's number, or (MaterialX, Mudbox) for ``u1_v1``.
+_MARK = re.compile(r"<UDIM>|%\(UDIM\)d|<UVTILE>", re.IGNORECASE)
 _FIRST, _LAST, _ACROSS = 1001, 1100, 10
 
 
@@ -44,12 +44,18 @@ def read_tiles(name: str, read: Callable[[Callable[[str], str]], Image]) -> Tile
     tiles, missing = {}, None
     for number in range(_FIRST, _LAST + 1):
         try:
-            tiles[number - _FIRST] = read(partial(_MARK.sub, str(number)))
+            tiles[number - _FIRST] = read(partial(_of_tile, number))
         except MissingFileError as error:
             missing = missing or error
     if not tiles and missing:
         raise missing
     return _joined(name, tiles)
+
+
+def _of_tile(number: int, name: str) -> str:
+    """The name of a tile's file."""
+    row, column = divmod(number - _FIRST, _ACROSS)
+    return _MARK.sub(lambda mark: f"u{column + 1}_v{row + 1}" if "uv" in mark[0].lower() else str(number), name)
 
 
 def _joined(name: str, tiles: Mapping[int, Image]) -> TiledImage:

@@ -118,9 +118,13 @@ def test_a_colour_texture(read):
     assert place == {(0, 0, 0): [0, 1], (1, 0, 0): [1, 1], (0, 1, 0): [0, 0]}
 
 
-def test_a_texture_in_tiles(read):
-    body = surface("color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>", texture(file="tex/t.<UDIM>.png"))
-    files = {"tex/t.1001.png": png([[[255, 0, 0]]]), "tex/t.1012.png": png([[[0, 0, 255]]])}
+@pytest.mark.parametrize(
+    ("mark", "first", "other"),
+    [("<UDIM>", "1001", "1012"), ("%(UDIM)d", "1001", "1012"), ("<UVTILE>", "u1_v1", "u2_v2")],
+)
+def test_a_texture_in_tiles(read, mark, first, other):
+    body = surface("color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>", texture(file=f"tex/t.{mark}.png"))
+    files = {f"tex/t.{first}.png": png([[[255, 0, 0]]]), f"tex/t.{other}.png": png([[[0, 0, 255]]])}
     scene = read(body, files=files)
     found = scene.materials[0].base_color_texture
     assert (found.wrap_u, found.wrap_v) == ("clamp", "clamp")
