@@ -72,6 +72,8 @@ def test_without_certificates_dasks_own_configuration_counts(tmp_path):
     with dask.config.set({"distributed.comm.require-encryption": True}):
         assert TlsFiles().security().require_encryption
     assert not TlsFiles().security().require_encryption
+    with pytest.raises(UsageError, match="tls_ca: is missing; tls:// goes by certificates"):
+        TlsFiles().security("tls://127.0.0.1:8786")
 
 
 def test_without_dask_it_is_said_how_to_get_it(monkeypatch):

@@ -63,20 +63,27 @@ class TlsFiles:
         """The three files by the names of the parameters that they come from."""
         return {"tls_ca": self.ca, "tls_cert": self.certificate, "tls_key": self.key}
 
-    def security(self) -> Security:
-        """``distributed.Security`` with these files, or with those of Dask's configuration.
+    def security(self, address: str = "") -> Security:
+        """``distributed.Security`` for ``address`` with these files, or with those of Dask's configuration.
 
         Raises
         ------
         UsageError
-            If one of the three is not given, or a file does not exist.
+            If one of the three is not given, or a file does not exist; the address is ``tls://``, and neither are there
+            files nor does Dask's configuration name any.
         ClusterError
             If Dask is not installed.
         """
         files = self.options()
         distributed = import_distributed()
         if not any(files.values()):
-            return distributed.Security()
+            configured = distributed.Security()
+            if urlsplit(address).scheme == "tls" and not configured.tls_ca_file:
+                rule = "tls:// goes by certificates: tls_ca=..., tls_cert=... and tls_key=..."
+                raise UsageError(
+                    "is missing", parameter="tls_ca", rule=rule, fix="or name them in Dask's configuration"
+                )
+            return configured
         for name, path in files.items():
             if path is None:
                 rule = "tls_ca=..., tls_cert=... and tls_key=... go together"

@@ -111,7 +111,7 @@ def connect(
             yield Cluster(client, roster, f"local:{target.local}", remark)
         return
     assert target.address is not None
-    security = tls.security()
+    security = tls.security(target.address)
     # Before connecting: whoever listens there can send code as soon as the connection is open.
     warn_of_exposure(target.address, security, remark)
     check_reachable(target.address, tls.ca, tls.certificate, tls.key)
@@ -169,6 +169,8 @@ def _started_here(distributed: Any, count: int, threads: int | None) -> Iterator
                     parameter="cluster",
                     fix="run it again, with fewer workers if memory is short",
                 ) from None
+        # Dask's own attempt at the end of the program would be another one, and a traceback where it fails, too.
+        cluster.shutdown_on_close = False
         stack.callback(_in_time, cluster.close)
         client = distributed.Client(cluster, set_as_default=False, name="lippmann")
         stack.callback(_in_time, client.close)

@@ -98,7 +98,7 @@ def serve(options: WorkerOptions, *, quiet: bool = False, remark: Callable[[str]
         os.environ.setdefault("DASK_DISTRIBUTED__LOGGING__DISTRIBUTED", "error")
     distributed = import_distributed()
     drop_tracebacks()
-    security = options.tls.security()
+    security = options.tls.security(options.address)
     warn_of_exposure(options.address, security, remark)
     with private_scratch() as folder, spawn_safely():
         asyncio.run(_serve(distributed, options, security, folder))
