@@ -301,3 +301,20 @@ def test_damaged_paint(read, paint):
     main = model(solid(1, f'v1="0" v2="1" v3="2" paint_color="{paint}"'))
     with pytest.raises(SceneError, match="a painted triangle is damaged"):
         read(main, **{"Metadata/project_settings.config": FILAMENTS})
+
+
+@pytest.mark.parametrize(
+    "settings",
+    ["{", "[]", "[" * 100_000, '{"filament_colour": 3}', '{"filament_colour": [3]}', '{"filament_colour": ["red"]}'],
+)
+def test_damaged_filaments(read, settings):
+    with pytest.raises(SceneError, match=r"^a\.3mf: its slicer's filaments are damaged"):
+        read(model(solid(1)), **{"Metadata/project_settings.config": settings})
+
+
+def test_numbers_of_filaments_that_nobody_has(read):
+    pieces = '<config><object id="1"><metadata key="extruder" value="{}"/></object></config>'
+    for number in (9 * 10**30, -4, 99):
+        settings = {"Metadata/project_settings.config": FILAMENTS}
+        settings["Metadata/model_settings.config"] = pieces.format(number)
+        assert read(model(solid(1)), **settings).meshes[0].colors[0].tolist() == [1, 0, 0, 1]

@@ -22,6 +22,9 @@ _BAMBU, _BAMBU_PIECES = "Metadata/project_settings.config", "Metadata/model_sett
 #: Kinds of pieces that are printed as they stand; all others modify, support, or are cut away.
 _PRINTED = {"normal_part", "ModelPart"}
 
+#: Filaments of a project, and digits of the paint of a triangle, at most.
+_MOST_FILAMENTS, _LONGEST_PAINT = 1 << 16, 1 << 16
+
 #: A triangle in a triangle: a row of three weights for each of its corners.
 Corners = NDArray[np.float64]
 
@@ -65,7 +68,7 @@ def read_project(package: Package) -> SlicerProject:
             package.parse(name, _Pieces(project).begin)
     try:
         project.colors = [code_of_color(text) for text in _filaments(package)]
-    except (ValueError, TypeError, AttributeError) as error:
+    except (ValueError, TypeError, AttributeError, RecursionError) as error:
         raise SceneError(f"its slicer's filaments are damaged ({error})", where=package.where) from None
     return project
 
@@ -108,7 +111,7 @@ class _Pieces:
         elif tag == "metadata":
             key, value = given.get("key"), given.get("value", "")
             if key == "extruder":
-                self._piece.filament = int(value) or self._object.filament
+                self._piece.filament = min(max(int(value), 0), _MOST_FILAMENTS) or self._object.filament
             elif key == "volume_type":
                 self._piece.is_printed = value in _PRINTED
             elif key == "modifier" and value == "1":
@@ -128,6 +131,8 @@ def painted(text: str) -> tuple[tuple[Corners, int], ...]:
     ValueError
         The text ends too early, or has other letters.
     """
+    if len(text) > _LONGEST_PAINT:
+        raise ValueError(f"{len(text)} digits")
     return tuple(_parts([int(digit, 16) for digit in reversed(text)]))
 
 
