@@ -333,7 +333,7 @@ def test_what_shows_nothing_is_refused_in_one_line(tmp_path):
 
 
 def compress(path):
-    """The file's pixels as JPEG XL's, which no decoder of pydicom's own reads."""
+    """The file's pixels as those of high-throughput JPEG 2000, which nothing installed decodes."""
     import pydicom
     from pydicom.encaps import encapsulate
 
@@ -341,10 +341,30 @@ def compress(path):
     data.PixelData = encapsulate([b"\xff\xd8\xff\xd9"])
     data["PixelData"].is_undefined_length = True
     data["PixelData"].VR = "OB"
-    data.file_meta.TransferSyntaxUID = (
-        pydicom.uid.JPEGXL if hasattr(pydicom.uid, "JPEGXL") else "1.2.840.10008.1.2.4.80"
-    )
+    data.file_meta.TransferSyntaxUID = pydicom.uid.HTJ2K
     data.save_as(path)
+
+
+@pytest.mark.parametrize("syntax", ["JPEGLossless", "JPEGLosslessSV1", "JPEGLSLossless"])
+@pytest.mark.parametrize("lowest", [0, -1024])
+def test_lossless_jpeg_as_archives_of_clinics_keep_it(tmp_path, syntax, lowest):
+    import imagecodecs
+    import pydicom
+    from pydicom.encaps import encapsulate
+
+    pixels = np.arange(lowest, lowest + 20, dtype=np.int16).reshape(4, 5)
+    path = tmp_path / "a.dcm"
+    save_slice(path, pixels, BitsStored=12, HighBit=11, PixelRepresentation=int(lowest < 0))
+    data, codes = pydicom.dcmread(path), pixels.astype(np.uint16) & 4095
+    if syntax == "JPEGLSLossless":
+        coded = imagecodecs.jpegls_encode(codes)
+    else:
+        coded = imagecodecs.jpeg8_encode(codes, lossless=True, bitspersample=12)
+    data.PixelData = encapsulate([coded])
+    data["PixelData"].is_undefined_length = True
+    data.file_meta.TransferSyntaxUID = getattr(pydicom.uid, syntax)
+    data.save_as(path)
+    assert (load_scene(path).description.volume.grid[0] == pixels).all()
 
 
 def test_an_unknown_compression_is_named(tmp_path):
@@ -361,7 +381,10 @@ def test_a_slice_of_an_unknown_compression_is_left_out_of_its_series(tmp_path):
     compress(path)
     scene = load_scene(tmp_path / "ct")
     assert scene.description.volume.grid[:, 1, 0].tolist() == [0, 30, 60, 90]
-    assert any("1 of 4 files is left out: 1 compressed as JPEG" in each and path.name in each for each in scene.notes)
+    assert any(
+        "1 of 4 files is left out: 1 compressed as High-Throughput JPEG 2000" in each and path.name in each
+        for each in scene.notes
+    )
 
 
 def test_links_in_a_folder_are_left_alone(tmp_path):

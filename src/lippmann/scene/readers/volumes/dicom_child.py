@@ -15,6 +15,7 @@ import pydicom
 
 from lippmann.runtime.helper_process import limit_memory, serve
 from lippmann.scene.parsing.dicom_files import MOST_FILES, fault_of, files_in
+from lippmann.scene.readers.volumes.dicom_decoders import add_decoders
 from lippmann.scene.readers.volumes.dicom_slices import (
     Frame,
     SeriesError,
@@ -43,6 +44,7 @@ _TIMES = (0x00181063, 0x00181065)
 
 def main() -> None:
     """Answer requests, JSON with ``path``, ``series`` and ``memory``, by JSON after its length and a grid's bytes."""
+    add_decoders()
     serve(_answer)
 
 
