@@ -66,7 +66,7 @@ def depth_codes(distance: FloatArray, near: float, far: float, bits: int, white:
     """Codes ``(h, w)`` of distances, linear in inverse depth from ``near`` to ``far``."""
     span = 1.0 / near - 1.0 / far
     # All that is seen may be at one distance; what is not is at infinity.
-    share = (1.0 / distance.astype(np.float64) - 1.0 / far) / span if span else np.isfinite(distance)
+    share = (1.0 / distance.astype(np.float64) - 1.0 / far) / span if span else np.isfinite(distance).astype(np.float64)
     share = np.clip(share, 0.0, 1.0)
     values: FloatArray = (share if white == "near" else 1.0 - share).astype(np.float32)
     return quantize(values, bits, "linear")
