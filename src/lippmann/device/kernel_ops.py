@@ -27,27 +27,21 @@ from lippmann.color.transfer import (
 )
 from lippmann.device.types import Array, Bool, Color3f, FloatOrColor, UInt32
 
-#: A multiple of the lanes of any processor's vectors.
-_PACKET = 64
-
 
 def upload(values: NDArray[Any]) -> Array:
     """A flat table on the device in memory of its own: Float, Int32 or UInt32 by the type of ``values``.
 
-    On the CPU Dr.Jit reads a NumPy array where it lies. It is not aligned there as packets of loads need it, so every
-    look-up of a row would become one slow gather a column. And the last packet reads on beyond its end, which crashes
-    where that is the end of a page; so what is read is filled up to whole packets.
+    On the CPU Dr.Jit would read a NumPy array where it lies. It is not aligned there as packets of loads need it, so
+    every look-up of a row would become one slow gather a column. And the last packet reads on beyond its end, which
+    crashes where that is the end of a page. So the values are copied to memory that Dr.Jit allocates.
     """
     kinds = {"f": (mi.Float, np.float32), "i": (mi.Int32, np.int32), "u": (mi.UInt32, np.uint32)}
     device_type, dtype = kinds[values.dtype.kind]
-    filled = np.zeros(-(-values.size // _PACKET) * _PACKET, dtype)
-    filled[: values.size].reshape(values.shape)[...] = values
-    table = device_type(filled)
-    if values.size:
-        # Something is added, as Dr.Jit would hand over the array itself where all of it is asked for.
-        table = dr.gather(device_type, table, dr.arange(mi.UInt32, values.size)) + dr.opaque(device_type, 0)
-        dr.eval(table)
-        dr.sync_thread()  # what is read is freed
+    on_cpu = dr.backend_v(device_type) == dr.JitBackend.LLVM
+    table = dr.empty(device_type, values.size) if on_cpu else device_type(values.astype(dtype).ravel())
+    dr.sync_thread()  # kernels may still use the memory that is written; and what was read is freed
+    if on_cpu:
+        np.asarray(table).reshape(values.shape)[...] = values
     return table
 
 
