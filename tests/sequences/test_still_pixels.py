@@ -143,6 +143,25 @@ def test_two_probes_that_change_leave_no_patch_but_an_even_change_is_found():
     is_still = _find_still(key, replace(key, probes=np.where(column[..., None] < 20, 0.9, 1) * probes), job)
     assert not is_still[:, :18].any()
     assert is_still[:, 29:].all()
+    # Beside another surface light is taken to change, as far as probes are averaged.
+    is_still = _find_still(key, replace(key, features=np.where(column < 20, 1.0, 0.0)), job)
+    assert not is_still[:, :28].any()
+    assert is_still[:, 28:].all()
+
+
+def test_another_window_finds_each_pixels_own_sub_pixels():
+    from lippmann.sequences.still_pixels import _Picture
+
+    whole = np.arange(6.0 * 3 * 8).reshape(6, 24)  # 8 pixels of 3 sub-pixels in a row
+    key = _Picture(PixelWindow(10, 20, 8, 6), np.repeat(whole[..., None], 3, axis=2), whole, whole[..., None])
+    part = key.crop(PixelWindow(13, 18, 7, 4), 3)
+    assert part.features.shape == (4, 21)
+    assert np.isnan(part.features[:2]).all()
+    assert np.isnan(part.features[:, 15:]).all()
+    np.testing.assert_array_equal(part.features[2:, :15], whole[:2, 9:])
+    np.testing.assert_array_equal(part.pixels[2:, :15, 0], whole[:2, 9:])
+    np.testing.assert_array_equal(part.probes[2:, :15, 0], whole[:2, 9:])
+    assert np.isnan(key.crop(PixelWindow(40, 20, 8, 6), 3).pixels).all()
 
 
 def test_surfaces_that_no_light_reaches_stay_as_they_are(display):
