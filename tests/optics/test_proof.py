@@ -12,7 +12,7 @@ from lippmann.display import list_displays, load_display
 from lippmann.display.lens_profile import LensProfile
 from lippmann.display.pixel_aperture import PixelAperture
 from lippmann.optics.fitting import gap_of
-from lippmann.optics.moire import moire_waves
+from lippmann.optics.moire import _spread, moire_waves
 from lippmann.optics.proof import is_print, prove
 
 SHORT = "print:lpi=60,ppi=720,size=50x30mm,thickness=26mil"
@@ -124,6 +124,14 @@ def test_dark_lines_make_moire():
     assert bled / plain == pytest.approx(math.exp(-2 * (math.pi / 5) ** 2))
     blurred = moire_waves(replace(panel, lens=LensProfile(2.0, 1.5)))
     assert max((wave.contrast for wave in blurred), default=0) < max(wave.contrast for wave in waves)
+
+
+def test_micro_lenses_blur_waves_alike_up_and_across():
+    array = replace(load_display("mla-square"), lens=LensProfile(1.2, 3.0, 1.5))
+    share = _spread(array)
+    frequency = 0.3 / array.panel.pixel_pitch
+    assert 0.1 < share(frequency, 0.0) < 0.9
+    assert share(0.0, frequency) == pytest.approx(share(frequency, 0.0), abs=1e-3)
 
 
 @pytest.mark.parametrize("layout", ["mla-square", "mla-hexagonal"])

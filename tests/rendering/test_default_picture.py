@@ -79,14 +79,14 @@ class TestCompressedDepth:
         assert (apart > 2e-3 * max(np.abs(second).max(), 1.0)).mean() < 2e-3  # rays that graze an edge
 
     @pytest.mark.slow
-    @pytest.mark.parametrize("method", ["lens-view", "interpolated", "pooled"])
-    def test_methods_that_share_points_show_what_full_rendering_shows(self, scenes, method):
+    def test_methods_that_share_points_show_what_full_rendering_shows(self, scenes):
         compressed, _ = scenes
         asked = {"display": lenticular(), "placement": PLACED, "integrator": "direct", "spp": 16, "tone_map": "none"}
         full = lippmann.render(compressed, method="full", **asked).pixels
-        shared = lippmann.render(compressed, method=method, **asked).pixels
-        error = np.mean((encode_srgb(full) - encode_srgb(shared)) ** 2)
-        assert -10 * np.log10(error) > 30
+        for method in ("lens-view", "interpolated", "pooled"):
+            shared = lippmann.render(compressed, method=method, **asked).pixels
+            error = np.mean((encode_srgb(full) - encode_srgb(shared)) ** 2)
+            assert -10 * np.log10(error) > 30, method
 
     def test_the_layers_of_a_picture(self, scenes):
         compressed, flat = scenes

@@ -67,6 +67,13 @@ def test_distance_is_from_the_eye_and_infinite_where_nothing_is_hit(slope):
     assert middle[-1] < 590 < 620 < middle[0]
 
 
+def test_depth_of_a_film_is_coded_between_the_same_ends_in_each_frame(slope):
+    seen = visible_distance(slope, EYE, (64, 64))
+    wide = rgbd_codes(slope, RgbdForm(), EYE, between=(400.0, 900.0), size=(64, 64))[:, 64:]
+    np.testing.assert_array_equal(wide[..., 0], depth_codes(seen, 400.0, 900.0, 8, "near"))
+    assert wide.max() < rgbd_codes(slope, RgbdForm(), EYE, size=(64, 64))[:, 64:].max()
+
+
 @pytest.mark.parametrize("bits", [8, 16])
 @pytest.mark.parametrize("form", [RgbdForm(), RgbdForm(half=True), RgbdForm(white="far"), RgbdForm(True, "far")])
 @pytest.mark.parametrize("kind", [".png", ".tif"])

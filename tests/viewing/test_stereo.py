@@ -94,6 +94,9 @@ def test_grey_stays_grey_in_an_anaglyph_and_each_eye_sees_its_own():
     assert cyan[0] == 0
     assert cyan[1:].min() > 0.95
     assert anaglyph(white * 50, black).max() <= 1
+    # Light that a display cannot show adds to no other colour.
+    np.testing.assert_array_equal(anaglyph(white * 50, white), anaglyph(white, white))
+    np.testing.assert_array_equal(anaglyph(white, white * 50), anaglyph(white, white))
 
 
 def test_the_anaglyph_s_matrices_are_the_least_squares_solution():

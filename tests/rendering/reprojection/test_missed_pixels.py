@@ -20,7 +20,7 @@ def thinned(row, known=()):
     points = PointImage.empty(row + 1, len(LENS))
     points.status[row] = QUEUED
     points.status[row, list(known)] = TRACED
-    lens = np.broadcast_to(LENS, points.status.shape)
+    lens = np.tile(LENS, (len(points.status), 1))
     thin_out(row, row + 1, points, lens, choose_rules(careful=False, coded=False))
     return points, lens
 

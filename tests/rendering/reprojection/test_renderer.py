@@ -26,8 +26,15 @@ class Case:
         self.display_from_world = np.linalg.inv(world)
         self.integrator = WhittedIntegrator(build_classic(bundled.make_classic(name)), 2)
         self.source = DisplayRays(self.display, world)
+        self._full = {}
 
     def full(self, samples=1):
+        """Frame of the full renderer, traced once."""
+        if samples not in self._full:
+            self._full[samples] = self._trace_full(samples)
+        return self._full[samples]
+
+    def _trace_full(self, samples):
         from lippmann.rendering.film.memory_model import cut_wavefronts
         from lippmann.rendering.film.sample_batches import FullInBatches
         from lippmann.rendering.film.wavefront import Frame, trace_frame
@@ -157,10 +164,9 @@ def test_what_a_frame_tells(case):
 @pytest.mark.slow
 @pytest.mark.parametrize("careful", [True, False])
 def test_threads_do_not_matter(case, careful):
-    made = [case("room").reused(careful=careful, threads=threads) for threads in (1, 2, 3)]
-    for other in made[1:]:
-        assert np.array_equal(made[0].pixels, other.pixels)
-        assert np.array_equal(made[0].maps["status"], other.maps["status"])
+    made = [case("room").reused(careful=careful, threads=threads) for threads in (1, 3)]
+    assert np.array_equal(made[0].pixels, made[1].pixels)
+    assert np.array_equal(made[0].maps["status"], made[1].maps["status"])
 
 
 def test_small_wavefronts_make_the_same_picture(case):

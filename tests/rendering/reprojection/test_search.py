@@ -26,7 +26,7 @@ def the_field():
     from lippmann.display.lens_field import LensField
 
     edges = np.arange(LENSES + 1) * WIDE
-    lens = np.broadcast_to(np.repeat(np.arange(LENSES, dtype=np.int32), WIDE), (HEIGHT, LENSES * WIDE))
+    lens = np.tile(np.repeat(np.arange(LENSES, dtype=np.int32), WIDE), (HEIGHT, 1))
     center = np.stack([edges[:-1] + (WIDE - 1) / 2, np.zeros(LENSES)], axis=1)
     return LensField(lens, center, LENSES)
 
