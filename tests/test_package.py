@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from pathlib import Path
 
@@ -47,3 +48,10 @@ def test_each_public_name_leads_to_what_it_names():
         assert getattr(plugins, name).__name__ == name
     with pytest.raises(AttributeError, match=r"module 'lippmann\.plugins' has no attribute 'Nothing'"):
         _ = plugins.Nothing
+
+
+def test_the_help_of_each_function_says_what_it_returns():
+    functions = [each for each in (getattr(lippmann, name) for name in lippmann.__all__) if inspect.isfunction(each)]
+    assert len(functions) > 10
+    silent = [each.__name__ for each in functions if not re.search(r"\n\s*(Returns|Yields)\n\s*---", each.__doc__)]
+    assert silent == []

@@ -1,5 +1,19 @@
 """Lippmann renders 3D scenes into the native pixels of integral-imaging (light-field) displays.
 
+::
+
+    import lippmann
+
+    lippmann.preview("model.glb", "looking-glass-portrait").pixels  # what the display will show, in seconds
+    image = lippmann.render("model.glb", "looking-glass-portrait", placement={"turn": (20, 15)})
+    image.save("model.png")  # the panel's native pixels
+    image.replay((0.0, 0.0, 600.0))  # what an eye sees that is 600 mm in front of the panel
+
+:func:`load_scene` takes a scene's own options (``up``, ``environment``, ``background``, ``light``), and
+:func:`load_display` the names that :func:`list_displays` lists. Lengths are millimetres, +x to the right, +y up and +z
+toward the viewer. Pictures are ``(H, W, 3)`` float32 linear RGB, row 0 on top. Whatever is wrong is a
+:class:`LippmannError` of one line.
+
 Importing this package does no work: the names below are loaded when they are first used.
 """
 

@@ -73,7 +73,7 @@ def test_options_choose_splats(lippmann, engine, scan, tmp_path):
     [
         (["--crop", "1,2,3"], "--crop"),
         (["--crop", "9,9,9,8,8,8"], "--crop: "),
-        (["--unit-scale", "0"], "--unit-scale: 0; a factor from "),
+        (["--unit-scale", "0"], "--unit-scale: 0; must be a factor from "),
         (["--min-opacity", "2"], "--min-opacity: 2; a number from 0 to 1"),
         (["--method", "lens-view"], "--method: lens-view shares the light of surfaces"),
         (["--denoise", "oidn"], "--denoise: oidn goes by the edges of surfaces"),

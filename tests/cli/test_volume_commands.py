@@ -54,7 +54,7 @@ def test_options_change_what_is_seen(lippmann, engine, scan, tmp_path):
     [
         (["--window", "3"], "--window: '3'; must be 2 numbers"),
         (["--transfer-function", "bone"], "unknown preset 'bone', did you mean"),
-        (["--series", "2"], "holds no several volumes"),
+        (["--series", "2"], "has no series to choose from"),
         (["--denoise", "oidn"], "this scene has a volume, and light that lies on none"),
         (["--method", "lens-view"], "lens-view shares the light of surfaces"),
     ],

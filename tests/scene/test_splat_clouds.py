@@ -126,7 +126,7 @@ def test_a_choice_of_splats_is_made_in_order():
     [
         ({"crop": (0, 0, 0, 1, 0, 1)}, "crop: .*lowest corner"),
         ({"crop": (9, 9, 9, 10, 10, 10)}, "crop: leaves no Gaussian splat"),
-        ({"unit_scale": 0.0}, "unit_scale: 0; a factor from "),
+        ({"unit_scale": 0.0}, "unit_scale: 0; must be a factor from "),
         ({"unit_scale": float("nan")}, "unit_scale: nan"),
         ({"unit_scale": 1e9}, None),
         ({"min_opacity": 1.5}, "min_opacity: 1.5; a number from 0 to 1"),

@@ -172,6 +172,11 @@ def read_picture(path: str | Path, *, display: Display | str | PathLike[str] | N
         Display of the picture, or what :func:`lippmann.display.load_display` takes, instead of the one in the file;
         required for files of other programs.
 
+    Returns
+    -------
+    IntegralImage
+        With ``.pixels`` ``(H, W, 3)`` float32 linear RGB, row 0 on top, and the file's layers in ``.maps``.
+
     Raises
     ------
     PictureError

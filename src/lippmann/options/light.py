@@ -15,7 +15,7 @@ _STRENGTH: dict[str, Any] = {
     "metavar": "FACTOR",
     "low": 0.0,
     "high": MOST_STRENGTH,
-    "rule": f"a factor from 0 to {MOST_STRENGTH:g}",
+    "rule": f"must be a factor from 0 to {MOST_STRENGTH:g}",
 }
 
 
@@ -52,7 +52,7 @@ class LightOptions(Options):
         "Turn light from far away, degrees to the right and up: the environment, the studio, directional lights.",
         first=True,
         metavar="AZIMUTH[,ELEVATION]",
-        rule="two finite angles in degrees",
+        rule="must be two finite angles in degrees",
         read=texts.light_turn,
     )
     light_strength: float = _light(1.0, "Factor on the scene's own light sources.", **_STRENGTH)

@@ -51,7 +51,7 @@ class SplatSelection:
     def __post_init__(self) -> None:
         check_crop(self.crop)
         if self.unit_scale is not None and not 1 / _LARGEST_FACTOR <= self.unit_scale <= _LARGEST_FACTOR:
-            rule = f"a factor from {1 / _LARGEST_FACTOR:g} to {_LARGEST_FACTOR:g}"
+            rule = f"must be a factor from {1 / _LARGEST_FACTOR:g} to {_LARGEST_FACTOR:g}"
             raise UsageError(f"{self.unit_scale:g}", parameter="unit_scale", rule=rule)
         if self.min_opacity is not None and not 0.0 <= self.min_opacity <= 1.0:
             raise UsageError(f"{self.min_opacity:g}", parameter="min_opacity", rule="a number from 0 to 1")

@@ -221,6 +221,16 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
     ``lkg-portrait``, and by what its device is called, such as ``Looking Glass Go`` or ``27 inch landscape``.
     ``bridge`` is the panel that Looking Glass Bridge finds on this machine, ``bridge:SERIAL`` one of several.
 
+    Parameters
+    ----------
+    name_or_path:
+        Such a name, a file, or a short form such as ``print:lpi=60,ppi=720,size=20x10cm``.
+
+    Returns
+    -------
+    Display
+        With its lengths in millimetres.
+
     Raises
     ------
     DisplayError
@@ -287,6 +297,11 @@ def _of_plugin(name: str, path: Path) -> Display | None:
 
 def list_displays() -> list[Display]:
     """All presets, by name.
+
+    Returns
+    -------
+    list of Display
+        Those of this package in the order of their names, then those of plugins.
 
     Examples
     --------

@@ -151,6 +151,11 @@ def load_scene(
     **options:
         Fields of :class:`~lippmann.options.scene.SceneOptions`, and ``allow_outside``.
 
+    Returns
+    -------
+    Scene
+        Its ``.notes`` say what the file has and is not shown; ``.bounds`` is its box in world units.
+
     Raises
     ------
     SceneError
@@ -379,7 +384,7 @@ def _check_options(source: str | Path, suffix: str, asked: SceneOptions) -> None
     has_none: dict[ReaderOption, str] = {
         "variants": f"{name} has no variants",
         "depth_map": f"{name} is no photograph",
-        "series": f"{name} holds no several volumes",
+        "series": f"{name} has no series to choose from",
     }
     for option, what in has_none.items():
         if getattr(asked, option):
