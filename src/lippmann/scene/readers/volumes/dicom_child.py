@@ -255,8 +255,9 @@ def _fill(frames: list[Frame], lost: dict[str, list[str]], memory: int) -> tuple
         raise next(iter(damaged.values()))
     if damaged:
         for name, error in damaged.items():
-            is_packed = isinstance(error, SeriesError)  # others of the series are not, or in a way that is decoded
-            kind = error.said["error"].removeprefix("its pixels are ") if is_packed else "damaged"
+            kind = "damaged"
+            if isinstance(error, SeriesError):  # packed in a way that nothing here decodes, as others are not
+                kind = error.said["error"].removeprefix("its pixels are ")
             lost.setdefault(kind, []).append(name)
         return _fill([frame for frame in frames if frame.file not in damaged], lost, memory)
     if stack.places is not None:
