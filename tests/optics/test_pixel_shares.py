@@ -45,6 +45,15 @@ def test_a_lens_shows_the_pixel_of_its_direction():
     np.testing.assert_allclose(seen[0], expected, atol=0.35)
 
 
+def test_a_sub_pixel_to_the_right_is_seen_that_much_sooner():
+    columns = np.arange(SHEET.panel.width, dtype=float)[None]
+    slopes = np.full(len(LENSES), 0.1)
+    middle, third, whole = (pixel_shares(SHEET, LENSES, slopes, offset) for offset in (0.0, 1 / 3, 1.0))
+    np.testing.assert_array_equal(whole.first, middle.first - 1)
+    np.testing.assert_allclose(whole.shares, middle.shares, atol=1e-9)
+    np.testing.assert_allclose(middle.gather(columns) - third.gather(columns), 1 / 3, atol=0.1)
+
+
 @pytest.mark.parametrize("name", ["seed-lenticular", "mla-square"])
 def test_displays_without_such_a_lens_are_named(name):
     with pytest.raises(DisplayError, match="gives no lens"):
