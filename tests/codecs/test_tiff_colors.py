@@ -71,6 +71,13 @@ def test_lab_is_that_of_little_cms(tmp_path, bits):
         )  # whole numbers of L*, a* and b* are coarse, and LittleCMS's tables more so
 
 
+def test_cmyk_in_jpeg(tmp_path):
+    inks = np.tile(np.array([0, 160, 230, 20], np.uint8), (32, 32, 1))
+    plain = read(written(tmp_path / "a.tif", inks, photometric="separated"))
+    packed = read(written(tmp_path / "b.tif", inks, photometric="separated", compression="jpeg"))
+    assert np.abs(packed.astype(int) - plain).max() <= 3
+
+
 def test_cmyk(tmp_path):
     inks = Image.fromarray(RGB).convert("CMYK")
     inks.save(tmp_path / "a.tif")

@@ -19,6 +19,7 @@ _WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE, _CMYK, _YCBCR, _CIELAB, _ICCLAB 
 _ASSOCIATED = 1
 #: JPEG and old JPEG, whose decoders give RGB for YCbCr.
 _JPEG = (6, 7, 34892, 33007)
+_PLAIN_JPEG = 7
 #: XYZ of the white of L*a*b*, D50, and where its curve is a line.
 _D50, _LINE = np.array([0.9642, 1.0, 0.8249]), 6.0 / 29.0
 
@@ -44,7 +45,8 @@ def check_colors(page: Any) -> None:
 
 def is_cmyk(page: Any) -> bool:
     """Whether the page's colours are of four inks, which :func:`gray_or_rgb` makes sRGB."""
-    return int(page.photometric) == _CMYK and page.samplesperpixel >= 4 and int(page.compression) not in _JPEG
+    keeps_inks = int(page.compression) not in _JPEG or int(page.compression) == _PLAIN_JPEG
+    return int(page.photometric) == _CMYK and page.samplesperpixel >= 4 and keeps_inks
 
 
 def stored_type(page: Any) -> str:
