@@ -45,7 +45,7 @@ GROUPS: Mapping[str, Mapping[str, tuple[str, str, str]]] = {
         "preview": (
             "preview",
             "preview",
-            "Show in a second or two what a display will show to an eye in front of its middle.",
+            "Show in a few seconds what a display will show to an eye in front of its middle.",
         ),
         "plan": (
             "plan",

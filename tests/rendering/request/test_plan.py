@@ -311,10 +311,20 @@ def test_classic_models_refuse_other_light_and_materials_than_the_files(asked, n
 @pytest.mark.parametrize(
     ("options", "light", "request_options", "said"),
     [
-        ({"background": (1, 1, 1)}, {}, {}, "integrator: background beside normal; .*; leave out background"),
-        ({}, {"light_turn": (20, 0)}, {}, "integrator: light_turn beside normal"),
+        (
+            {"background": (1, 1, 1)},
+            {},
+            {},
+            r"integrator: normal beside background=\.\.\.; .*; leave out background",
+        ),
+        ({}, {"light_turn": (20, 0)}, {}, r"integrator: normal beside light_turn=\.\.\."),
         ({}, {}, {"depth": 3}, "depth: 3: normal follows no path"),
-        ({"single_scattering": True}, {"light_strength": 2.0}, {}, "leave out light_strength and single_scattering"),
+        (
+            {"single_scattering": True},
+            {"light_strength": 2.0},
+            {},
+            r"leave out light_strength=\.\.\. and single_scattering=\.\.\.",
+        ),
     ],
 )
 def test_a_property_of_surfaces_has_no_light(options, light, request_options, said):

@@ -70,7 +70,7 @@ def preview(
     printed: PrintOptions,
     machine: MachineOptions,
 ) -> None:
-    """Show in a second or two what a display will show to an eye in front of its middle."""
+    """Show in a few seconds what a display will show to an eye in front of its middle."""
     from lippmann.image.write import check_output, write_plain_picture
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.viewing.replay import check_size, eye_before

@@ -67,13 +67,13 @@ def check_scene(request: RenderRequest, scene: Scene) -> None:
     refusals = _of_surfaces(request, scene) if scene.lies_off_surfaces else []
     goes_on = request.depth is not None and request.plan is None  # frames of a sequence are planned again
     caustics = request.caustics != "auto" and request.plan is None
-    name, is_property = request.integrator, request.integrator in PROPERTIES
+    name, is_property, rule = request.integrator, request.integrator in PROPERTIES, "it tells of surfaces alone"
     names = {line.partition(" ")[0] for line in scene.settings} & {"environment", "single_scattering", "background"}
-    light, rule = " and ".join(sorted(names | {*changed_options(scene.light)})), "it is told of the first surface alone"
+    light = " and ".join(f"{each}=..." for each in sorted(names | {*changed_options(scene.light)}))
     _refuse(
         [
             *refusals,
-            (is_property and bool(light), f"{light} beside {name}", "integrator", rule, f"leave out {light}"),
+            (is_property and bool(light), f"{name} beside {light}", "integrator", rule, f"leave out {light}"),
             (is_property and goes_on, f"{request.depth}: {name} follows no path", "depth", rule, _LEAVE),
             (is_own and request.integrator == "direct", "no light falls on it", "integrator", own, _LEAVE),
             (is_own and caustics, "no light makes any on it", "caustics", own, _LEAVE),
