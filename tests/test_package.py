@@ -9,19 +9,20 @@ from pathlib import Path
 import pytest
 
 import lippmann
-from lippmann import plugins
+from lippmann import image, plugins
 
 
 def test_render_can_be_called_again_and_again(engine):
     for _ in range(2):
-        image = lippmann.render("teapot", integrator="normal", spp=1)
-        assert image.pixels.shape == (512, 512, 3)
+        picture = lippmann.render("teapot", integrator="normal", spp=1)
+        assert picture.pixels.shape == (512, 512, 3)
 
 
-def test_all_names_are_there():
-    for name in lippmann.__all__:
-        assert getattr(lippmann, name) is not None
-    assert set(lippmann.__all__) <= set(dir(lippmann))
+@pytest.mark.parametrize("module", [lippmann, image, plugins])
+def test_all_names_are_there_and_are_completed_before_they_are_used(module):
+    assert dir(module) == sorted(module.__all__)
+    for name in module.__all__:
+        assert getattr(module, name) is not None
 
 
 def test_scripts_name_tests_that_are_there():

@@ -84,6 +84,10 @@ def __getattr__(name: str) -> Any:
     return getattr(importlib.import_module(_HOME[name]), name)
 
 
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
+
 def doors() -> tuple[Door[Any], ...]:
     """All kinds of extensions."""
     from lippmann.display.formats.load import displays
