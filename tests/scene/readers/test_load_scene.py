@@ -92,7 +92,7 @@ def test_up_of_what_says_it_itself_is_refused():
         ("dancer.pmx", "MMD Tools"),
         ("house.rvt", "FBX"),
         ("chair.reality", r"\.usdz"),
-        ("hill.asc", r"\.ply"),
+        ("hill.las", r"\.ply"),
         ("shed.kmz", "SketchUp"),
         ("brain.mnc", r"nibabel\.load\('a\.mnc'\)"),
         ("hero.ms3d", r"assimp export in\.ms3d out\.glb"),

@@ -111,7 +111,7 @@ _ELSEWHERE = {
     **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar"), "unpack it, and name the scene file inside"),
     ".zae": "unzip it, and convert the .dae by Assimp: assimp export in.dae out.glb",
     **dict.fromkeys((".ksplat", ".lcc"), "open it in SuperSplat (superspl.at/editor), export it as .ply"),
-    **dict.fromkeys((".las", ".laz", ".e57", ".pts", ".ptx", ".asc", ".xyzrgb"), _CLOUD_COMPARE),
+    **dict.fromkeys((".las", ".laz", ".e57", ".ptx", ".xyzrgb"), _CLOUD_COMPARE),
     ".txt": "save clouds of points as .ply, in CloudCompare for instance, COLMAP's by its model_converter",
     **dict.fromkeys((".mrc", ".map", ".ccp4"), "save it as .npy: numpy.save('a.npy', mrcfile.read('a.mrc'))"),
     **{kind: _OPEN_BABEL.format(kind) for kind in (".cube", ".gro", ".mae", ".pqr")},
@@ -428,7 +428,8 @@ def _upright(description: SceneDescription, suffix: str, reader: Reader, up: Up 
     is_guessed = up is None and description.up is None
     notes = [*description.notes]
     if is_guessed and usual == "z":
-        notes.append(f"up is taken as +z, as 3D printing has it, for nothing in {suffix} files says it (else up=y)")
+        who = "3D printing" if suffix in (".stl", ".3mf") else "surveying"
+        notes.append(f"up is taken as +z, as {who} has it, for nothing in {suffix} files says it (else up=y)")
     if is_guessed and usual == "-y":
         notes.append("up is taken as -y, as trainers of splats have it, for nothing in the file says it (else up=y)")
     if is_guessed and suffix == ".spz":

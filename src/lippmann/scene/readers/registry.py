@@ -167,6 +167,8 @@ _OWN = {
     "obj": Reader((".obj",), f"{_HERE}.obj:read_obj", options=("files",), up="y"),
     "ply": Reader((".ply",), f"{_HERE}.ply:read_ply", {b"ply\n": ".ply", b"ply\r": ".ply"}, ("files",), "y"),
     "pcd": Reader((".pcd",), f"{_HERE}.pcd:read_pcd", {b"# .PCD": ".pcd"}, up="y"),
+    "text-cloud": Reader((".pts", ".asc"), f"{_HERE}.text_cloud:read_text_cloud", up="z"),
+    "xyz": Reader((".xyz",), f"{_HERE}.text_cloud:read_xyz", up="z"),
     "off": Reader((".off",), f"{_HERE}.off:read_off", up="y"),
     "sog": Reader((".sog",), f"{_HERE}.splats.sog:read_sog", options=("files",), up="-y"),
     "spz": Reader((".spz",), f"{_HERE}.splats.spz:read_spz", up="y"),
@@ -197,7 +199,7 @@ _OWN = {
         ("files",),
     ),
     "molecules": Reader(
-        (".pdb", ".ent", ".cif", ".xyz", ".sdf", ".sd", ".mol", ".mol2", ".json", ".pdb.gz", ".ent.gz", ".cif.gz"),
+        (".pdb", ".ent", ".cif", ".sdf", ".sd", ".mol", ".mol2", ".json", ".pdb.gz", ".ent.gz", ".cif.gz"),
         f"{_HERE}.molecules.reader:read_molecule",
         {b'{"data_': ".json"},
     ),

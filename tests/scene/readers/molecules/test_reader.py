@@ -316,7 +316,7 @@ def test_of_a_trajectory_the_first_moment_is_shown(read):
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("0 0 1\n0 1 0\n", "its first line is no number of atoms: save clouds of points as .ply"),
+        ("H 0 0 1\n", "its first line is no number of atoms: save clouds of points as .ply"),
         (FRAME[:-30], "it holds fewer than 3 atoms: is it cut short?"),
         ("2\n\nO 0 0 0\nH 0 0\n", "it holds fewer than 2 atoms"),
         ("1\n\nO 0 0 up\n", "could not convert string to float"),
