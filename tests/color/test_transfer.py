@@ -1,7 +1,16 @@
 import numpy as np
 import pytest
 
-from lippmann.color.transfer import coding_chord, coding_slope, decode_srgb, dequantize, encode, encode_srgb, quantize
+from lippmann.color.transfer import (
+    coding_chord,
+    coding_slope,
+    decode_srgb,
+    dequantize,
+    encode,
+    encode_srgb,
+    pbr_neutral,
+    quantize,
+)
 
 
 @pytest.mark.parametrize("transfer", ["srgb", "linear"])
@@ -66,6 +75,30 @@ def test_the_slope_with_a_tone_map_is_that_along_the_color(color):
     low = np.array([0.2]) * color
     chord = (encode(color, "pbr-neutral") - encode(low, "pbr-neutral")) / (color - low)
     assert coding_chord(low, color, "pbr-neutral") == pytest.approx(chord, rel=1e-3)
+
+
+@pytest.mark.parametrize("coding", ["linear", "srgb"])
+def test_the_chord_of_a_value_with_itself_is_the_slope(coding):
+    values = np.array([0.001, 0.1, 0.3, 0.7])
+    assert coding_chord(values, values, coding) == pytest.approx(coding_slope(values, coding))
+
+
+def neutral(color):
+    """One colour by the specification's own steps (Khronos PBR Neutral, 2024)."""
+    least = min(color)
+    color = [value - (least - 6.25 * least * least if least < 0.08 else 0.04) for value in color]
+    peak = max(color)
+    if peak < 0.76:
+        return color
+    lower = 1 - 0.24**2 / (peak + 0.24 - 0.76)
+    share = 1 - 1 / (0.15 * (peak - lower) + 1)
+    return [value * lower / peak * (1 - share) + lower * share for value in color]
+
+
+def test_the_tone_map_is_that_of_the_specification():
+    random = np.random.default_rng(6)
+    colors = random.random((400, 3)) * random.choice([0.1, 1.0, 4.0, 50.0], (400, 1))
+    assert pbr_neutral(colors) == pytest.approx(np.array([neutral(color) for color in colors]), abs=1e-6)
 
 
 def test_the_white_of_a_bright_color_is_no_change_by_its_dark_channel():

@@ -215,3 +215,20 @@ def test_views_are_woven_for_the_lens_that_is_there():
     assert 0.005 < np.abs(plain.pixels - corrected.pixels).mean() < 0.1
     with pytest.raises(DisplayError, match="gives no lens"):
         weave(solid([0, 1], 2, 1), SHEETS[0], correct="lens")
+
+
+def test_the_views_reach_from_edge_to_edge_of_a_real_lens():
+    """Behind a real lens the outermost views are less far apart than behind a pinhole at the gap."""
+    display = load_display("print:lpi=60,ppi=720,size=40x10mm,thickness=26mil")
+    assert display.edge_factor < 0.98
+    axis = (display.lattice.origin_x + 12 * display.lattice.pitch) * display.magnification
+    x = axis + np.array([-0.49999, 0.0, 0.49999]) * display.micro_image_pitch
+    assert weave_module.view_fraction(display, x, np.zeros(3)) == pytest.approx([1, 0.5, 0], abs=1e-4)
+
+
+def test_views_sampled_a_pixel_beside_are_those_of_the_next_pixel():
+    display = load_display("seed-lenticular").resized(24, 8)
+    quilt = Quilt(np.random.default_rng(3).random((20, 90, 3), np.float32), QuiltLayout(3, 1, None))
+    here, beside = (weave_module.weave_window(quilt, display, "linear", (0, 8), None, by) for by in (0.0, 1.0))
+    np.testing.assert_allclose(beside[:, :-1], here[:, 1:], atol=1e-6)
+    assert not np.allclose(beside, here, atol=0.01)
