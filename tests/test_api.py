@@ -43,6 +43,8 @@ def test_a_preview_takes_scene_and_display_in_the_order_of_a_render(small):
 def test_an_option_of_another_call_names_that_call(small, option, fix):
     with pytest.raises(UsageError, match=fix):
         lippmann.render("teapot", small, **{option: 1})
+    with pytest.raises(UsageError, match=fix):
+        lippmann.render_turntable("teapot", small, **{option: 1})
 
 
 def test_the_options_that_are_known_are_those_of_people(small):

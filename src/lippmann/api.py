@@ -370,6 +370,7 @@ def render_turntable(
     from lippmann.sequences.frames import render_sequence
     from lippmann.sequences.turntable import open_turntable
 
+    _refuse_misplaced(options)
     classic = options.get("integrator") == "classic"
     where = options_of_sequence(placement)
     motion = open_turntable(_scene(scene), frames, swing=swing, placement=where, classic=classic)
@@ -519,12 +520,16 @@ _GIVEN_OTHERWISE: Mapping[type[Options], str] = {
 
 
 def _request(placement: object, options: Mapping[str, object]) -> RenderRequest:
+    _refuse_misplaced(options)
+    return RenderRequest.of({**options, "placement": placement})
+
+
+def _refuse_misplaced(options: Iterable[str]) -> None:
     for kind, way in _GIVEN_OTHERWISE.items():
         for each, _ in options_of(kind):
             if each.name in options:
                 what = f"is an option of a {kind.noun}, not of a render"
                 raise UsageError(what, parameter=each.name, fix=f"use {way.format(each.name)}")
-    return RenderRequest.of({**options, "placement": placement})
 
 
 __all__ = ["load_scene", "plan", "preview", "render", "render_quilt", "render_to_file", "studio"]
