@@ -227,7 +227,9 @@ class MaterialMapper:
         key = path, brightest if _is_linear(name) else 1.0
         if key not in self._images:
             if is_tiled(name):
-                image = read_tiles(name, lambda tile: self._image(replace(reference, file=tile(name)), brightest))
+                image: Image = read_tiles(
+                    name, lambda tile: self._image(replace(reference, file=tile(name)), brightest)
+                )
             elif _is_linear(name):
                 pixels, notes = read_linear(path)
                 self.notes += notes

@@ -371,7 +371,7 @@ def _gltf_image(kind: str, channel: str, given: Record, node: Usd.Prim) -> Recor
     image = _image(f"{kind}_color" if "color" in kind else kind, channel, given, node)
     if channel == "outa":
         return {**image, "channel": "a"}
-    tint = given.get("color", given.get("factor", {})).get("value", 1.0)
+    tint = (given.get("color") or given.get("factor") or {}).get("value", 1.0)
     return _scale(image, tint[:3] if isinstance(tint, list) else [tint] * 3)
 
 

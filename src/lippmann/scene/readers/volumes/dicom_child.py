@@ -254,10 +254,10 @@ def _fill(frames: list[Frame], lost: dict[str, list[str]], memory: int) -> tuple
     if grid is None:
         raise next(iter(damaged.values()))
     if damaged:
-        for name, error in damaged.items():
+        for name, problem in damaged.items():
             kind = "damaged"
-            if isinstance(error, SeriesError):  # packed in a way that nothing here decodes, as others are not
-                kind = error.said["error"].removeprefix("its pixels are ")
+            if isinstance(problem, SeriesError):  # packed in a way that nothing here decodes, as others are not
+                kind = problem.said["error"].removeprefix("its pixels are ")
             lost.setdefault(kind, []).append(name)
         return _fill([frame for frame in frames if frame.file not in damaged], lost, memory)
     if stack.places is not None:
