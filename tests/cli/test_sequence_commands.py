@@ -232,7 +232,10 @@ def test_a_film_for_a_hololuminescent_display(engine, lippmann, tmp_path):
         (("render", "--turntable", "8", "--frames", "0:9", "-o", "out"), "there is no frame 8"),
         (("render", "--turntable", "8", "--fps", "9", "-o", "out"), "--fps: a turn has one pose a frame"),
         (("render", "--turntable", "8", "-o", "out", "--video", "x_qs8x6a1.mp4", "--eye", "0,0,9"), "--eye: a quilt's"),
-        (("quilt", "render", "--turntable", "8", "-o", "x_qs8x6a0.75.png"), "x_%04d_qs8x6a0.75.png, or a folder"),
+        (
+            ("quilt", "render", "--turntable", "8", "-o", "x_qs8x6a0.75.png"),
+            "x_%04d_qs8x6a0.75.png, a folder, or a film: x_qs8x6a0.75.mp4",
+        ),
         (("quilt", "render", "--turntable", "8", "--video", "x_qs5x9a0.75.mp4"), "the name says another quilt"),
         (("quilt", "render", "--turntable", "8", "--video", "x.mp4", "--eye", "0,0,0"), "--eye: an eye at z = 0"),
         (("render", "--turntable", "8", "-o", "out", "--shows", "native"), "--shows: there is no film"),

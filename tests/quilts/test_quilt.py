@@ -106,8 +106,8 @@ def test_names_are_read(tmp_path, name, layout):
         ("x_qs8x.png", "does not say how many views"),
         ("x_qs0x6a0.75.png", "0 columns and 6 rows"),
         ("x_qs33x6a0.75.png", "33 columns and 6 rows; there are 1 to 32"),
-        ("x_qs8x6a0.png", "the aspect 0"),
-        ("x_qs8x6a100.png", "the aspect 100"),
+        ("x_qs8x6a0.png", "the aspect is 0"),
+        ("x_qs8x6a100.png", "the aspect is 100"),
     ],
 )
 def test_impossible_names_are_refused(tmp_path, name, said):
