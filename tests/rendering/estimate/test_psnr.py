@@ -13,7 +13,7 @@ from lippmann.display.micro_image_layout import lens_indices
 from lippmann.display.panel import Panel
 from lippmann.metrics.mse_psnr import micro_image_means, psnr
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
-from lippmann.rendering.estimate.psnr import FLOOR, Estimate, PixelErrors
+from lippmann.rendering.estimate.psnr import FLOOR, Estimate, Parts, PixelErrors
 from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.request.render_request import RenderRequest
 
@@ -173,3 +173,11 @@ def test_an_estimator_among_mirrors_states_that_interval():
     errors, _ = noisy_picture(shown, 1)
     plain, mirrored = (PictureEstimator(shown, among).estimate(errors, 4) for among in (False, True))
     assert mirrored == plain.widen_for_mirrors(4)
+
+
+def test_the_first_view_of_a_quilt_is_at_the_bottom_left():
+    parts = Parts.views(3, 2, (4, 5), known=7)
+    assert parts.owner.shape == (10, 12)
+    assert (parts.rows, parts.columns, parts.known) == (1, 6, 7)
+    assert [parts.owner[row, column] for row in (9, 0) for column in (0, 4, 11)] == [0, 1, 2, 3, 4, 5]
+    assert (np.bincount(parts.owner.ravel()) == 20).all()
