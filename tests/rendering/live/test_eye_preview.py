@@ -66,7 +66,7 @@ BLOCKS = Display("blocks", Panel(192, 128, 0.25), LensArray("square", 1.0), 1.0,
 def test_noise_is_taken_out_of_the_eyes_view(display, most):
     """In a room, whose walls are noisy: the network does not smooth edges, which are most of the error elsewhere.
 
-    Of sub-pixels it gets all colours: one colour of each leaves 0.48 of the error, as their noise looks like texture.
+    Of sub-pixels it gets all colours: one colour of each leaves 0.49 of the error, as their noise looks like texture.
     """
     room = lippmann.load_scene("room")
 
