@@ -149,7 +149,7 @@ def _load() -> tuple[Any, Any]:
 def _hints_compiled_at_use() -> Iterator[None]:
     """Let :mod:`typing` keep the texts of type hints as they are: it evaluates a text as it evaluates code.
 
-    Dr.Jit's import makes hints of 2500 texts, and no render evaluates one: compiling them is half of its time.
+    Dr.Jit's import makes hints of 2500 texts, and no render evaluates one: compiling them is two fifths of its time.
     """
     names = vars(typing)
     names["compile"] = lambda text, *_: text  # in front of the built-in function
