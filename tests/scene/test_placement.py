@@ -13,7 +13,7 @@ from lippmann.options.placement import PlacementOptions
 from lippmann.scene.camera_placement import VisibleDepth
 from lippmann.scene.fit_placement import FILL, POP_OUT
 from lippmann.scene.matrices import rotation, translation
-from lippmann.scene.placement import options_of_sequence, place, placement_of
+from lippmann.scene.placement import face_viewer, find_eye_share, options_of_sequence, place, placement_of
 from lippmann.scene.values.description import Camera
 
 
@@ -660,3 +660,27 @@ def test_a_flat_scene_seen_edge_on_is_turned(thin, said):
 def test_a_flat_scene_seen_from_its_face_stays():
     bounds = np.array([[-10.0, -15.0, 0.0], [10.0, 15.0, 1e-9]])
     assert not place(bounds, display()).warnings
+
+
+@pytest.mark.parametrize(("aside", "is_seen"), [(0.0, True), (4.0, True), (6.0, False)])
+def test_a_fit_is_seen_from_a_camera_that_has_the_scene_within_45_degrees(aside, is_seen):
+    camera = Camera("from the right", rotation((90.0, 0.0, 0.0)) @ translation((aside, 0.0, 5.0)), math.radians(40))
+    seen = face_viewer(box(1, 1, 1), PlacementOptions(), [], [camera])
+    assert any(seen.turn) == is_seen
+
+
+def test_a_scene_that_covers_the_panel_is_not_cut_by_its_size():
+    asked = {"options": options(scale=2.0)}
+    assert place(box(1, 1, 1), display(), **asked).may_cut is not None
+    assert place(box(1, 1, 1), display(), **asked, fills_panel=True).may_cut is None
+
+
+def test_eyes_need_not_bear_what_lies_before_the_rays():
+    monitor = load_display("spatiallabs")
+    near = monitor.aperture_distance
+    shares = [
+        find_eye_share(np.eye(4), np.array([[-9.0, -9.0, -20.0], [9.0, 9.0, front]]), monitor)
+        for front in (near, 2 * near)
+    ]
+    assert shares[0] == shares[1]
+    assert shares[0][1] == (-20.0, near)
