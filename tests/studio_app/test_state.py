@@ -120,7 +120,7 @@ def test_files_that_a_state_names_lie_beside_it(tmp_path, monkeypatch):
         ("subpixels = 1", "state:1: subpixels: 1; true or false"),
         ('method = "fast"', "known are auto, full"),
         ("\npop_out = 2.0", "state:2: pop_out: 2.0; must be a share of the depth"),
-        ("light_strength = -1.0", "state:1: light_strength: -1.0; a factor from 0"),
+        ("light_strength = -1.0", "state:1: light_strength: -1.0; must be a factor from 0"),
         ("exposure = inf", "exposure"),
         ('place = "display"\npop_out = 0.5', "state:2: pop_out"),
         ("[scene]\nname = 1", "state:1: scene"),

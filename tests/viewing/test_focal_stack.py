@@ -39,7 +39,7 @@ def test_a_stack_is_its_planes(layout):
 
 def test_all_planes_are_checked_first(image):
     near = Display("near", DISPLAY.panel, DISPLAY.lens_array, gap=6.0, viewing_distance=90.0)
-    with pytest.raises(UsageError, match="it must be finite mm below"):
+    with pytest.raises(UsageError, match="mm and below the viewing distance"):
         focal_stack(IntegralImage(image.pixels, near), [0.0, 95.0])
 
 

@@ -90,5 +90,5 @@ def test_what_cannot_be_shown():
         quilt_display(levels(), None, "a.png")
     with pytest.raises(PictureError, match="square lenses"):
         quilt_display(levels(), Display("s", Panel(60, 60, 0.1), LensArray("square", 0.6), gap=1.0), "a.png")
-    with pytest.raises(UsageError, match="it must be finite mm below"):
+    with pytest.raises(UsageError, match="mm and below the viewing distance"):
         refocus_quilt(levels(), display(), [0.0, 300.0])
