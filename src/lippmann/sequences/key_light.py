@@ -10,7 +10,7 @@ does not change keep it (:mod:`lippmann.sequences.still_pixels`).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -172,21 +172,26 @@ def _gather_light(key: KeyPicture, job: Job) -> tuple[Floats, Mask]:
     return irradiance * albedo, is_known
 
 
-def rays_of(source: OnePicture | QuiltRays, is_chosen: Mask) -> tuple[SinglePixelRays, tuple[Places, Places]]:
-    """Rays of the chosen pixels ``(H, W)`` of a source; their rows and columns ``(n,)`` in the order of the rays."""
+def rays_of(source: OnePicture | QuiltRays, is_chosen: Mask) -> Iterator[tuple[SinglePixelRays, tuple[Places, Places]]]:
+    """Rays of the chosen pixels ``(H, W)`` of a source, no more at once than a wavefront takes.
+
+    Yields the rays, and the rows and columns ``(n,)`` of their pixels.
+    """
+    from lippmann.rendering.film.memory_model import preferred_lanes
     from lippmann.rendering.film.wavefront import STRIP_ROWS
     from lippmann.rendering.transport.ray_source import SinglePixelRays
 
     rows, columns = np.nonzero(is_chosen)
     order = np.lexsort((rows % STRIP_ROWS, columns, rows // STRIP_ROWS))  # neighbours take much the same paths
-    rows, columns = rows[order], columns[order]
-    return SinglePixelRays(source, columns, rows, np.zeros_like(rows)), (rows, columns)
+    for part in np.array_split(order, -(-len(order) // preferred_lanes())) if len(order) else ():
+        places = rows[part], columns[part]
+        yield SinglePixelRays(source, *places[::-1], np.zeros_like(part)), places
 
 
 def trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
     """The picture with ``pixels`` where their light ``is_known``; the others are traced and denoised among them."""
-    from lippmann.rendering.film.wavefront import Coverage, Frame
-    from lippmann.rendering.methods import SAMPLES_LAYER, Job, Traced, denoise_whole, trace_one_stream
+    from lippmann.rendering.film.wavefront import Frame
+    from lippmann.rendering.methods import SAMPLES_LAYER, Traced, denoise_whole
     from lippmann.rendering.transport.ray_source import SubpixelRays
 
     source = job.sample_source
@@ -200,30 +205,48 @@ def trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
         frame = Frame(colors, shares=shares)
         frame.maps[SAMPLES_LAYER] = np.zeros(is_known.shape, np.uint32)
         return Traced(frame, request.samples, notes=(request.judged_by, note))
-    few, places = rays_of(source, ~np.repeat(is_known, count_columns(job), axis=1))
-    session = replace(job.session, request=request)
-    traced = trace_one_stream(Job(session, job.integrator, few, job.display_from_world), request.judged_by, note)
-    frame = traced.frame
-
-    def spread(part: Floats, others: Floats | float) -> Floats:
-        whole = np.empty((*pixels.shape[:2], part.shape[-1]), dtype=np.float32)
-        whole[...] = others
-        whole[places] = part[0]
-        return whole
-
-    frame.pixels = spread(frame.pixels, pixels)
-    frame.specular = None if frame.specular is None else spread(frame.specular, 0.0)
-    frame.excess = None if frame.excess is None else spread(frame.excess, 0.0)
-    if frame.coverage is not None:
-        further = job.denoiser.coverage()
-        covered = 1.0 if further is None else (further[0] + further[1]).share
-        frame.coverage = Coverage(spread(frame.coverage.share, covered), frame.coverage.samples)
-    frame.maps[SAMPLES_LAYER] = np.where(is_known, np.uint32(0), np.uint32(traced.samples))
-    frame.shares = shares
-    job.denoiser.restrict_to(~np.repeat(is_known, count_columns(job), axis=1))
+    is_traced = ~np.repeat(is_known, count_columns(job), axis=1)
+    few = replace(job, session=replace(job.session, request=request))
+    traced = _trace_some(few, pixels, is_traced, sum_coverage(job), note)
+    traced.frame.shares = shares
+    job.denoiser.restrict_to(is_traced)
     traced = denoise_whole(job, traced)
     traced.frame.pixels[is_known] = colors[is_known]
     return traced
+
+
+def _trace_some(job: Job, pixels: Floats, is_traced: Mask, coverage: Floats, note: str) -> Traced:
+    """The picture in one stream, not denoised, with ``pixels (H, columns W, 3)`` but where ``is_traced``.
+
+    ``coverage (H, columns W)`` is that of the others.
+    """
+    from lippmann.rendering.film.wavefront import Coverage, Frame
+    from lippmann.rendering.methods import SAMPLES_LAYER, Traced, trace_one_stream
+
+    whole, samples = Frame(np.array(pixels, np.float32)), job.request.samples
+    for few, places in rays_of(job.sample_source, is_traced):
+        part = trace_one_stream(replace(job, source=few)).frame
+        whole.pixels[places] = part.pixels[0]
+        if part.specular is not None and part.excess is not None:
+            if whole.specular is None or whole.excess is None:
+                whole.specular, whole.excess = np.zeros((2, *pixels.shape), np.float32)
+            whole.specular[places], whole.excess[places] = part.specular[0], part.excess[0]
+        if part.coverage is not None:
+            whole.coverage = whole.coverage or Coverage(coverage[..., None].copy(), samples)
+            whole.coverage.share[places] = part.coverage.share[0]
+        whole.rays += part.rays
+        whole.seconds_compile += part.seconds_compile
+        whole.seconds_trace += part.seconds_trace
+    by_pixel = is_traced.reshape(len(is_traced), -1, count_columns(job)).any(axis=2)
+    whole.maps[SAMPLES_LAYER] = np.where(by_pixel, np.uint32(samples), np.uint32(0))
+    return Traced(whole, samples, notes=(job.request.judged_by, note))
+
+
+def sum_coverage(job: Job) -> Floats:
+    """Coverage ``(H, columns W)`` by surfaces of any kind."""
+    coverage = job.denoiser.coverage()
+    assert coverage is not None  # guides of one set of rays have it
+    return (coverage[0] + coverage[1]).share[..., 0]
 
 
 __all__ = ["KeyLight", "LightOfSurfaces", "count_columns", "light_of", "rays_of", "trace_others"]

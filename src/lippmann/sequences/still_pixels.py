@@ -23,7 +23,16 @@ from numpy.typing import NDArray
 
 from lippmann.display.panel import PixelWindow
 from lippmann.sequences.cuts import Moment
-from lippmann.sequences.key_light import Floats, KeyLight, Mask, count_columns, light_of, rays_of, trace_others
+from lippmann.sequences.key_light import (
+    Floats,
+    KeyLight,
+    Mask,
+    count_columns,
+    light_of,
+    rays_of,
+    sum_coverage,
+    trace_others,
+)
 from lippmann.sequences.tuning import TUNING
 
 if TYPE_CHECKING:
@@ -133,15 +142,8 @@ def _hash_features(job: Job) -> NDArray[np.float64]:
     assert guides.height is not None
     roots = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0])
     return np.asarray(
-        guides.albedo @ roots[:3] + guides.normal @ roots[3:6] + roots[6] * _sum_coverage(job) + guides.height
+        guides.albedo @ roots[:3] + guides.normal @ roots[3:6] + roots[6] * sum_coverage(job) + guides.height
     )
-
-
-def _sum_coverage(job: Job) -> Floats:
-    """Coverage ``(H, columns W)`` by surfaces of any kind."""
-    coverage = job.denoiser.coverage()
-    assert coverage is not None  # guides of one set of rays have it
-    return (coverage[0] + coverage[1]).share[..., 0]
 
 
 def _trace_probes(job: Job, window: PixelWindow) -> tuple[Floats, RayTotals]:
@@ -156,16 +158,15 @@ def _trace_probes(job: Job, window: PixelWindow) -> tuple[Floats, RayTotals]:
     probes = np.full((source.height, source.width, 3), np.nan, np.float32)
     row, column = np.indices((source.height, source.width))
     column += count_columns(job) * window.left
-    is_probed = ((row + window.top + 2 * column) % TUNING.pixels_of_probe == 0) & (_sum_coverage(job) > 0)
-    if not is_probed.any():
-        return probes, RayTotals()
-    few, places = rays_of(source, is_probed)
+    is_probed = ((row + window.top + 2 * column) % TUNING.pixels_of_probe == 0) & (sum_coverage(job) > 0)
     # Light that was prepared for one scene would make other paths in another.
-    plain = job.integrator.lit_by(PreparedLight())
-    plan = cut_wavefronts(few.width, few.height, 1, channels=1, memory=job.session.memory)
-    frame = trace_frame(plain, few, plan, seed=named_seed("probes"), box_filter=job.request.box_filter)
-    probes[places] = frame.pixels[0]
-    return probes, frame.rays
+    plain, rays = job.integrator.lit_by(PreparedLight()), RayTotals()
+    for few, places in rays_of(source, is_probed):
+        plan = cut_wavefronts(few.width, few.height, 1, channels=1, memory=job.session.memory)
+        frame = trace_frame(plain, few, plan, seed=named_seed("probes"), box_filter=job.request.box_filter)
+        probes[places] = frame.pixels[0]
+        rays += frame.rays
+    return probes, rays
 
 
 def _find_still(key: _Picture, own: _Picture, job: Job) -> Mask:
@@ -185,7 +186,7 @@ def _find_still(key: _Picture, own: _Picture, job: Job) -> Mask:
     change -= np.sqrt(squares) / (2 * TUNING.probe_reach + 1)
     # Where no probe finds light in either frame, such as on the outer side of a wall, there is none to change.
     is_agreed = (probed > 0) & (change <= TUNING.largest_change * lit)
-    is_still = is_same & (is_agreed | (_sum_coverage(job) == 0))
+    is_still = is_same & (is_agreed | (sum_coverage(job) == 0))
     return np.asarray(is_still.reshape(len(is_still), -1, count_columns(job)).all(axis=2))
 
 
