@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import imagecodecs
 import numpy as np
 import pytest
@@ -109,3 +111,12 @@ def test_wrong_and_half_files_are_refused(display, picture, tmp_path):
     with pytest.raises(PictureError, match="hexagonal lenses; ESLF takes"):
         write_eslf(light_field_of(picture(display("hexagonal")), "uint8"), display("hexagonal"), path)
     assert path.read_bytes() == whole
+
+
+@pytest.mark.parametrize("transfer", ["srgb", "linear"])
+def test_the_file_says_srgb_of_srgb_codes_alone(display, picture, tmp_path, transfer):
+    image = picture(display("square", lenses=(4, 3), pixels=3), stored="uint8")
+    provenance = replace(image.provenance, transfer=transfer)
+    write_eslf(light_field_of(replace(image, provenance=provenance), "uint8"), image.display, tmp_path / "x.png")
+    with Image.open(tmp_path / "x.png") as found:
+        assert ("srgb" in found.info) == (transfer == "srgb")
