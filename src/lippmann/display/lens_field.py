@@ -57,8 +57,7 @@ class LensField(NamedTuple):
         if display.lattice.rows_are_alike:
             across = np.arange(panel.width) + 0.5
             i, _ = display.lens_of(*display.panel_point(across, np.full(panel.width, 0.5)), NUMPY)
-            # In full, as of arrays: kernels are compiled for one kind of array alone.
-            lens = np.tile(i.astype(np.int32), (panel.height, 1))
+            lens = np.broadcast_to(i.astype(np.int32), (panel.height, panel.width))
         else:
             i, j = pixel_lenses(display)
             lens = (j * np.int32(grid.columns) + i).astype(np.int32)
