@@ -1,10 +1,10 @@
 """Light of a key frame in the frames after it, which trace paths for the other pixels alone.
 
 Two kinds of films share light. Where the scene and its light are at rest and the display alone moves, a diffuse surface
-keeps its radiance, and nearly so does one with wide lobes: pixels take the irradiance of the key frame's denoised
-picture at the same point, times their own albedo (:mod:`lippmann.device.pbr.diffuse_pixels`). Disocclusions, outlines,
-emitters, edges of shadows, and surfaces with narrow lobes are traced. Where the display is at rest, pixels whose light
-does not change keep it (:mod:`lippmann.sequences.still_pixels`).
+keeps its radiance: pixels take the irradiance of the key frame's denoised picture at the same point, times their own
+albedo (:mod:`lippmann.device.pbr.diffuse_pixels`). Disocclusions, outlines, emitters, edges of shadows, and surfaces
+that are not diffuse are traced. Where the display is at rest, pixels whose light does not change keep it
+(:mod:`lippmann.sequences.still_pixels`).
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class KeyLight(ABC):
 
 
 class LightOfSurfaces(KeyLight):
-    """The irradiance of surfaces of a scene at rest, for a display that moves."""
+    """The irradiance of diffuse surfaces of a scene at rest, for a display that moves."""
 
     def __init__(self) -> None:
         self._key: tuple[PreparedLight, KeyPicture] | None = None

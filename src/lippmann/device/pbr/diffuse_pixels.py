@@ -1,12 +1,11 @@
-"""Surfaces in the pixels of a picture, and their light in another picture of the same scene.
+"""Diffuse surfaces in the pixels of a picture, and their light in another picture of the same scene.
 
 A diffuse surface has the same radiance from all sides. So its irradiance in one picture, times the albedo in another
-one, is the light of the same point there. That holds for a glossy surface with wide lobes, too, as both pictures see
-the point from nearly the same direction (below).
+one, is the light of the same point there.
 
 The views (micro-images, or those of a quilt's cameras) to either side of a pixel's own ray show its point, or the
 nearest that they can show. Each gives a bilinear mean of four pixels. Those of another plane or normal, or of no
-such surface, do not count. Light between the points that a picture shows is not known. So it is taken only where
+diffuse surface, do not count. Light between the points that a picture shows is not known. So it is taken only where
 all these pixels agree on it, as codes: then no edge of a shadow lies between them, no highlight, and none of them
 shows another surface.
 """
@@ -23,7 +22,6 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import Coding
 from lippmann.device.kernel_ops import DEVICE, divide, encode, upload
-from lippmann.device.pbr.gltf_bsdf import SHARP_LOBE, WIDE_LOBES
 from lippmann.device.types import Array, Bool, Float, MitsubaScene, Normal3f, Point2f, Point3f, Ray3f, UInt32, Vector4f
 from lippmann.display.nearby_views import NearbyViews
 from lippmann.scene.matrices import inverse, rotation_of
@@ -40,7 +38,7 @@ _AGREEMENT = 0.02
 
 
 class DiffusePixels:
-    """What the pixels of a picture show, and which of them show one surface with even light and nothing of an edge.
+    """What the pixels of a picture show, and which of them show one diffuse surface and nothing of an edge.
 
     Parameters
     ----------
@@ -95,19 +93,13 @@ class DiffusePixels:
         """Albedo of pixels."""
         return dr.gather(self.color, self.all_albedo, pixel)
 
-    def is_even(self, ray: Ray3f, normal: Normal3f) -> Bool:
-        """Whether each pixel shows a single surface whose lobes are all diffuse or wide, and that emits no light."""
+    def is_diffuse(self, ray: Ray3f, normal: Normal3f) -> Bool:
+        """Whether each pixel shows a single surface, which is diffuse and emits no light."""
         si = self._scene.ray_intersect(ray)
-        bsdf = si.bsdf(ray)
-        flags = bsdf.flags()
-        is_even = si.is_valid() & ((flags & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) == 0)
-        is_glossy = is_even & ((flags & int(mi.BSDFFlags.Glossy)) != 0)
-        has_width = is_glossy & bsdf.has_attribute(WIDE_LOBES, is_glossy)
-        may_be_sharp = has_width & bsdf.has_attribute(SHARP_LOBE, has_width)
-        is_wide = has_width & (bsdf.eval_attribute_1(WIDE_LOBES, si, has_width) > 0)
-        is_wide &= ~may_be_sharp | (dr.squared_norm(bsdf.eval_attribute_3(SHARP_LOBE, si, may_be_sharp)) == 0)
+        flags = si.bsdf(ray).flags()
+        directional = (flags & int(mi.BSDFFlags.Glossy | mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
         is_dark = dr.max(si.emitter(self._scene).eval(si)) == 0
-        return is_even & (~is_glossy | is_wide) & is_dark & (dr.squared_norm(normal) > _SAME_NORMAL**2)
+        return si.is_valid() & ~directional & is_dark & (dr.squared_norm(normal) > _SAME_NORMAL**2)
 
 
 class KeyPicture:
@@ -132,8 +124,8 @@ class KeyPicture:
         self._mm = float(1 / np.linalg.norm(inverse(self._to_frame)[:3, 0]))
         pixel = dr.arange(mi.UInt32, colors.shape[0] * colors.shape[1])
         ray, normal = pixels.ray(pixel), pixels.normal(pixel)
-        # No normal of a surface is like the zero of pixels that show no such surface.
-        normal = dr.select(pixels.is_even(ray, normal), dr.normalize(normal), 0)
+        # No normal of a surface is like the zero of pixels that show no diffuse surface.
+        normal = dr.select(pixels.is_diffuse(ray, normal), dr.normalize(normal), 0)
         self._planes = dr.ravel(mi.Vector4f(*normal, dr.dot(normal, pixels.point(pixel, ray))))
         dr.eval(self._planes)
 
@@ -141,7 +133,7 @@ class KeyPicture:
         """Light over albedo of other pixels by their numbers, and 1 where it is known, else 0."""
         ray, normal = others.ray(pixel), others.normal(pixel)
         point, albedo = others.point(pixel, ray), others.albedo(pixel)
-        is_known = others.is_even(ray, normal)
+        is_known = others.is_diffuse(ray, normal)
         normal = dr.normalize(normal)
         to_key = self._to_frame
         in_key = [mi.Float64(value) for value in _move(to_key, point)]
