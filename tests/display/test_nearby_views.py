@@ -61,6 +61,21 @@ def test_weights_make_a_point_of_those_that_two_lenses_show_beside_it():
     assert between.mean() > 0.3
     mean = sum(place.weight * at for place, at in zip(places, shown, strict=True)) / sum(p.weight for p in places)
     np.testing.assert_allclose(mean[between], point[0][between], atol=2e-3)
+    np.testing.assert_allclose(mean_aside(places)[between], 0, atol=2e-3)
+
+
+def mean_aside(places):
+    """Pixels to the right from the points that two lenses show, in the mean, to the point."""
+    return sum(place.weight * place.across for place in places) / sum(place.weight for place in places)
+
+
+def test_points_aside_of_all_that_two_lenses_show_are_told():
+    display = DISPLAYS["seed-lenticular"]
+    x, slope, z = np.linspace(-50, 50, 400), np.where(np.arange(400) % 2, 1.5, 0.1), np.full(400, -30.0)
+    point = x - slope * z, np.zeros_like(x), z
+    aside = mean_aside(list(LensViews(display, PixelWindow(0, 0, 512, 512)).places(x, 0 * x, slope, point, NUMPY)))
+    assert np.abs(aside[slope < 1]).max() < 0.01
+    assert np.abs(aside[slope > 1]).min() > 1
 
 
 def test_cameras_beside_a_ray_show_its_points_where_their_pictures_have_them():

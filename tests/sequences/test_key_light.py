@@ -12,8 +12,8 @@ import lippmann
 from lippmann.color.transfer import encode_srgb
 from lippmann.display import load_display
 from lippmann.rendering.methods import SAMPLES_LAYER
-from lippmann.scene.matrices import scaling, translation
-from lippmann.scene.values.description import Camera, Instance, Light, Material, Mesh, SceneDescription
+from lippmann.scene.matrices import rotation, scaling, translation
+from lippmann.scene.values.description import Camera, Environment, Instance, Light, Material, Mesh, SceneDescription
 from lippmann.scene.values.whitted_scene import CameraPose
 from lippmann.sequences import key_frames
 from lippmann.sequences.frames import FrameRange, render_quilt_sequence, render_sequence
@@ -136,6 +136,50 @@ def test_animated_cameras_pass_on_light_in_any_picture(form):
     # Frames of their own err alike, so that their difference is no judge.
     own, reference = (render([1], seed=seed, spp=n)[1] for seed, n in ((1, key.provenance.spp), (2, 64)))
     assert error(after, reference) < 1.2 * error(own, reference)
+
+
+class Turning(Motion):
+    """A matt ball, about which the camera turns by 12 degrees with each frame from ``start`` on."""
+
+    content = None
+    count = 2
+
+    def __init__(self, start=0):
+        trimesh = pytest.importorskip("trimesh")
+        ball = trimesh.creation.icosphere(4, 15)
+        mesh = Mesh("ball", ball.vertices.astype("f4"), ball.faces, 0, ball.vertex_normals.astype("f4"))
+        self.start = start
+        self.ball = lippmann.load_scene(
+            SceneDescription(
+                "ball",
+                [mesh],
+                [Material(base_color=(0.9, 0.6, 0.3), specular=0.0, roughness=1.0)],
+                [Instance(0, np.eye(4))],
+                lights=[Light("point", (4000.0, 4000.0, 4000.0), translation((20, 30, 40)))],
+                environment=Environment(np.full((16, 32, 3), 0.25, np.float32)),
+                cameras=[self.camera(0, None)],
+            )
+        )
+
+    def scene(self, frame):
+        return self.ball
+
+    def camera(self, frame, name):
+        turn = rotation((12 * (frame + self.start), 0, 0))
+        return Camera("turning", turn @ translation((0, 0, 654)), fov_y=0.06, focus_distance=654)
+
+    def bounds(self):
+        return self.ball.bounds
+
+
+@pytest.mark.slow
+def test_surfaces_that_come_into_sight_take_no_light_of_those_beside_them():
+    display = load_display("seed-lenticular").resized(256, 160)
+    options = {"integrator": "path", "placement": {"depth_scale": 0.3}, "exposure": 0.0, "tone_map": "none"}
+    after = dict(render_sequence(Turning(), display, [1], **options))[1]
+    traced = dict(render_sequence(Turning(start=1), display, [0], **options))[0]
+    assert after.provenance.pixel_shares
+    assert error(after, traced) < 1e-5
 
 
 def test_what_is_kept_of_a_film_ends_with_it(display, monkeypatch):

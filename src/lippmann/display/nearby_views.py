@@ -21,8 +21,10 @@ _CLOSE = 1e-3
 
 class Place(NamedTuple):
     """Continuous pixel coordinates in a picture, to the right and downwards, and the rectangle of the pixels that
-    belong to the same view: ``left <= column < right``, ``top <= row < bottom``. ``weight`` falls with the
-    distance to the point itself, so that the weighted mean of the points shown is that point if it lies between them.
+    belong to the same view: ``left <= column < right``, ``top <= row < bottom``.
+
+    ``across`` and ``down`` lead from there to the point itself, in pixels. ``weight`` falls with them, so that the
+    weighted mean of the points shown is that point if it lies between them; that of ``across`` and ``down`` is 0 then.
     """
 
     u: Array
@@ -31,6 +33,8 @@ class Place(NamedTuple):
     top: Array
     right: Array
     bottom: Array
+    across: Array
+    down: Array
     weight: Array
 
 
@@ -88,8 +92,9 @@ class LensViews:
         near_v = v
         if display.lens_array.layout != "lenticular":
             near_v = ops.minimum(ops.maximum(v, middle[1] - half_height), middle[1] + half_height)
-        weight = 1 / (abs(u - near_u) + abs(v - near_v) + _CLOSE)
-        return Place(near_u - window.left, near_v - window.top, 0, 0, window.width, window.height, weight)
+        across, down = u - near_u, v - near_v
+        weight = 1 / (abs(across) + abs(down) + _CLOSE)
+        return Place(near_u - window.left, near_v - window.top, 0, 0, window.width, window.height, across, down, weight)
 
 
 @dataclass(frozen=True)
@@ -119,7 +124,7 @@ class CameraViews:
             above = ops.floor((view + 0.5) / self.columns)
             left = (view - above * self.columns) * self.window.width
             top = (self.rows - 1 - above) * self.window.height
-            yield Place(left + u, top + v, left, top, left + self.window.width, top + self.window.height, 1.0)
+            yield Place(left + u, top + v, left, top, left + self.window.width, top + self.window.height, 0.0, 0.0, 1.0)
 
 
 __all__ = ["CameraViews", "LensViews", "NearbyViews", "Place"]

@@ -33,6 +33,8 @@ Matrix = NDArray[np.float64]
 _SAME_NORMAL = 0.97
 #: Distance from a surface's plane, as a share of its height, plus a share of the gap.
 _OFF_PLANE = 0.02, 0.1
+#: Pixels from the mean of the points that views show to the point itself: it is to lie between them.
+_ASIDE = 0.5
 #: Largest difference of codes between pixels that agree.
 _AGREEMENT = 0.02
 
@@ -144,14 +146,17 @@ class KeyPicture:
         off_plane = _OFF_PLANE[0] * dr.abs(mi.Float(in_key[2])) + _OFF_PLANE[1] * self._views.display.gap
         mean, total = self._color(0), mi.Float(0)
         least, most = self._color(dr.inf), self._color(0)
-        for u, v, left, top, right, bottom, weight in self._views.places(x, y, slopes[0], tuple(in_key), DEVICE):
-            place = mi.Float(u), mi.Float(v)
-            inside = mi.Int32(left), mi.Int32(top), mi.Int32(right), mi.Int32(bottom)
+        aside = mi.Vector2f(0)
+        for view in self._views.places(x, y, slopes[0], tuple(in_key), DEVICE):
+            place, weight = (mi.Float(view.u), mi.Float(view.v)), mi.Float(view.weight)
+            inside = mi.Int32(view.left), mi.Int32(view.top), mi.Int32(view.right), mi.Int32(view.bottom)
             is_known, irradiance, low, high = self._mean(place, inside, phase, point, normal, off_plane, is_known)
             least, most = dr.minimum(least, low), dr.maximum(most, high)
             # Else light would move on the surface with each frame that passes it on.
-            mean += mi.Float(weight) * irradiance
-            total += mi.Float(weight)
+            mean += weight * irradiance
+            total += weight
+            aside += weight * mi.Vector2f(mi.Float(view.across), mi.Float(view.down))
+        is_known &= dr.max(dr.abs(aside)) < _ASIDE * total
         low, high, mean = (mi.Color3f(part if len(part) == 3 else part.x) for part in (least, most, mean / total))
         reflected = mi.Color3f(albedo if len(albedo) == 3 else albedo.x)
         apart = encode(high * reflected, coding) - encode(low * reflected, coding)
