@@ -100,7 +100,7 @@ def test_what_cannot_be_compared_is_refused_in_one_line(lippmann, pair, tmp_path
         ((pair[0], tmp_path / "empty.exr"), "empty.exr"),
         ((pair[0], tmp_path / "missing.png"), "missing.png"),
         ((*pair, "--map", tmp_path / "map.txt"), "'.txt'"),
-        ((*pair, "--csv", tmp_path / "no" / "folder.csv"), "not found"),
+        ((*pair, "--csv", tmp_path / "no" / "folder.csv"), "there is no folder"),
         ((*pair, "--display", "none-such"), "none-such"),
     ):
         done = lippmann("compare", *words)

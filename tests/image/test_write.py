@@ -139,7 +139,7 @@ def test_what_is_stored(tmp_path, name, bits, source, stored):
         ("a", None, "no ending; known are .png"),
         ("a.png", 32, "32 bits per channel are not possible; png has 8 or 16"),
         ("a.exr", 8, "8 bits per channel are not possible; exr has 16 or 32"),
-        ("missing/a.png", None, "not found"),
+        ("missing/a.png", None, "there is no folder"),
     ],
 )
 def test_output_that_cannot_be(tmp_path, display, picture, name, bits, message):

@@ -113,7 +113,7 @@ def test_nothing_is_rendered_for_a_place_that_cannot_be_written(monkeypatch, tmp
         raise AssertionError("rendering began")
 
     monkeypatch.setattr("lippmann.reproduce.run.engine_renderer", refuse)
-    with pytest.raises(OutputError, match="not found"):
+    with pytest.raises(OutputError, match="there is no folder"):
         reproduce(tmp_path / "no" / "such", quick=True)
 
 

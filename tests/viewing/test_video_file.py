@@ -170,7 +170,7 @@ def test_places_that_cannot_be(tmp_path):
             check_animation_path(tmp_path / name)
         with pytest.raises(OutputError, match=message):
             write_animation(frames(), tmp_path / name)
-    with pytest.raises(OutputError, match="not found"):
+    with pytest.raises(OutputError, match="there is no folder"):
         write_animation(frames(), tmp_path / "missing" / "a.mp4")
 
 
