@@ -35,8 +35,6 @@ _FAULTS = (OSError, zipfile.BadZipFile, ElementTree.ParseError, KeyError, ValueE
 #: Attributes that hold for all that stands in an element.
 _INHERITED = ("colorspace", "fileprefix")
 _INCLUDE = "{http://www.w3.org/2001/XInclude}include"
-#: Documents that include each other.
-_DEEPEST = 8
 
 
 def materialx_layer(path: str, admits: Callable[[str], bool], notes: list[str]) -> Sdf.Layer:
@@ -54,7 +52,7 @@ def materialx_layer(path: str, admits: Callable[[str], bool], notes: list[str]) 
     """
     try:
         root = _read(path)
-        _include(root, path, admits, notes, _DEEPEST)
+        _include(root, path, admits, notes, {os.path.normpath(path)})
         layer = Sdf.Layer.CreateAnonymous(f"{path}.usda")
         _Document(root, Usd.Stage.Open(layer), path, notes).make_materials()
     except _FAULTS as error:
@@ -70,19 +68,20 @@ def _read(path: str) -> Element:
         return ElementTree.fromstring(package.read(inner))
 
 
-def _include(root: Element, path: str, admits: Callable[[str], bool], notes: list[str], depth: int) -> None:
-    """Put what included documents hold in the place of their names."""
+def _include(root: Element, path: str, admits: Callable[[str], bool], notes: list[str], included: set[str]) -> None:
+    """Put what included documents hold in the place of their names, of each document once."""
     for element in root.findall(_INCLUDE):
         name = element.get("href", "")
         inner = _beside(path, name)
         try:
-            if depth == 0 or not admits(inner):
-                raise ValueError("it includes itself" if depth == 0 else "it lies outside the scene's folder")
-            held = _read(inner)
+            if not admits(inner):
+                raise ValueError("it lies outside the scene's folder")
+            held = Element("materialx") if inner in included else _read(inner)
         except _FAULTS as error:
             notes.append(f"'{name}', which '{os.path.basename(path)}' includes, cannot be read ({error}): left out")
             continue
-        _include(held, inner, admits, notes, depth - 1)
+        included.add(inner)
+        _include(held, inner, admits, notes, included)
         folder = posixpath.join(posixpath.dirname(name), "")
         for child in held:
             child.set("colorspace", child.get("colorspace", held.get("colorspace", "")))
