@@ -11,7 +11,7 @@
 
 :func:`load_scene` takes a scene's own options (``up``, ``environment``, ``background``, ``light``), and
 :func:`load_display` the names that :func:`list_displays` lists. Lengths are millimetres, +x to the right, +y up and +z
-toward the viewer. Pictures are ``(H, W, 3)`` float32 linear RGB, row 0 on top. Whatever is wrong is a
+toward the viewer. Pictures are ``(H, W, 3)`` float32 linear RGB, row 0 on top. Every error is a
 :class:`LippmannError` of one line.
 
 Importing this package does no work: the names below are loaded when they are first used.

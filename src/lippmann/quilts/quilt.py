@@ -422,8 +422,6 @@ def checked_layout(columns: int, rows: int, aspect: float | None, *, where: str)
         rule = f"there are 1 to {MOST_TILES} of both"
         raise PictureError(f"it says {columns} columns and {rows} rows", where=where, rule=rule)
     if aspect is not None and not 0.05 <= aspect <= 20:
-        # The command line has an option of its own for it.
-        where = where.replace("--layout", "--aspect")
         raise PictureError(f"the aspect is {aspect:g}", where=where, rule="it is width over height, 0.05 to 20")
     return QuiltLayout(columns, rows, aspect)
 

@@ -183,7 +183,8 @@ def rays_of(source: OnePicture | QuiltRays, is_chosen: Mask) -> Iterator[tuple[S
 
     rows, columns = np.nonzero(is_chosen)
     order = np.lexsort((rows % STRIP_ROWS, columns, rows // STRIP_ROWS))  # neighbours take much the same paths
-    for part in np.array_split(order, -(-len(order) // preferred_lanes())) if len(order) else ():
+    for start in range(0, len(order), preferred_lanes()):
+        part = order[start : start + preferred_lanes()]
         places = rows[part], columns[part]
         yield SinglePixelRays(source, *places[::-1], np.zeros_like(part)), places
 

@@ -347,7 +347,8 @@ def layout_of(layout: str | None, aspect: float | None) -> QuiltLayout | None:
             raise UsageError("applies to --layout only", where="--aspect", fix="add --layout")
         return None
     columns, rows = parse.size(layout, "--layout", rule="columns x rows, such as 8x6")
-    return checked_layout(columns, rows, aspect, where="--layout")
+    checked_layout(columns, rows, None, where="--layout")
+    return checked_layout(columns, rows, aspect, where="--aspect")
 
 
 def _views(source: Path, layout: QuiltLayout | None, progress: ProgressCallback) -> Quilt:

@@ -199,8 +199,8 @@ def evaluate(sample: PixelSample, lanes: int, totals: RayTotals) -> None:
     # All at once: a sum of an unevaluated radiance would run the path loop anew.
     dr.eval(sample.radiance, sample.specular, sample.excess, sample.covered, counts.secondary, counts.shadow, finite)
     totals.primary += lanes
-    totals.secondary += lane_total(counts.secondary)
-    totals.shadow += lane_total(counts.shadow)
+    totals.secondary += lane_sum_lanes(counts.secondary)
+    totals.shadow += lane_sum_lanes(counts.shadow)
     totals.discarded += lanes - int(dr.count(finite)[0])
 
 
@@ -210,7 +210,7 @@ def finite_or_black(radiance: Spectrum) -> tuple[Color3f, Bool]:
     return dr.select(finite, radiance, mi.Color3f(0)), finite
 
 
-def _total(values: Float, count: int) -> NDArray[np.float32]:
+def _sum_lanes(values: Float, count: int) -> NDArray[np.float32]:
     """Sums of ``count`` lanes each."""
     return np.asarray(dr.block_sum(values, count) if count > 1 else values)
 
@@ -228,9 +228,9 @@ def add_samples(
     None in rows. The sums are in rows. The rays of a sub-pixel carry all three colours: it keeps the one that it shows.
     """
     lights = {"radiance": sample.radiance, "specular": sample.specular, "excess": sample.excess}
-    totals = {name: [_total(part, count) for part in light] for name, light in lights.items() if light is not None}
+    totals = {name: [_sum_lanes(part, count) for part in light] for name, light in lights.items() if light is not None}
     if sample.covered is not None:
-        totals["covered"] = [_total(sample.covered, count)] * channels
+        totals["covered"] = [_sum_lanes(sample.covered, count)] * channels
     for name, components in totals.items():
         for index, total in enumerate(components):
             lanes = total.reshape(-1, channels, len(sums[name]))[:, index % channels]
@@ -248,7 +248,7 @@ def select_colors(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.stack([values[:, c, ..., c] for c in range(3)], axis=-1)
 
 
-def lane_total(counts: UInt32) -> int:
+def lane_sum_lanes(counts: UInt32) -> int:
     """The sum of evaluated counts over all lanes."""
     # Sums of 32-bit counts overflow beyond 2^32 rays a wavefront; 64 bits do not.
     return int(dr.sum(mi.UInt64(counts))[0])
