@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 import pytest
 
-from lippmann.errors import SceneError
+from lippmann.errors import MemoryLimitError, SceneError
 from lippmann.scene.readers.load import load_scene
 
 GRID = np.random.default_rng(0).integers(-5, 900, (4, 3, 2)).astype(np.int16)  # z, y, x
@@ -48,6 +48,14 @@ def test_voxels_in_a_file_of_their_own(tmp_path):
     assert (volume_of(tmp_path / "a.nhdr").grid == GRID).all()
     (tmp_path / "a.nhdr").write_text(header.replace("skip: 5", "skip: -1"))
     assert (volume_of(tmp_path / "a.nhdr").grid == GRID).all()
+
+
+def test_bytes_before_packed_voxels_are_unpacked_within_the_memory_alone(tmp_path):
+    more = f"byte skip: {10**15}\n"
+    header = NRRD.format(kind="int16", endian="little", encoding="gzip", more=more, **LPS).encode()
+    (tmp_path / "a.nrrd").write_bytes(header + b"\n" + gzip.compress(bytes(100)))
+    with pytest.raises(MemoryLimitError, match="bytes before the voxels"):
+        load_scene(tmp_path / "a.nrrd")
 
 
 @pytest.mark.parametrize(("encoding", "pack"), [("raw", bytes), ("gzip", gzip.compress)])

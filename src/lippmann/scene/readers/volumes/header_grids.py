@@ -102,6 +102,7 @@ def read_header_grid(path: Path, *, files: NamedFiles) -> SceneDescription:
             raise SceneError(f"has no {grid.lines} lines before its voxels", where=where, fix="is it whole?")
     skip = max(grid.skip, 0)
     if grid.is_packed:
+        check_input(skip + size, f"{skip} bytes before the voxels", where=where)
         try:
             body = zlib.decompressobj(47).decompress(data[start:], skip + size)[skip:]  # of zlib or gzip
         except zlib.error as error:
