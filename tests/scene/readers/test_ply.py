@@ -248,6 +248,24 @@ def test_a_cloud_of_points_is_drawn_as_balls(read, colored):
     assert (mesh.colors is not None) == colored
 
 
+@pytest.mark.parametrize("owner", ["vertex", "edge"])
+def test_edges_without_faces_are_drawn_as_rods(read, owner):
+    """As line sets of Open3D, and loose edges of Blender."""
+    colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+    head = header("ascii", vertex=colors if owner == "vertex" else "", faces=0)
+    edges = "element edge 2\nproperty int vertex1\nproperty int vertex2\n" + (colors if owner == "edge" else "")
+    rows = [f"{x} {y} {z}" + " 255 0 0" * (owner == "vertex") for x, y, z in VERTICES]
+    rows += [f"{ends}" + " 255 0 0" * (owner == "edge") for ends in ("0 1", "1 2")]
+    text = head.replace("end_header\n", edges + "end_header\n") + "\n".join(rows) + "\n"
+    scene = read(text.encode())
+    (mesh,) = scene.meshes
+    assert mesh.positions.max(axis=0) == pytest.approx([1.0, 1.0, 0.0], abs=0.02)  # without vertices of no edge
+    assert (mesh.colors[:, :3] == [1.0, 0.0, 0.0]).all()
+    assert [note[:18] for note in scene.notes] == ["lines are drawn as"]
+    with pytest.raises(SceneError, match="an edge uses a vertex that is not there"):
+        read(text.replace("\n0 1", "\n0 5").encode())
+
+
 def test_points_without_coordinates_are_left_out(read):
     colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n"
     rows = "".join(f"{'nan' if x == 0 else x} {y} {z} {100 * x} 255 0\n" for x, y, z in VERTICES)

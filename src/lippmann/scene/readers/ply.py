@@ -91,14 +91,15 @@ def describe_polygons(
     unread = sorted({each.name for each in elements["vertex"].properties} - _KNOWN)
     if unread:
         notes.append(f"of vertices not shown: {', '.join(name[:40] for name in unread[:20])}")
-    stepped_over = [each.name[:40] for each in header.elements if each.count and each.name not in _ELEMENTS]
-    if stepped_over:
-        notes.append(f"elements not shown: {', '.join(stepped_over[:20])}")
     if _UV_FACES in columns:
         columns = _with_corner_uvs(columns)
     outline = _outline(columns, where)
+    shown = _ELEMENTS if len(outline.sizes) else (*_ELEMENTS, "edge")
+    stepped_over = [each.name[:40] for each in header.elements if each.count and each.name not in shown]
+    if stepped_over:
+        notes.append(f"elements not shown: {', '.join(stepped_over[:20])}")
     if not len(outline.sizes):
-        return replace(_cloud(columns["vertex"], elements["vertex"], path.stem, notes, where), up=header.up)
+        return replace(_cloud(columns, elements, path.stem, notes, where), up=header.up)
     mesh, owners = _mesh(columns, elements, outline, path.stem, notes, where)
     if "face" in elements and all(_color_names(elements[name]) for name in ("vertex", "face")):
         notes.append("colours of faces are not shown: vertices have their own")
@@ -171,20 +172,42 @@ def _material(name: str, texture: Texture | None, mesh: Mesh) -> Material:
     )
 
 
-def _cloud(vertex: Columns, element: Element, name: str, notes: list[str], where: str) -> SceneDescription:
-    """Points as balls."""
+def _cloud(
+    columns: Mapping[str, Columns], elements: Mapping[str, Element], name: str, notes: list[str], where: str
+) -> SceneDescription:
+    """Edges as rods, without any points as balls."""
+    vertex = columns["vertex"]
     positions = np.stack([np.asarray(vertex[axis]) for axis in "xyz"], axis=-1)
     if not len(positions):
         raise SceneError("holds no vertices", where=where)
-    finite, colors = _is_finite(positions), _colors(vertex, element)
+    colors = _colors(vertex, elements["vertex"])
+    ends = _ends(columns.get("edge", {}), len(positions), where)
+    if ends is not None:
+        of_edges = _colors(columns["edge"], elements["edge"]) if colors is None else None
+        positions, colors = positions[ends.ravel()], None if colors is None else colors[ends.ravel()]
+        colors = colors if of_edges is None else np.repeat(of_edges, 2, axis=0)
+        whole = np.repeat(_is_finite(positions).reshape(-1, 2).all(axis=1), 2)
+        positions, colors = positions[whole], None if colors is None else colors[whole]
+    finite = _is_finite(positions)
     if finite.any() and not finite.all():  # places of depth cameras' pictures that nothing was measured at
         notes.append(f"{np.count_nonzero(~finite)} points without finite coordinates are left out")
         positions, colors = positions[finite], None if colors is None else colors[finite]
     _check_finite(positions, where)
     positions = near_origin(positions, notes)
-    points = np.arange(len(positions), dtype=np.uint32)[:, None]
-    thin = Mesh(name, positions.astype(np.float32), points, 0, None, (), colors)
+    places = np.arange(len(positions), dtype=np.uint32).reshape(-1, 1 if ends is None else 2)
+    thin = Mesh(name, positions.astype(np.float32), places, 0, None, (), colors)
     return describe_cloud(thin, _material(name, None, thin), notes)
+
+
+def _ends(edge: Columns, count: int, where: str) -> NDArray[np.int64] | None:
+    """The two vertices ``(m, 2)`` of each edge; None without edges."""
+    pair = [edge.get(name) for name in ("vertex1", "vertex2")]
+    if not all(isinstance(each, np.ndarray) and len(each) for each in pair):
+        return None
+    ends = np.stack([np.asarray(each) for each in pair], axis=1)
+    if not ((ends >= 0) & (ends < count)).all():
+        raise SceneError("an edge uses a vertex that is not there", where=where, rule=f"the file has 0 to {count - 1}")
+    return ends.astype(np.int64)
 
 
 def _is_finite(positions: Numbers) -> NDArray[np.bool_]:

@@ -362,3 +362,127 @@ def test_surfaces_without_shading(read, kind, name):
     scene = read(material_x(kind, f"color3f inputs:{name} = (0.5, 0.25, 1)"))
     assert (scene.materials[0].base_color, scene.materials[0].unlit) == ((0.5, 0.25, 1.0), True)
     assert scene.notes == []
+
+
+def test_omni_tints_lays_and_cuts_its_pictures(read):
+    """The tint alone is how Omniverse's programs colour; alpha is what the opacity's mode 0 takes."""
+    assert read(of_kind("OmniPBR", "color3f inputs:diffuse_tint = (1, 0.5, 0)")).materials[0].base_color == (
+        pytest.approx((0.2, 0.1, 0.0))
+    )
+    inputs = """asset inputs:diffuse_texture = @t.png@
+        color3f inputs:diffuse_tint = (1, 0.5, 0)
+        float inputs:albedo_brightness = 0.5
+        float2 inputs:texture_scale = (2, 3)
+        float2 inputs:texture_translate = (0.25, 0)
+        float inputs:texture_rotate = 45
+        bool inputs:enable_opacity = 1
+        bool inputs:enable_opacity_texture = 1
+        asset inputs:opacity_texture = @a.png@
+        int inputs:opacity_mode = 0
+        float inputs:opacity_threshold = 0.25"""
+    alpha = np.array([[[255, 255, 255, 0], [0, 0, 0, 255]]], np.uint8)
+    scene = read(of_kind("OmniPBR", inputs), files={"t.png": png(PICTURE), "a.png": png(alpha)})
+    material = scene.materials[0]
+    assert material.base_color == pytest.approx((0.5, 0.25, 0.0))
+    assert material.base_color_texture.uv_transform @ (0.5, 1.0, 1.0) == pytest.approx((1.25, 1.0, 1.0))
+    np.testing.assert_allclose(material.base_color_texture.image.pixels[0, [0, -1], 3], [0, 255])
+    assert (material.alpha_mode, material.alpha_cutoff) == ("mask", 0.25)
+    assert scene.notes == ["material /mat: not honoured: texture_rotate"]
+
+
+IMAGE = (
+    'def Shader "t" { uniform token info:id = "ND_image_color3"\n asset inputs:file = @t.png@\n color3f outputs:out\n'
+)
+
+
+def computed(kind, inputs, before=""):
+    node = f'def Shader "m" {{ uniform token info:id = "ND_{kind}"\n {inputs}\n color3f outputs:out\n}}\n'
+    base = "color3f inputs:base_color.connect = </mat/m.outputs:out>"
+    return material_x(STANDARD, base, node + before)
+
+
+@pytest.mark.parametrize(
+    ("kind", "inputs", "color"),
+    [
+        ("add_color3", "color3f inputs:in1 = (0.5, 0, 0)\n color3f inputs:in2 = (0, 0.25, 0)", (0.5, 0.25, 0.0)),
+        ("subtract_color3FA", "color3f inputs:in1 = (1, 0.5, 0.5)\n float inputs:in2 = 0.25", (0.75, 0.25, 0.25)),
+        ("divide_color3FA", "color3f inputs:in1 = (1, 0.5, 0)\n float inputs:in2 = 2", (0.5, 0.25, 0.0)),
+        ("multiply_color4", "color4f inputs:in1 = (1, 1, 0, 1)\n color4f inputs:in2 = (0.5, 1, 1, 1)", (0.5, 1.0, 0.0)),
+        (
+            "mix_color3",
+            "color3f inputs:fg = (1, 0, 0)\n color3f inputs:bg = (0, 0, 1)\n float inputs:mix = 0.25",
+            (0.25, 0.0, 0.75),
+        ),
+        ("invert_color3", "color3f inputs:in = (1, 0.75, 0)", (0.0, 0.25, 1.0)),
+        ("remap_color3", "color3f inputs:in = (1, 0.5, 0)\n color3f inputs:outlow = (0.5, 0.5, 0.5)", (1.0, 0.75, 0.5)),
+        ("combine3_color3", "float inputs:in1 = 0.25\n float inputs:in3 = 1", (0.25, 0.0, 1.0)),
+        ("dot_color3", 'color3f inputs:in = (0.5, 1, 0) (colorSpace = "srgb_texture")', (0.214041, 1.0, 0.0)),
+    ],
+)
+def test_values_are_computed(read, kind, inputs, color):
+    scene = read(computed(kind, inputs))
+    assert scene.materials[0].base_color == pytest.approx(color, abs=1e-6)
+    assert scene.notes == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "inputs", "color"),
+    [
+        (
+            "subtract_color3",
+            "color3f inputs:in1 = (1, 1, 1)\n color3f inputs:in2.connect = </mat/t.outputs:out>",
+            (0, 1, 1),
+        ),
+        (
+            "mix_color3",
+            "color3f inputs:fg.connect = </mat/t.outputs:out>\ncolor3f inputs:bg = (0, 0, 1)\n float inputs:mix = 0.25",
+            (0.25, 0, 0.75),
+        ),
+        ("hsvadjust_color3", "color3f inputs:in.connect = </mat/t.outputs:out>", (1, 0, 0)),
+        (  # what is not read is not 0
+            "multiply_color3",
+            "color3f inputs:in1.connect = </mat/n.outputs:out>\n color3f inputs:in2.connect = </mat/t.outputs:out>",
+            (1, 0, 0),
+        ),
+    ],
+)
+def test_images_are_computed_or_shown_as_they_are(read, kind, inputs, color):
+    noise = 'def Shader "n" { uniform token info:id = "ND_noise2d_color3"\n color3f outputs:out\n}\n'
+    red = np.array([[[255, 0, 0]]], np.uint8)
+    scene = read(computed(kind, inputs, IMAGE + "}\n" + noise), files={"t.png": png(red)})
+    material = scene.materials[0]
+    texel = material.base_color_texture.image.pixels[0, 0]
+    values = texel / 255.0 if texel.dtype == np.uint8 else texel
+    np.testing.assert_allclose(values * material.base_color, color, atol=1e-6)
+    is_computed = kind in ("subtract_color3", "mix_color3")
+    assert any(f"'{kind}' are not read: their image is shown as it is" in note for note in scene.notes) != is_computed
+
+
+def test_coordinates_times_a_value_repeat_an_image(read):
+    place = """float2 inputs:texcoord.connect = </mat/p.outputs:out>
+    }
+    def Shader "p" {
+        uniform token info:id = "ND_multiply_vector2FA"
+        float2 inputs:in1.connect = </mat/c.outputs:out>
+        float inputs:in2 = 3
+        float2 outputs:out
+    }
+    def Shader "c" {
+        uniform token info:id = "ND_texcoord_vector2"
+        float2 outputs:out
+    }
+"""
+    image = "color3f inputs:in.connect = </mat/t.outputs:out>"
+    scene = read(computed("dot_color3", image, IMAGE + place), files={"t.png": png(PICTURE)})
+    texture = scene.materials[0].base_color_texture
+    assert texture.uv_transform @ (1.0, 0.0, 1.0) == pytest.approx((3.0, -2.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("space", "srgb"),
+    [("srgb_texture", True), ("g22_rec709", True), ("lin_srgb", False), ("Utility - Linear - sRGB", False)],
+)
+def test_linear_spaces_named_after_srgb_are_linear(read, space, srgb):
+    image = IMAGE.replace("@t.png@", f'@t.png@ (colorSpace = "{space}")') + "}\n"
+    body = computed("dot_color3", "color3f inputs:in.connect = </mat/t.outputs:out>", image)
+    assert read(body, files={"t.png": png(PICTURE)}).materials[0].base_color_texture.srgb is srgb

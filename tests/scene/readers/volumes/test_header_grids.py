@@ -31,7 +31,7 @@ def volume_of(path):
 
 
 @pytest.mark.parametrize("axes", [LPS, RAS])
-@pytest.mark.parametrize(("kind", "endian", "dtype"), [("short", "little", "<i2"), ("signed int", "big", ">i4")])
+@pytest.mark.parametrize(("kind", "endian", "dtype"), [("short", "little", "<i2"), ("long long int", "big", ">i8")])
 @pytest.mark.parametrize(("encoding", "pack"), [("raw", bytes), ("gzip", gzip.compress)])
 def test_nrrd_lies_as_its_directions_say(tmp_path, axes, kind, endian, dtype, encoding, pack):
     header = NRRD.format(kind=kind, endian=endian, encoding=encoding, more="", **axes)
@@ -107,6 +107,13 @@ def test_rows_of_a_metaimage_s_matrix_are_directions(tmp_path):
         (("short", "block"), "has a header without sense"),
         (("encoding: raw", "encoding: bzip2"), "encoding bzip2; raw and gzip are read"),
         (("sizes: 2 3 4", "sizes: 3 2 2 2"), "one number a voxel on three axes"),
+        (
+            (
+                "sizes: 2 3 4\nspace directions: (1,0,0) (0,2,0) (0,0,3)",
+                "sizes: 2 3 2 2\nspace directions: " + "(1,0,0,0) (0,2,0,0) (0,0,3,0) (0,0,0,1)",
+            ),
+            "has .2, 3, 2, 2. values",
+        ),
         (("kinds: domain", "kinds: vector"), "2 values a voxel, vector; one is read"),
         (("sizes: 2 3 4", "sizes: 2 3 5"), "holds 48 of 60 bytes of voxels"),
         (("(0,0,3)", "(0,2,0)"), "its voxels have no extent"),

@@ -5,10 +5,19 @@ from __future__ import annotations
 import os
 from typing import Any
 
+import numpy as np
 from pxr import Gf, Sdf, Usd, UsdShade
 
+from lippmann.color.transfer import decode_srgb
 from lippmann.scene.readers.usd.records import Record
-from lippmann.scene.readers.usd.stage_surfaces import as_preview, is_read, materialx_node, surface_of, unread_inputs
+from lippmann.scene.readers.usd.stage_surfaces import (
+    as_preview,
+    is_coded,
+    is_read,
+    materialx_node,
+    surface_of,
+    unread_inputs,
+)
 
 #: Nodes between a surface and what it reads.
 _DEEPEST = 8
@@ -75,6 +84,8 @@ class MaterialTable:
             value = attribute.Get(self._time)
             if isinstance(value, Sdf.AssetPath):
                 return {"asset": asset_record(attribute, value, self._time)}
+            if is_coded(str(attribute.GetColorSpace())) and str(attribute.GetTypeName()).startswith("color"):
+                value = type(value)(*decode_srgb(np.array(value)[:3]).tolist(), *list(value)[3:])
             return None if value is None else {"value": _plain(value)}
         node = UsdShade.Shader(attribute.GetPrim())
         node_kind = str(node.GetShaderId()) if node else ""
@@ -90,8 +101,12 @@ class MaterialTable:
             return {"transform": given}
         if node_kind.startswith("UsdPrimvarReader_"):
             return {"primvar": given.get("varname", {}).get("value", ""), "fallback": given.get("fallback")}
-        self._notes[f"shader nodes of type '{node_kind}' are not read"] = None
-        return None
+        # Most nodes change a colour; as it is, it is nearer to the right one than any default.
+        names = () if "normal" in node_kind else ("in", "in1", "in2", "fg", "bg")
+        passed = next((given[each] for each in names if "texture" in given.get(each, ())), None)
+        then = "" if passed is None else ": their image is shown as it is"
+        self._notes[f"shader nodes of type '{node_kind}' are not read{then}"] = None
+        return passed
 
 
 def asset_record(attribute: Usd.Attribute, value: Sdf.AssetPath, time: Usd.TimeCode) -> Record:

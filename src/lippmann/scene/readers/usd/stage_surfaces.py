@@ -7,11 +7,13 @@ translation to ``UsdPreviewSurface``, and of NVIDIA's OmniPBR.mdl and OmniGlass.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pxr import Usd, UsdShade
 
 from lippmann.scene.readers.usd.records import Record
@@ -119,8 +121,10 @@ _MODELS = {
             "roughness": ("reflection_roughness_constant", 0.5),
             "emissiveColor": ("emissive_color", [1.0, 0.1, 0.1]),
             "opacity": ("opacity_constant", 1.0),
+            "opacityThreshold": ("opacity_threshold", 0.0),
         },
         {"emissiveColor": ("enable_emission", 0.0)},
+        unread=("albedo_desaturation", "texture_rotate", "project_uvw"),
     ),
 }
 _MODELS |= {
@@ -224,6 +228,10 @@ def as_preview(kind: str, given: Record) -> Record:
         if not _number(given, "enable_clearcoat", 0.0):
             inputs.pop("clearcoat", None)
         inputs.update(_omni_pictures(given))
+        if "texture" in inputs["diffuseColor"]:
+            brightness, more = _number(given, "albedo_brightness", 1.0), _number(given, "albedo_add", 0.0)
+            inputs["diffuseColor"] = _affine(inputs["diffuseColor"], brightness, more)
+        inputs["diffuseColor"] = _affine(inputs["diffuseColor"], _numeric(given.get("diffuse_tint"), 1.0), 0.0)
         if not _number(given, "enable_opacity", float(kind.endswith("Opacity"))):
             inputs.pop("opacity")
     if kind == "ND_gltf_pbr_surfaceshader":
@@ -235,7 +243,7 @@ def as_preview(kind: str, given: Record) -> Record:
             inputs["opacityThreshold"] = given.get("alpha_cutoff", {"value": 0.5})
     for preview, (name, usual) in model.weights.items():
         weight = _number(given, name, usual)
-        inputs[preview] = _scale(inputs[preview], [weight, weight, weight])
+        inputs[preview] = _affine(inputs[preview], weight, 0.0)
     if share := _number(given, model.subsurface, 0.0):
         inputs["diffuseColor"] = _mix(inputs["diffuseColor"], given.get("subsurface_color", {"value": _WHITE}), share)
     if through := _number(inputs, "transmission", 0.0) if model.transmission_color else 0.0:
@@ -254,16 +262,18 @@ def _omni_pictures(given: Record) -> Record:
     for preview, (name, channel, switch) in _OMNI_PICTURES.items():
         asset = given.get(name)
         if asset is not None and asset.get("asset", {}).get("name") and (switch is None or _number(given, switch, 0.0)):
-            inputs[preview] = _picture(asset, channel, preview)
+            is_in_alpha = name == "opacity_texture" and _number(given, "opacity_mode", 1.0) == 0.0
+            inputs[preview] = _picture(asset, "a" if is_in_alpha else channel, preview, given)
     packed = given.get("ORM_texture")
     if packed is not None and packed.get("asset", {}).get("name") and _number(given, "enable_ORM_texture", 0.0):
-        inputs |= {preview: _picture(packed, channel, preview) for preview, channel in _OMNI_PACKED.items()}
+        inputs |= {preview: _picture(packed, channel, preview, given) for preview, channel in _OMNI_PACKED.items()}
     return inputs
 
 
-def _picture(asset: Record, channel: str, preview: str) -> Record:
+def _picture(asset: Record, channel: str, preview: str, given: Record) -> Record:
     repeat = {"value": "repeat"}
-    texture: Record = {"file": asset, "wrapS": repeat, "wrapT": repeat}
+    place = {"scale": given.get("texture_scale"), "translation": given.get("texture_translate")}
+    texture: Record = {"file": asset, "wrapS": repeat, "wrapT": repeat, "st": {"transform": place}}
     if preview == "normal":
         texture |= _AS_DIRECTIONS
     elif channel != "rgb":
@@ -277,33 +287,58 @@ _AS_DIRECTIONS: Record = {"scale": {"value": [2.0, 2.0, 2.0, 1.0]}, "bias": {"va
 def _under_coat(base: Record, tint: Record, coat: float) -> Record:
     """A base colour below a coloured coat, which light passes; where both are pictures, the base alone."""
     if isinstance(color := tint.get("value"), list):
-        return _scale(base, [1.0 + coat * (number - 1.0) for number in color])
+        return _affine(base, 1.0 + coat * (np.array(color) - 1.0), 0.0)
     if coat == 1.0 and isinstance(color := base.get("value"), list):
-        return _scale(tint, color)
+        return _affine(tint, color, 0.0)
     return base
 
 
 def _mix(below: Record, above: Record, share: float) -> Record:
-    """One colour over another; where one is a picture, that of the larger share."""
-    first, second = below.get("value"), above.get("value")
-    if isinstance(first, list) and isinstance(second, list):
-        return {"value": [a + share * (b - a) for a, b in zip(first, second, strict=True)]}
+    """One colour over another; of two pictures that of the larger share."""
+    if (color := _numeric(above)) is not None:
+        return _affine(below, 1.0 - share, share * color)
+    if (color := _numeric(below)) is not None:
+        return _affine(above, share, (1.0 - share) * color)
     return above if share >= 0.5 else below
 
 
-def _scale(source: Record, factors: list[float]) -> Record:
-    """A colour times a factor of each channel."""
+def _affine(source: Record, factor: ArrayLike, shift: ArrayLike) -> Record:
+    """A value or a picture times a factor, plus a shift: numbers, or one of each for a channel."""
     if "texture" in source:
-        own = source["texture"].get("scale", {}).get("value", [1.0] * 4)
-        scale = [a * b for a, b in zip(own, [*factors, 1.0], strict=True)]
-        return {**source, "texture": {**source["texture"], "scale": {"value": scale}}}
-    value = source.get("value")
-    return {"value": [a * b for a, b in zip(value, factors, strict=True)]} if isinstance(value, list) else source
+        node = source["texture"]
+        scale, bias = (node.get(name, {}).get("value", [usual] * 4) for name, usual in (("scale", 1.0), ("bias", 0.0)))
+        # The alpha of a colour does not count, and a number may be that of any channel.
+        factors, shifts = (np.pad(each := np.ravel(given)[:4], (0, 4 - len(each)), "edge") for given in (factor, shift))
+        own = {"scale": {"value": (factors * scale).tolist()}, "bias": {"value": (factors * bias + shifts).tolist()}}
+        return {**source, "texture": {**node, **own}}
+    value = _numeric(source)
+    if value is None:
+        return source
+    given = source["value"]
+    return {"value": (value * factor + shift)[..., : len(given) if isinstance(given, list) else None].tolist()}
+
+
+def _numeric(source: Record | None, default: float | None = None) -> Any:
+    """The number of a source, or its first three, as an array; the default, if any, where it has none."""
+    value = (source or {}).get("value", default)
+    if value is None or isinstance(value, str):
+        return None
+    return (
+        np.pad(value[:3], (0, 3 - len(value[:3])), "edge") if isinstance(value, list) else np.array(value, np.float64)
+    )
 
 
 def _number(given: Record, name: str, default: float) -> float:
     value = given.get(name, {}).get("value", default)
     return float(value) if isinstance(value, (bool, int, float)) else default
+
+
+_CODED = re.compile(r"(?!.*lin).*(?:srgb|g\d\d|gamma|rec709_display)", re.IGNORECASE)
+
+
+def is_coded(space: str) -> bool:
+    """Whether values in a colour space are codes, near enough those of sRGB, and no linear light."""
+    return _CODED.match(space) is not None
 
 
 _WRAPS = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror", "constant": "black", "black": "black"}
@@ -324,7 +359,7 @@ def _image(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record:
     is_color = "color" in kind
     texture: Record = {
         "file": given.get("file", {}),
-        "sourceColorSpace": {"value": "sRGB" if "srgb" in space else "auto" if is_color and not space else "raw"},
+        "sourceColorSpace": {"value": "sRGB" if is_coded(space) else "auto" if is_color and not space else "raw"},
         "wrapS": {"value": _WRAPS.get(given.get("uaddressmode", {}).get("value", ""), "repeat")},
         "wrapT": {"value": _WRAPS.get(given.get("vaddressmode", {}).get("value", ""), "repeat")},
         "st": given.get("texcoord", {"primvar": "st"}),
@@ -343,10 +378,10 @@ def _arnold_image(kind: str, channel: str, given: Record, node: Usd.Prim) -> Rec
     if attribute and isinstance(name := file.get("value"), str):
         layer = attribute.GetPropertyStack(Usd.TimeCode.Default())[0].layer.realPath
         file = {"asset": {"name": name, "found": "", "folder": os.path.dirname(layer)}}
-    space = str(given.get("color_space", {}).get("value", "auto")).lower()
+    space = str(given.get("color_space", {}).get("value", "auto"))
     texture: Record = {
         "file": file,
-        "sourceColorSpace": {"value": "auto" if space in ("", "auto") else "sRGB" if "srgb" in space else "raw"},
+        "sourceColorSpace": {"value": "auto" if space in ("", "auto") else "sRGB" if is_coded(space) else "raw"},
         "wrapS": {"value": _WRAPS.get(given.get("swrap", {}).get("value", ""), "repeat")},
         "wrapT": {"value": _WRAPS.get(given.get("twrap", {}).get("value", ""), "repeat")},
     }
@@ -371,8 +406,7 @@ def _gltf_image(kind: str, channel: str, given: Record, node: Usd.Prim) -> Recor
     image = _image(f"{kind}_color" if "color" in kind else kind, channel, given, node)
     if channel == "outa":
         return {**image, "channel": "a"}
-    tint = (given.get("color") or given.get("factor") or {}).get("value", 1.0)
-    return _scale(image, tint[:3] if isinstance(tint, list) else [tint] * 3)
+    return _affine(image, _numeric(given.get("color") or given.get("factor"), 1.0), 0.0)
 
 
 def _gltf_normal_map(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
@@ -384,22 +418,75 @@ def _passed_on(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record
 
 
 def _separate(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
-    source = given.get("in", {})
+    source, chosen = given.get("in", {}), str(given.get("channels", {}).get("value", ""))
     index = {"outr": "r", "outg": "g", "outb": "b", "outa": "a", "outx": "r", "outy": "g", "outz": "b"}.get(channel)
-    index = index or "rgba"[int(_number(given, "index", 0.0)) % 4]
+    index = index or chosen.translate(str.maketrans("xyzw", "rgba")) or "rgba"[int(_number(given, "index", 0.0)) % 4]
+    if index not in tuple("rgba"):
+        return None
+    if (value := _numeric(source)) is not None:
+        return {"value": float(np.ravel(value)["rgba".index(index) % value.size])}
     return {**source, "channel": index} if "texture" in source else None
 
 
-def _multiply(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
-    """An image, or a value, times a value; None of two images."""
-    one, other = given.get("in1", {}), given.get("in2", {"value": 1.0})
-    if "value" not in other:
-        one, other = other, one
-    factor = other.get("value")
-    if isinstance(factor, float) and isinstance(one.get("value"), float):
-        return {"value": factor * one["value"]}
-    factors = [factor] * 3 if isinstance(factor, float) else factor
-    return _scale(one, factors) if one and isinstance(factors, list) and len(factors) == 3 else None
+def _arithmetic(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+    """Sum, difference, product or quotient of two values, or of an image, or coordinates, and a value."""
+    operation = kind.split("_")[1]
+    one, other = (_fed(given, node, name, float(operation in ("multiply", "divide"))) for name in ("in1", "in2"))
+    if "in1" not in given and "value" in one:
+        one = {"value": 0.0}
+    number, sign = _numeric(other), -1.0 if operation == "subtract" else 1.0
+    if number is not None and operation == "divide":
+        return _computed(kind, one, 1.0 / np.where(number == 0.0, 1.0, number), 0.0)
+    if number is None and operation != "divide":
+        one, number = other, _numeric(one)
+        if number is not None and operation == "subtract":
+            return _computed(kind, one, -1.0, number)
+    if number is None:
+        return None
+    return _computed(kind, one, number, 0.0) if operation == "multiply" else _computed(kind, one, 1.0, sign * number)
+
+
+def _blend(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+    below, above, share = (_fed(given, node, name, 0.0) for name in ("bg", "fg", "mix"))
+    weight = _numeric(share)
+    if weight is None:
+        return None
+    if (value := _numeric(above)) is not None:
+        return _computed(kind, below, 1.0 - weight, weight * value)
+    value = _numeric(below)
+    return None if value is None else _computed(kind, above, weight, (1.0 - weight) * value)
+
+
+def _invert(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+    return _computed(kind, _fed(given, node, "in", 0.0), -1.0, _numeric(given.get("amount"), 1.0))
+
+
+def _remap(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+    low, high = _numeric(given.get("inlow"), 0.0), _numeric(given.get("inhigh"), 1.0)
+    to_low, to_high = _numeric(given.get("outlow"), 0.0), _numeric(given.get("outhigh"), 1.0)
+    factor = (to_high - to_low) / np.where(high == low, 1.0, high - low)
+    return _computed(kind, _fed(given, node, "in", 0.0), factor, to_low - factor * low)
+
+
+def _fed(given: Record, node: Usd.Prim, name: str, usual: float) -> Record:
+    """An input, or its default; nothing, where a node feeds it that is not read."""
+    attribute = node.GetAttribute(f"inputs:{name}")
+    is_fed = bool(attribute) and attribute.HasAuthoredConnections()
+    return given.get(name, {} if is_fed else {"value": usual})  # type: ignore[no-any-return]
+
+
+def _computed(kind: str, source: Record, factor: ArrayLike, shift: ArrayLike) -> Record | None:
+    """A value, an image, or coordinates by their places, times a factor, plus a shift; None of what meshes have."""
+    if "vector2" in kind and source.keys() & {"primvar", "transform"}:
+        scale, translation = ({"value": np.resize(each, 2).tolist()} for each in (factor, shift))
+        return {"transform": {"in": source, "scale": scale, "translation": translation}}
+    return _affine(source, factor, shift) if source.keys() & {"texture", "value"} else None
+
+
+def _join(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+    """A colour of three numbers; None where one of them is a picture."""
+    numbers = [_numeric(_fed(given, node, f"in{place}", 0.0)) for place in (1, 2, 3)]
+    return None if any(each is None for each in numbers) else {"value": [float(np.ravel(each)[0]) for each in numbers]}
 
 
 def _place(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record:
@@ -421,7 +508,8 @@ def _place(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record:
 
 
 def _coordinates(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record:
-    name = (given.get("geomprop") or given.get("varname") or {}).get("value", "st")
+    usual = "displayColor" if "color" in kind else "st"
+    name = (given.get("geomprop") or given.get("varname") or {}).get("value", usual)
     return {"primvar": name, "fallback": given.get("default")}
 
 
@@ -434,7 +522,13 @@ _NODES: dict[str, Callable[[str, str, Record, Usd.Prim], Record | None]] = {
     "ND_convert_": _passed_on,
     "ND_dot_": _passed_on,
     "ND_constant_": _passed_on,
-    "ND_multiply_": _multiply,
+    **{f"ND_{operation}_": _arithmetic for operation in ("add", "subtract", "multiply", "divide")},
+    "ND_mix_": _blend,
+    "ND_invert_": _invert,
+    "ND_remap_": _remap,
+    "ND_combine3_": _join,
+    "ND_swizzle_": _separate,
+    "ND_geomcolor_": _coordinates,
     "ND_place2d_": _place,
     "ND_extract_": _separate,
     "ND_separate": _separate,

@@ -32,8 +32,9 @@ _TYPES = {
     **dict.fromkeys(("ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"), "u2"),
     **dict.fromkeys(("int", "int32", "int32_t"), "i4"),
     **dict.fromkeys(("uint", "unsigned int", "uint32", "uint32_t"), "u4"),
-    **dict.fromkeys(("longlong", "long long", "long_long", "int64", "int64_t"), "i8"),
+    **dict.fromkeys(("longlong", "long long", "long long int", "long_long", "int64", "int64_t"), "i8"),
     **dict.fromkeys(("ulonglong", "unsigned long long", "ulong_long", "uint64", "uint64_t"), "u8"),
+    "unsigned long long int": "u8",
     "long": "i4",
     "ulong": "u4",  # of MetaImage
     "float": "f4",
@@ -149,7 +150,8 @@ def _nrrd(entries: Mapping[str, str]) -> _Grid:
         notes.append("nothing says how a patient lies: slice 0 is in front, its row 0 on top")
     directions = [_numbers(word) for word in re.findall(r"\([^)]*\)", entries.get("space directions", ""))]
     if directions:
-        matrix = _matrix(np.array(directions), _numbers(entries.get("space origin", "0 0 0")))
+        origin = _numbers(entries.get("space origin", "0 0 0"))
+        matrix = _matrix(np.array(directions)[:3, :3], origin[:3])  # the fourth is time, which the sizes tell
     else:
         spacings = _numbers(entries.get("spacings", "1 1 1"))
         matrix = _matrix(np.diag(spacings[np.isfinite(spacings)][:3]), np.zeros(3))
