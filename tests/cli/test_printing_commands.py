@@ -60,7 +60,7 @@ def test_marks_are_added_by_render_and_afterwards_alike(lippmann, engine, tmp_pa
 def test_a_pitch_test(lippmann, tmp_path):
     path = tmp_path / "test.tif"
     outcome = lippmann("pitch-test", *SHEET, "--strips", "5", "--step", "0.2", "-o", path, "--json")
-    sheet = print_of_texts({"lpi": "20", "ppi": "200", "size": "40x20mm", "viewing-distance": "300"})
+    sheet = print_of_texts({"lpi": "20", "ppi": "200", "size": "40x20mm", "viewing-distance": "300mm"})
     test = PitchTest(sheet, 5, 0.2)
     assert outcome.json["strips"] == [strip.lpi for strip in test.all_strips]
     assert outcome.json["expected"] == pytest.approx(sheet.pitch_on_print)
@@ -97,9 +97,9 @@ def test_the_pitch_that_was_found_is_rendered(lippmann, engine, tmp_path):
         (("--size", "0x20mm"), "--size: a side of 0 mm"),
         (("--size", "40mm"), "--size: '40mm' is not a size"),
         (("--size", "40x20yards"), "--size: unknown unit 'yards'"),
-        (("--viewing-distance", "-1"), "--viewing-distance: viewing_distance is -1 mm"),
+        (("--viewing-distance", "-1mm"), "--viewing-distance: viewing_distance is -1 mm"),
         (("--viewing-distance", "soon"), "--viewing-distance: 'soon' is not a length"),
-        (("--thickness", "0"), "--thickness: thickness is 0.0; it must be a finite length above zero; sheets"),
+        (("--thickness", "0mm"), "--thickness: thickness is 0.0; it must be a finite length above zero; sheets"),
         (("--index", "1.5"), "--index: index is given without a thickness"),
         (("--field", "0"), "--field: field is 0"),
     ],
@@ -246,7 +246,7 @@ def test_a_job_sheet_is_one_page(lippmann, tmp_path):
         ((picture, "--job-sheet", tmp_path / "job.png"), "a job sheet is a .pdf file"),
         ((picture,), "--output: is missing"),
         ((picture, "-o", sheet, "--bleed", "3mm"), "--bleed: needs --display"),
-        ((sheet, "-o", tmp_path / "twice.tif"), "a margin with marks already"),
+        ((sheet, "-o", tmp_path / "twice.tif"), "sheet.tif: has a margin with marks already"),
     ):
         outcome = lippmann("marks", *words, "--quiet")
         assert (outcome.code, outcome.err.count("\n"), said in outcome.err) == (2, 1, True), outcome.err

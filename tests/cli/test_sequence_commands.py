@@ -72,6 +72,7 @@ def test_a_flight(engine, lippmann, tmp_path):
         (("--frames", "0:2", "-o", "out", "--maps", "maps"), "--maps"),
         (("--frames", "0:2", "-o", "out", "--layers"), "OpenEXR can"),
         (("--frames", "0:2", "-o", "out", "--camera-path", "none.cam"), "a camera path leads through"),
+        (("--eye", "0,0,600", "-o", "out.png"), "or --turntable 48; 'lippmann preview' and"),
         (("--fps", "24", "-o", "out.png"), "--fps: has no meaning for a single picture"),
         (("--camera-path", "x.cam", "-o", "out.png"), "--camera-path: has no meaning for a single picture"),
     ],

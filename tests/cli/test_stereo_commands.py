@@ -111,7 +111,7 @@ def test_colour_beside_depth(lippmann, picture, tmp_path):
     [
         (("--rgbd", "full", "--sweep"), "--sweep: does not apply to --rgbd"),
         (("--white", "far"), "--white: applies to --rgbd only"),
-        (("--rgbd", "full"), "the picture has no depth; that is one of its layers"),
+        (("--rgbd", "full"), "teapot.png: has no depth; that is one of its layers"),
         (("--rgbd", "full", "-o", "a.exr"), "unknown ending '.exr'; known are .png, .tif, .tiff"),
         (("--rgbd", "depth", "--white", "far"), "--white: cannot be; depth alone is distance"),
         (("--rgbd", "half", "-o", "a_rgbd.png"), "the name says another form; this one's ends in _rgbd-half"),

@@ -55,6 +55,14 @@ def test_fit(tmp_path, fit, expected):
     assert photos.cropped == ((0, 0.5) if fit == "cover" else (0, 0))
 
 
+def test_one_animation_is_its_frames(tmp_path):
+    first, *others = [Image.new("RGB", (8, 4), (level,) * 3) for level in (30, 90, 160)]
+    for name in ("a.gif", "a.webp", "a.png"):
+        first.save(tmp_path / name, save_all=True, append_images=others, lossless=True)
+        quilt = read_photos([tmp_path / name], (8, 4), PAPER).quilt
+        assert [quilt.view_values(k)[2, 4, 0] for k in range(quilt.layout.views)] == [30, 90, 160]
+
+
 def test_contain_leaves_white_paper_on_both_sides(tmp_path):
     paths = [save(tmp_path / f"{k}.png", ramp(80, 80)) for k in range(2)]
     view = read_photos(paths, (120, 60), PAPER, fit="contain").quilt.view_values(0)

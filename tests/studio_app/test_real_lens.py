@@ -17,7 +17,7 @@ from lippmann.viewing.replay import default_eye
 
 ROUND = LensProfile(radius=2.3, thickness=6.0, index=1.5)
 DISPLAYS = {
-    "print": load_display("print:lpi=60,ppi=360,size=8x5mm,thickness=0.6604,index=1.57,blur=9um"),
+    "print": load_display("print:lpi=60,ppi=360,size=8x5mm,thickness=0.6604mm,index=1.57,blur=9um"),
     "slanted": replace(
         load_display("panel-4k").resized(160, 90), lens=LensProfile(radius=1.9, thickness=4.6, index=1.57)
     ),

@@ -18,7 +18,7 @@ SLANTED = replace(load_display("panel-4k").resized(160, 90), lens=LensProfile(ra
 IDEAL = load_display("seed-lenticular").resized(96, 64)
 ROUND = LensProfile(radius=2.3, thickness=6.0, index=1.5)
 DISPLAYS = {
-    "print": load_display("print:lpi=60,ppi=360,size=8x5mm,thickness=0.6604,index=1.57,blur=9um"),
+    "print": load_display("print:lpi=60,ppi=360,size=8x5mm,thickness=0.6604mm,index=1.57,blur=9um"),
     # More lenses than pixels of the page, and more rows.
     "fine print": load_display("print:lpi=100,ppi=600,size=250x10mm,thickness=16mil,index=1.57"),
     "slanted": SLANTED,

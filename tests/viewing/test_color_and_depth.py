@@ -158,7 +158,7 @@ def test_depth_maps_are_read_back(tmp_path, slope, kind):
 
 
 def test_what_cannot_be(tmp_path, slope):
-    with pytest.raises(UsageError, match="the picture has no depth; that is one of its layers"):
+    with pytest.raises(UsageError, match="has no depth; that is one of its layers"):
         visible_distance(slope.with_pixels(slope.pixels, maps={}))
     with pytest.raises(OutputError, match="the name says another form; this one's ends in _rgbd-far"):
         named(tmp_path / "a_rgbd.png", RgbdForm(white="far"))

@@ -18,7 +18,7 @@ from lippmann.optics.lens import Lens
 from lippmann.optics.light_table import light_table
 from lippmann.viewing.optical_replay import replay_optics
 
-PRINT = load_display("print:lpi=60,ppi=720,size=20x10mm,thickness=0.6604,index=1.57,blur=9um")
+PRINT = load_display("print:lpi=60,ppi=720,size=20x10mm,thickness=0.6604mm,index=1.57,blur=9um")
 SLANTED = replace(
     load_display("panel-4k").resized(160, 90),
     lens=LensProfile(radius=1.9, thickness=4.6, index=1.57),

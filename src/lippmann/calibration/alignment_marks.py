@@ -79,7 +79,7 @@ class Marks:
             rule = "marks need upright cylindrical lenses"
             raise UsageError(f"the display {self.display.name} has {kind} lenses", rule=rule)
         if self.display.sheet is not None and self.display.sheet.margin:
-            raise UsageError("the picture has a margin with marks already", fix="take the picture without it")
+            raise UsageError("has a margin with marks already", fix="take the picture without it")
 
     @property
     def pixels(self) -> int:

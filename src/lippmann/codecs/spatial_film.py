@@ -52,7 +52,7 @@ def read_first_pair(path: Path) -> tuple[Photograph, Photograph]:
             "is a film of one view",
             where=str(path),
             rule="of films a spatial one (MV-HEVC) is read, by FFmpeg 7.1 (PyAV 14) or newer",
-            fix="write its frames as pictures first",
+            fix=f"write its frames as pictures first: ffmpeg -i {path.name} frame%03d.png",
         )
     notes = ("of the film the first frame is read",)
     views = [Photograph.of_codes(frame.to_ndarray(format="rgb24"), b"", notes) for frame in frames[:2]]

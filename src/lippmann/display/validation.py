@@ -145,7 +145,7 @@ def length(
     key: str,
     scales: Mapping[str, float] = MILLIMETRES,
     per_inch: tuple[str, ...] = (),
-    unit: str = "mm",
+    unit: str = "",
     rule: str = LENGTH,
 ) -> float:
     """Millimetres of a text such as ``"6.8 mm"``.
@@ -153,25 +153,27 @@ def length(
     Parameters
     ----------
     text:
-        A number, with a unit or without one.
+        A number with a unit.
     key:
         Key that errors name.
     scales, per_inch:
         Units with their millimetres, and units that count per inch, which give the distance from one to the next.
     unit:
-        Unit of a bare number.
+        Unit of a number without one; empty: a number needs a unit.
     rule:
         What is said of a text that is no length.
 
     Raises
     ------
     DisplayError
-        If the text is no length, its unit is unknown, or a count per inch is not above zero.
+        If the text is no length, its unit is missing or unknown, or a count per inch is not above zero.
     """
     match = _QUANTITY.fullmatch(text.strip())
     if match is None:
         raise DisplayError(f"{text!r} is not a length", where=key, rule=rule)
     amount, symbol = float(match[1]), match[2] or unit
+    if not symbol:
+        raise _no_unit(match[1], key)
     if symbol in scales:
         return amount * scales[symbol]
     if symbol in per_inch:
@@ -205,15 +207,18 @@ def size(text: str, key: str) -> tuple[float, float]:
         raise DisplayError(f"{text!r} is not a size", where=key, rule=rule)
     unit_of_height = match[4] or match[2]
     if not unit_of_height:
-        bare = f"{match[1]}x{match[3]}"
-        fix = f"say {bare}in or {bare}mm"
-        raise DisplayError(f"{text!r} has no unit", where=key, rule="inches or millimetres?", fix=fix)
+        raise _no_unit(f"{match[1]}x{match[3]}", key)
     sides = []
     for amount, unit in ((match[1], match[2] or unit_of_height), (match[3], unit_of_height)):
         if unit not in MILLIMETRES:
             raise DisplayError.unknown("unit", unit, MILLIMETRES, where=key)
         sides.append(float(amount) * MILLIMETRES[unit])
     return sides[0], sides[1]
+
+
+def _no_unit(bare: str, key: str) -> DisplayError:
+    fix = f"say {bare}in or {bare}mm"
+    return DisplayError(f"{bare!r} has no unit", where=key, rule="inches or millimetres?", fix=fix)
 
 
 def plain_number(text: str, key: str) -> float:

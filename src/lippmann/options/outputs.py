@@ -87,6 +87,8 @@ class SequenceOptions(Options):
             return True
         for name in changed_options(self):
             fix = 'add frames="0:48", or turntable=48'
+            if name == "eye":
+                fix += "; 'lippmann preview' and 'lippmann replay' show what an eye sees of one picture"
             raise UsageError("has no meaning for a single picture", parameter=name, fix=fix)
         return False
 

@@ -18,6 +18,7 @@ import numpy as np
 from lippmann.codecs.icc import Profile, convert_picture
 from lippmann.codecs.photograph import Photograph, open_photograph, report_errors
 from lippmann.codecs.picture_notes import FileNotes
+from lippmann.codecs.pillow_formats import BYTES_PER_PIXEL, codes_of, open_picture
 from lippmann.codecs.stereo_pairs import HEIF, PAIRS, read_pair
 from lippmann.codecs.types import Pixels
 from lippmann.color.transfer import quantize
@@ -25,6 +26,7 @@ from lippmann.errors import PictureError, UsageError
 from lippmann.image.read import MOST_PIXELS
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import Quilt, QuiltLayout
+from lippmann.runtime.machine import check_input
 from lippmann.runtime.regular_file import check_kind, unreadable
 
 if TYPE_CHECKING:
@@ -34,6 +36,9 @@ Fit = Literal["cover", "contain", "stretch"]
 
 #: Endings of the pictures in a folder of photographs.
 ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".avif", ".bmp", ".ppm", ".gif", ".tga", *PAIRS, *HEIF)
+
+#: Endings of files that may hold several frames.
+_ANIMATIONS = (".gif", ".webp", ".png", ".avif")
 
 #: The code of white paper.
 _PAPER = 255
@@ -106,7 +111,8 @@ def read_photos(
     Parameters
     ----------
     paths:
-        The photographs, at least 2, in the order of the views; a file of a stereo pair (JPS, MPO, HEIF) is two.
+        The photographs, at least 2, in the order of the views; a file of a stereo pair (JPS, MPO, HEIF) is two, and
+        one animation (GIF, WebP, PNG, AVIF) alone is its frames.
     size:
         Largest width and height of a view in pixels.
     paper:
@@ -135,6 +141,8 @@ def read_photos(
         is given.
     """
     sources = [source for path in paths for source in _views_in(path)]
+    if len(sources) == 1 and paths[0].suffix.lower() in _ANIMATIONS:
+        sources = _frames_of(paths[0])
     if len(sources) < 2:
         what = "one photograph is given" if sources else "no photographs are given"
         rule = f"at least 2 are interlaced, of {', '.join(ENDINGS)}"
@@ -220,6 +228,20 @@ def _views_in(path: Path) -> list[_Source]:
         else:
             pair = read_pair(path)
     return [_Source(path)] if pair is None else [_Source(path, view) for view in pair]
+
+
+def _frames_of(path: Path) -> list[_Source]:
+    """The frames of an animation."""
+    views = []
+    with report_errors(path), open_picture(path) as picture:
+        count, (width, height) = getattr(picture, "n_frames", 1), picture.size
+        check_input(
+            BYTES_PER_PIXEL * width * height * count, f"{count} pictures of {width} x {height}", where=str(path)
+        )
+        for number in range(count):
+            picture.seek(number)
+            views.append(Photograph.of_codes(codes_of(picture), picture.info.get("icc_profile") or b""))
+    return [_Source(path, view) for view in views]
 
 
 class _Header(NamedTuple):

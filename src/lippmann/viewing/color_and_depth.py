@@ -39,7 +39,7 @@ def visible_distance(image: IntegralImage, eye: Eye | None = None, size: tuple[i
     """
     depth = image.maps.get("depth")
     if depth is None:
-        raise UsageError("the picture has no depth", rule="that is one of its layers", fix="render it with layers=True")
+        raise UsageError("has no depth", rule="that is one of its layers", fix="render it with layers=True")
     eye = default_eye(image.display) if eye is None else eye
     is_hit = np.isfinite(depth)
     # A line of sight that misses the panel is black: no hit there.

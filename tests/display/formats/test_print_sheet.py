@@ -15,7 +15,7 @@ from lippmann.errors import DisplayError
 from lippmann.optics.first_order import extreme_ray_field
 from lippmann.optics.fitting import gap_of
 
-GOOD = {"lpi": "60", "ppi": "720", "size": "200x300mm", "viewing-distance": "500"}
+GOOD = {"lpi": "60", "ppi": "720", "size": "200x300mm", "viewing-distance": "500mm"}
 
 
 def test_the_example():
@@ -30,7 +30,7 @@ def test_the_example():
     # p (D + g) / D
     assert display.micro_image_pitch == pytest.approx(25.4 / 60 * (500 + display.gap) / 500)
     assert display.size_mm == pytest.approx((200, 300), abs=25.4 / 720 / 2)
-    assert display == load_display("print:lpi=60,ppi=720,size=200x300mm,viewing-distance=500")
+    assert display == load_display("print:lpi=60,ppi=720,size=200x300mm,viewing-distance=500mm")
 
 
 def test_the_preset_can_be_said_so():
@@ -118,42 +118,51 @@ def test_lengths_have_units():
         ({"size": "200x300km"}, "size", "unknown unit 'km'"),
         ({"size": "1e9x1mm"}, "size", "it must be 1 to 1000000 pixels"),
         ({"size": "0.2x300mm"}, "size", "a lens covers 12.01 pixels; the print has only 6"),
-        ({"viewing-distance": "0"}, "viewing-distance", "it must be a length of at least 10 mm, or infinite"),
-        ({"viewing-distance": "-500"}, "viewing-distance", "viewing_distance is -500 mm"),
+        ({"viewing-distance": "0mm"}, "viewing-distance", "it must be a length of at least 10 mm, or infinite"),
+        ({"viewing-distance": "-500mm"}, "viewing-distance", "viewing_distance is -500 mm"),
+        (
+            {"viewing-distance": "500"},
+            "viewing-distance",
+            "'500' has no unit; inches or millimetres?; say 500in or",
+        ),
         ({"viewing-distance": "far"}, "viewing-distance", "'far' is not a length"),
         *(
             ({"thickness": text}, "thickness", "above zero; sheets are 1.2 to 4 pitches thick")
-            for text in ("0", "-1mm", "1e400")
+            for text in ("0mm", "-1mm", "1e400mm")
         ),
         ({"thickness": "nan"}, "thickness", 'such as "6.8 mm"; sheets are 1.2 to 4 pitches thick'),
-        ({"thickness": "26"}, "thickness", "5 to 150 degrees; sheets are 1.2 to 4 pitches thick; look at its unit"),
-        ({"thickness": "0.66", "radius": "-0.3mm"}, "radius", "above zero; sheets have 0.53 to 1.7 pitches"),
-        ({"thickness": "0.66", "radius": "inf"}, "radius", 'such as "6.8 mm"; sheets have 0.53 to 1.7 pitches'),
-        ({"thickness": "0.66", "radius": "0.3", "field": "54"}, "radius", "radius and field are both given"),
-        ({"thickness": "0.66", "field": "20"}, "field", "field is 20 degrees; crests on 0.66 mm of index 1.57 have"),
-        ({"thickness": "0.66", "radius": "0.2"}, "radius", "radius is 0.2 mm; lenses 0.4233 mm wide need more than"),
-        ({"thickness": "0.15"}, "thickness", "thickness is 0.15 mm; the crest alone is 0.1532 mm high"),
-        ({"thickness": "0.05"}, "thickness", "thickness is 0.05 mm; the crest alone is 0.1532 mm high"),
+        ({"thickness": "26mm"}, "thickness", "5 to 150 degrees; sheets are 1.2 to 4 pitches thick; look at its unit"),
+        ({"thickness": "0.66mm", "radius": "-0.3mm"}, "radius", "above zero; sheets have 0.53 to 1.7 pitches"),
+        ({"thickness": "0.66mm", "radius": "inf"}, "radius", 'such as "6.8 mm"; sheets have 0.53 to 1.7 pitches'),
+        ({"thickness": "0.66mm", "radius": "0.3mm", "field": "54"}, "radius", "radius and field are both given"),
+        ({"thickness": "0.66mm", "field": "20"}, "field", "field is 20 degrees; crests on 0.66 mm of index 1.57 have"),
         (
-            {"thickness": "0.05", "radius": "2"},
+            {"thickness": "0.66mm", "radius": "0.2mm"},
+            "radius",
+            "radius is 0.2 mm; lenses 0.4233 mm wide need more",
+        ),
+        ({"thickness": "0.15mm"}, "thickness", "thickness is 0.15 mm; the crest alone is 0.1532 mm high"),
+        ({"thickness": "0.05mm"}, "thickness", "thickness is 0.05 mm; the crest alone is 0.1532 mm high"),
+        (
+            {"thickness": "0.05mm", "radius": "2mm"},
             "thickness",
             "such lenses must have a field of view of 5 to 150 degrees",
         ),
-        ({"radius": "0.3"}, "radius", "radius is given without a thickness; it means nothing alone"),
+        ({"radius": "0.3mm"}, "radius", "radius is given without a thickness; it means nothing alone"),
         ({"conic": "-0.4"}, "conic", "conic is given without a thickness"),
-        ({"thickness": "0.66", "conic": "99"}, "conic", "conic is 99; it must lie between -10 and 10"),
-        ({"thickness": "0.66", "index": "2.5"}, "index", "index is 2.5; it must lie between 1.3 and 2; sheets have"),
+        ({"thickness": "0.66mm", "conic": "99"}, "conic", "conic is 99; it must lie between -10 and 10"),
+        ({"thickness": "0.66mm", "index": "2.5"}, "index", "index is 2.5; it must lie between 1.3 and 2; sheets have"),
         ({"blur": "1mm"}, "blur", "blur is 1 mm; it must not exceed a pixel of 0.03528 mm"),
         ({"blur": "-1um"}, "blur", "blur is -0.001 mm; it must be a length of zero or more; prints have a fifth"),
         ({"sheet": "60lpi", "lpi": None}, "sheet", "unknown sheet '60lpi'"),
         ({"sheet": "50lpi"}, "lpi", "sheet and lpi are both given; a typical sheet has its own"),
-        ({"sheet": "50lpi", "lpi": None, "radius": "1"}, "radius", "sheet and radius are both given"),
+        ({"sheet": "50lpi", "lpi": None, "radius": "1mm"}, "radius", "sheet and radius are both given"),
         ({"index": "1.5"}, "index", "index is given without a thickness"),
-        ({"thickness": "0.66", "index": "0"}, "index", "index is 0"),
+        ({"thickness": "0.66mm", "index": "0"}, "index", "index is 0"),
         ({"field": "0"}, "field", "field is 0"),
         ({"field": "180"}, "field", "field is 180; it must lie between 5 and 150 degrees; makers state 25 to 60"),
         ({"print-lpi": "59.9"}, "print-lpi", "print_lpi and lpi are both given"),
-        ({"lpi": "1", "ppi": "72", "viewing-distance": "60"}, "viewing-distance", "look from farther away"),
+        ({"lpi": "1", "ppi": "72", "viewing-distance": "60mm"}, "viewing-distance", "look from farther away"),
         ({"paper": "A4"}, "paper", "unknown key 'paper'"),
     ],
 )

@@ -33,7 +33,7 @@ DISPLAYS = {
     "lenticular": Display("lenticular", Panel(96, 64, 0.5), LensArray("lenticular", 4.0), 3.0, "", 300.0, 20.0),
     "slanted": Display("slanted", Panel(90, 60, 0.5), LensArray("lenticular", 2.3, 12.0), 3.0, "", 400.0, 20.0),
     "square": Display("square", Panel(96, 64, 0.5), LensArray("square", 4.0), 3.0, "", float("inf"), 20.0),
-    "print": load_display("print:lpi=60,ppi=360,size=8x5mm,thickness=0.6604,index=1.57"),
+    "print": load_display("print:lpi=60,ppi=360,size=8x5mm,thickness=0.6604mm,index=1.57"),
 }
 EYES = [(0.0, 0.0, 300.0), (25.0, -10.0, 220.0)]
 SIZE = 60, 40

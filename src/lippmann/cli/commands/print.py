@@ -9,7 +9,7 @@ import typer
 
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import only, with_options
-from lippmann.cli.shared.console import Console
+from lippmann.cli.shared.console import Console, naming
 from lippmann.cli.shared.scene_source import print_of
 from lippmann.errors import OutputError, UsageError
 from lippmann.options.prints import FinishOptions, PrintOptions
@@ -66,7 +66,7 @@ def marks(
         icc = finishing.icc
         finish = Finish(length(margin, "--margin"), finishing.mirror, None if icc is None else read_profile(icc))
         image = picture_of_file(file, target)
-        with console.progress() as progress:
+        with naming(picture), console.progress() as progress:
             printed = write_finished(image, output, finish, icc=file.icc, bits=bits, progress=progress)
     if job_sheet is not None:
         write_job_sheet(printed, job_sheet, (output or picture).name)

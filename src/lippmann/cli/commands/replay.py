@@ -12,7 +12,7 @@ import typer
 from lippmann.cli.commands.quilt import Aspect, Layout, quilt_of
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import only, with_options
-from lippmann.cli.shared.console import Console
+from lippmann.cli.shared.console import Console, naming
 from lippmann.cli.shared.scene_source import output_of
 from lippmann.errors import UsageError
 from lippmann.options.outputs import SequenceOptions
@@ -266,8 +266,9 @@ def _replay_depth(
     image = read_picture(picture, display=display)
     position = None if eye is None else triple(eye, "--eye")
     pixels = None if size is None else parse.size(size, "--size")
-    distance = rgbd.visible_distance(image, position, pixels)
-    near, far = rgbd.range_of(distance)
+    with naming(picture):
+        distance = rgbd.visible_distance(image, position, pixels)
+        near, far = rgbd.range_of(distance)
     if form == "depth":
         rgbd.write_depth(distance, path)
     else:

@@ -15,12 +15,24 @@ from typing import TYPE_CHECKING, cast
 
 from lippmann import printable
 from lippmann.cli.shared.command_options import translate
+from lippmann.errors import LippmannError
 from lippmann.progress import ProgressCallback, silent
 from lippmann.progress_bar import PlainProgress, bar
 from lippmann.wording import depths_in_words
 
 if TYPE_CHECKING:
     from lippmann.image import Provenance
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Let errors that name neither a file nor a parameter name ``path``."""
+    try:
+        yield
+    except LippmannError as error:
+        if not error.where and not error.parameter:
+            error.where = str(path)
+        raise
 
 
 @dataclass(frozen=True)

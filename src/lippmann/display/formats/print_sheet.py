@@ -327,7 +327,7 @@ def print_of_texts(texts: Mapping[str, str]) -> Print:
     """The print of options as people write them.
 
     Keys are ``lpi`` or ``print-lpi``, ``ppi``, ``size`` (``200x300mm``), and, if wanted, ``viewing-distance``
-    (``500``, ``50cm`` or ``infinite``), ``thickness`` (``0.66mm``, ``26mil``), ``index``, ``field`` (degrees),
+    (``50cm`` or ``infinite``), ``thickness`` (``0.66mm``, ``26mil``), ``index``, ``field`` (degrees),
     ``radius`` and ``conic`` of the crest, ``blur`` of ink (``12um``), ``sheet`` (``75lpi``).
 
     Raises
@@ -345,7 +345,7 @@ def print_of_texts(texts: Mapping[str, str]) -> Print:
         for key in _LENGTHS
         if key in texts
     }
-    distance = texts.get("viewing-distance", str(DEFAULT_DISTANCE))
+    distance = texts.get("viewing-distance", f"{DEFAULT_DISTANCE}mm")
     lengths["viewing-distance"] = math.inf if distance == INFINITE else validation.length(distance, "viewing-distance")
     values = {key.replace("-", "_"): value for key, value in (numbers | lengths).items()}
     try:
