@@ -416,6 +416,19 @@ def test_a_map_whose_name_says_disparity_is_nearer_where_it_is_larger(tmp_path, 
 
 
 @pytest.mark.parametrize(
+    ("codes", "is_stretched"), [([0, 200, 30000, 65400, 65535], True), ([0, 400, 900, 4000, 65535], False)]
+)
+def test_16_bits_over_their_whole_range_are_no_distances(tmp_path, codes, is_stretched):
+    """As estimates of depth are written; a depth camera has 0 and 65535 for what it does not know."""
+    path, photo = tmp_path / "photo_depth.png", tmp_path / "photo.png"
+    Pillow.fromarray(np.array([codes] * 2, np.uint16)).save(path)
+    steps = np.diff(read_depth_map(path).inverse[0, 1:])
+    assert ((steps > 0) == is_stretched).all()
+    photo.write_bytes(encoded(np.zeros((2, 5, 3), np.uint8)))
+    assert any("brighter is taken as nearer" in note for note in load_scene(photo).notes) == is_stretched
+
+
+@pytest.mark.parametrize(
     ("photo", "name"),
     [
         ("photo", "photo_depth.png"),

@@ -55,9 +55,13 @@ _LONGEST_NUMBER = 30
 
 @dataclass(frozen=True, eq=False)
 class DepthMap:
-    """Inverse depth along the camera's axis ``(h, w)`` float32, up to scale and shift; NaN where it is unknown."""
+    """Inverse depth along the camera's axis ``(h, w)`` float32, up to scale and shift; NaN where it is unknown.
+
+    ``note`` says what was taken for granted.
+    """
 
     inverse: NDArray[np.float32]
+    note: str = ""
 
 
 def of_depth(depth: NDArray[np.float32]) -> DepthMap:
@@ -95,8 +99,8 @@ def read_depth_map(path: Path) -> DepthMap:
     """Read a depth map.
 
     Floats (``.pfm``, ``.npy``, OpenEXR, TIFF) are metres, pictures of 16 bits millimetres, but disparities where the
-    name says so (:func:`says_disparity`). A picture of 8 bits is brighter where something is nearer, as programs that
-    estimate depth write it.
+    name says so (:func:`says_disparity`). A picture of 8 bits, or one whose 16 bits are stretched to their whole range,
+    is brighter where something is nearer, as programs that estimate depth write it.
 
     Raises
     ------
@@ -121,9 +125,23 @@ def read_depth_map(path: Path) -> DepthMap:
     except (ValueError, EOFError, OSError) as error:
         raise SceneError(f"is no depth map ({error})", where=path.name) from None
     values, is_wide = _gray(data, path.name)
+    if is_wide and convert is of_depth and _is_stretched(values):
+        note = f"{path.name} spans all of its 16 bits, as no distances do: brighter is taken as nearer"
+        return DepthMap(values.astype(np.float32), f"{note}; invert a map in which dark is near")
     if values.dtype.kind == "f" or is_wide:  # a scale is no matter
         return convert(values.astype(np.float32))
     return DepthMap(without_stairs(values))
+
+
+def _is_stretched(values: NDArray[np.generic]) -> bool:
+    """Whether 16 bits reach from 0 to 65535 without a gap of a 256th at either end.
+
+    Programs that estimate depth stretch it so; in distances 0 and 65535 stand for what is unknown, far from all others.
+    """
+    ends, level = (0, 65535), 256
+    within = values[(values > ends[0]) & (values < ends[1])]
+    is_whole = (values.min(), values.max()) == ends and within.size > 0
+    return bool(is_whole and within.min() < level and within.max() > ends[1] - level)
 
 
 def _numpy_array(path: Path) -> NDArray[np.generic]:

@@ -95,6 +95,7 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
         notes = (*notes, f"{depth_map.name} is taken for disparity, as its name says: larger values are nearer")
     chosen = read_depth_map(depth_map) if depth_map is not None else own
     assert chosen is not None
+    notes = (*notes, *filter(None, [chosen.note]))
     height, width = image.pixels.shape[:2]
     rows, columns = chosen.inverse.shape
     if not _alike((width, height), (columns, rows)):
