@@ -125,7 +125,7 @@ def read_depth_map(path: Path) -> DepthMap:
     except (ValueError, EOFError, OSError) as error:
         raise SceneError(f"is no depth map ({error})", where=path.name) from None
     values, is_wide = _gray(data, path.name)
-    if is_wide and convert is of_depth and _is_stretched(values):
+    if is_wide and convert is of_depth and _is_stretched(values.astype(np.float64)):
         note = f"{path.name} spans all of its 16 bits, as no distances do: brighter is taken as nearer"
         return DepthMap(values.astype(np.float32), f"{note}; invert a map in which dark is near")
     if values.dtype.kind == "f" or is_wide:  # a scale is no matter
@@ -133,7 +133,7 @@ def read_depth_map(path: Path) -> DepthMap:
     return DepthMap(without_stairs(values))
 
 
-def _is_stretched(values: NDArray[np.generic]) -> bool:
+def _is_stretched(values: NDArray[np.float64]) -> bool:
     """Whether 16 bits reach from 0 to 65535 without a gap of a 256th at either end.
 
     Programs that estimate depth stretch it so; in distances 0 and 65535 stand for what is unknown, far from all others.
