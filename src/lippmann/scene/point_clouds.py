@@ -14,17 +14,17 @@ from lippmann.scene.splat_clouds import bulk_of
 from lippmann.scene.values.description import Instance, Material, Matrix, Mesh, SceneDescription
 
 
-def draw_cloud(clouds: Sequence[Mesh]) -> tuple[list[Mesh], Width]:
+def draw_cloud(clouds: Sequence[Mesh], width: Width | None = None) -> tuple[list[Mesh], Width]:
     """Balls about the points of clouds, whose ``faces`` are points ``(m, 1)``, and how wide they are.
 
     Strays, far outside of where nearly all points are, have meshes of their own, which displays are not fitted to; see
-    :func:`lippmann.scene.splat_clouds.bulk_of`. The bulk tells how wide points are drawn.
+    :func:`lippmann.scene.splat_clouds.bulk_of`. The bulk tells how wide points are drawn, unless ``width`` says so.
     """
     positions = np.concatenate([cloud.positions for cloud in clouds]).astype(np.float64)
     bulk = bulk_of(positions, np.ones(len(positions)))
     if not bulk.any():
         bulk[:] = True
-    width = width_of(float(np.linalg.norm(np.ptp(positions[bulk], axis=0))), len(positions), lines=False)
+    width = width or width_of(float(np.linalg.norm(np.ptp(positions[bulk], axis=0))), len(positions), lines=False)
     meshes, first = [], 0
     for cloud in clouds:
         inside = bulk[first : first + len(cloud.positions)]
@@ -36,13 +36,13 @@ def draw_cloud(clouds: Sequence[Mesh]) -> tuple[list[Mesh], Width]:
     return meshes, width
 
 
-def draw_thin(thin: Sequence[Mesh]) -> tuple[list[Mesh], Width]:
+def draw_thin(thin: Sequence[Mesh], width: Width | None = None) -> tuple[list[Mesh], Width]:
     """Points as by :func:`draw_cloud`, or rods along lines, whose ``faces`` are ``(m, 2)``; and how wide they are."""
     if thin[0].faces.shape[1] == 1:
-        return draw_cloud(thin)
+        return draw_cloud(thin, width)
     positions = np.concatenate([mesh.positions for mesh in thin])
     diagonal = float(np.linalg.norm(np.ptp(positions, axis=0)))
-    width = width_of(diagonal, sum(len(mesh.faces) for mesh in thin), lines=True)
+    width = width or width_of(diagonal, sum(len(mesh.faces) for mesh in thin), lines=True)
     return [as_mesh(mesh, np.eye(4)[None], width.radius, mesh.material) for mesh in thin], width
 
 

@@ -238,6 +238,29 @@ def test_clouds_of_points_are_drawn_as_balls(plotter, tmp_path):
         assert not any("lines or points" in note for note in scene.notes)
 
 
+def test_spheres_and_tubes_are_as_wide_as_at_the_focus_and_shaded(plotter):
+    plotter.add_points(np.eye(3), render_points_as_spheres=True, point_size=20)
+    plotter.add_mesh(pyvista.Line(), line_width=10, render_lines_as_tubes=True)
+    plotter.enable_parallel_projection()
+    plotter.camera.position, plotter.camera.focal_point, plotter.camera.parallel_scale = (0, 0, 9), (0, 0, 0), 2
+    scene = load_scene(plotter).description
+    pixel = 4 / plotter.window_size[1]
+    balls, rod = scene.meshes
+    assert np.ptp(balls.positions.reshape(3, -1, 3), axis=1).max() == pytest.approx(20 * pixel, rel=0.02)
+    assert np.ptp(rod.positions[:, 1:], axis=0).max() == pytest.approx(10 * pixel, rel=0.02)
+    assert not any(material.unlit for material in scene.materials)
+
+
+def test_a_surface_of_one_value_has_the_first_colour(plotter):
+    """As a contour at one level has, whose colour map has no range."""
+    plane = pyvista.Plane(i_resolution=1, j_resolution=1)
+    plane.point_data["level"] = [7.0] * 4
+    plotter.add_mesh(plane, cmap="viridis")
+    scene = load_scene(plotter).description
+    assert np.isfinite(scene.meshes[0].uvs[0]).all()
+    assert scene.materials[0].base_color_texture.image.pixels[-1, 128, :3].tolist() == [68, 1, 84]
+
+
 @pytest.mark.parametrize("of_cells", [False, True], ids=["points", "cells"])
 def test_lines_alone_are_drawn_as_rods(plotter, tmp_path, of_cells):
     """Streamlines, from an object, a file and a plotter: two pieces and one, in the colours of their scalars."""

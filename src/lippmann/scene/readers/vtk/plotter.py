@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.points_lines import POINTS_NOTE, Width
 from lippmann.scene.parsing.vertex_colors import COLORED
 from lippmann.scene.point_clouds import draw_thin
 from lippmann.scene.readers.vtk.data_set import Surface, image_of, is_thin, mesh_of, surface_of
@@ -54,7 +55,9 @@ def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
         The plotter shows no surface and no volume, or several volumes.
     """
     renderer = plotter.renderers[0]
-    scene = _Plotted()
+    camera = _camera(renderer, plotter.window_size)
+    height = camera.height or 2.0 * np.tan((camera.fov_y or 0.0) / 2.0) * (camera.focus_distance or 0.0)
+    scene = _Plotted(float(height) / plotter.window_size[1])
     if len(plotter.renderers) > 1:
         scene.notes.append(f"of {len(plotter.renderers)} renderers the first is shown")
     ignored = 0
@@ -80,7 +83,7 @@ def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
         scene.meshes,
         scene.materials,
         scene.instances,
-        cameras=[_camera(renderer, plotter.window_size)],
+        cameras=[camera],
         background=_linear(renderer.background_color.float_rgb),
         notes=scene.notes,
         volume=scene.volumes[0] if scene.volumes else None,
@@ -89,8 +92,9 @@ def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
 
 @dataclass(eq=False)
 class _Plotted:
-    """What is read of a plotter's actors."""
+    """What is read of a plotter's actors; ``pixel`` is the side of a pixel at the focus of its camera."""
 
+    pixel: float
     meshes: list[Mesh] = field(default_factory=list)
     materials: list[Material] = field(default_factory=list)
     instances: list[Instance] = field(default_factory=list)
@@ -121,13 +125,21 @@ class _Plotted:
         meshes = [mesh_of(surface, block.name, len(self.materials))]
         material = _material(actor.prop, block, texture, is_mapped=is_mapped)
         if surface.faces.shape[1] < 3:
-            meshes, width = draw_thin(meshes)
-            material = replace(material, unlit=True)
+            width = self._width(actor.prop, is_line=surface.faces.shape[1] == 2)
+            material = replace(material, unlit=width is None)
+            meshes, width = draw_thin(meshes, width)
             self.notes.append(f"'{block.name[:40]}': {width.note}")
         self.materials.append(material)
         matrix = _matrix(actor.GetMatrix())
         self.instances += [Instance(len(self.meshes) + number, matrix) for number in range(len(meshes))]
         self.meshes += meshes
+
+    def _width(self, prop: Any, *, is_line: bool) -> Width | None:
+        """The width of points that are to be spheres, or of lines that are to be tubes; None of others."""
+        solid = prop.GetRenderLinesAsTubes() if is_line else prop.GetRenderPointsAsSpheres()
+        size = prop.GetLineWidth() if is_line else prop.GetPointSize()
+        what = "lines are drawn as rods" if is_line else POINTS_NOTE
+        return Width(size * self.pixel / 2.0, f"{what}, as wide as the plotter's at its focus") if solid else None
 
 
 def _left_out(actor: Any, mapper: Any) -> list[str]:
@@ -220,7 +232,9 @@ def _map_scalars(mapper: Any, data: Any) -> Texture | None:
         (data.cell_data if of_cells else data.point_data)[_COLORS] = _values(mapped)
         data.set_active_scalars(_COLORS, preference="cell" if of_cells else "point")
     elif coordinates is not None and picture is not None:
-        data.point_data.active_texture_coordinates = _values(coordinates)
+        # Where all scalars are one, VTK divides by the range: the texture has one colour then, but for its ends.
+        places = np.nan_to_num(_values(coordinates), nan=0.5, posinf=1.0, neginf=0.0)
+        data.point_data.active_texture_coordinates = places
         return Texture(_texels(picture), srgb=True, wrap_u="clamp", wrap_v="clamp", filter="nearest")
     return None
 
