@@ -133,7 +133,7 @@ class PhysicalSurfaces:
 
     def _first(self, ray: Ray3f) -> tuple[Ray3f, PreliminaryIntersection3f]:
         ray = mi.Ray3f(ray)
-        pi = self._scene.ray_intersect_preliminary(ray, coherent=True, active=True)
+        pi = self._scene.ray_intersect_preliminary(ray)
         return self._skip_null(ray, pi) if self._has_null else (ray, pi)
 
     @syntax
@@ -164,7 +164,7 @@ class PhysicalSurfaces:
         distance = mi.Float(0)  # length of the path so far
         tint = mi.Color3f(1)  # of the specular surfaces so far
         steps = mi.UInt32(0)  # specular surfaces so far
-        pi = self._scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+        pi = self._scene.ray_intersect_preliminary(ray, active=active)
         covered = mi.Bool(pi.is_valid())
         while dr.hint(active, label="to the first rough surface"):
             toward = mi.Ray3f(o, d)
