@@ -8,6 +8,8 @@ from lippmann.color.transfer import (
     dequantize,
     encode,
     encode_srgb,
+    encode_with_slope,
+    over_channels,
     pbr_neutral,
     quantize,
 )
@@ -77,10 +79,25 @@ def test_the_slope_with_a_tone_map_is_that_along_the_color(color):
     assert coding_chord(low, color, "pbr-neutral") == pytest.approx(chord, rel=1e-3)
 
 
+@pytest.mark.parametrize("coding", ["linear", "srgb", "pbr-neutral"])
+def test_codes_beside_their_slope_are_those_of_the_coding(coding):
+    linear = np.random.default_rng(2).random((50, 3)).astype(np.float32) * 1.5 - np.float32(0.2)
+    codes, slope = encode_with_slope(linear, coding)
+    assert np.array_equal(codes, encode(linear, coding))
+    assert np.array_equal(slope, coding_slope(linear, coding))
+
+
 @pytest.mark.parametrize("coding", ["linear", "srgb"])
 def test_the_chord_of_a_value_with_itself_is_the_slope(coding):
     values = np.array([0.001, 0.1, 0.3, 0.7])
     assert coding_chord(values, values, coding) == pytest.approx(coding_slope(values, coding))
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_reductions_over_colors_are_those_over_the_last_axis(channels):
+    values = np.arange(4 * 5 * channels).reshape(4, 5, channels) % 7
+    assert np.array_equal(over_channels(np.add, values), values.sum(axis=-1))
+    assert np.array_equal(over_channels(np.maximum, values), values.max(axis=-1))
 
 
 def neutral(color):

@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import Coding, coding_chord, coding_slope, encode
+from lippmann.color.transfer import Coding, coding_chord, encode, encode_with_slope, over_channels
 from lippmann.rendering.denoise.noisy_blend import mean_around, weigh_samples
 from lippmann.rendering.denoise.tuning import TUNING
 from lippmann.rendering.estimate.psnr import PixelErrors
@@ -97,14 +97,15 @@ class Denoised:
         """Squared error of every pixel's code, estimated from the two halves."""
         noisy, clean = self._clean_halves()
         first, second = (encode(half, self._coding) for half in clean)
-        apart: Floats = (np.float32(0.25) * np.square(first - second)).mean(axis=2)
+        apart: Floats = over_channels(np.add, np.square(first - second)) / np.float32(12)
         picture = self._blend_halves()
-        bend = encode(picture, self._coding) - np.float32(0.5) * (first + second)
-        slope = self._measure_slope(picture, noisy)
+        codes, slope = encode_with_slope(picture, self._coding)
+        bend = codes - np.float32(0.5) * (first + second)
+        self._take_chords(slope, picture, noisy)
         left = [slope * (half - smooth) + bend for half, smooth in zip(noisy, clean, strict=True)]
-        common = (left[0] * left[1]).mean(axis=2)
+        common = over_channels(np.add, left[0] * left[1]) / np.float32(3)
         limit = TUNING.hidden * max(1.0, REQUEST.usual / self._renderer.samples)
-        hidden = np.maximum(np.abs(left[0]), np.abs(left[1])).max(axis=2) > limit
+        hidden = over_channels(np.maximum, np.maximum(np.abs(left[0]), np.abs(left[1]))) > limit
         common[hidden] = np.float32(ESTIMATE.outlier_ratio) * apart[hidden]
         samples = self._renderer.squared_error()
         if samples.blur is not None:
@@ -164,25 +165,24 @@ class Denoised:
         further = None if paths is None or self._coverage is None else self._coverage()
         return None if paths is None or further is None else list(zip(paths, further, strict=True))
 
-    def _measure_slope(self, picture: Floats, noisy: tuple[Floats, Floats]) -> Floats:
-        """Factor from linear errors to errors of the code, per pixel: the curve's slope, or a finite difference."""
+    def _take_chords(self, slope: Floats, picture: Floats, noisy: tuple[Floats, Floats]) -> None:
+        """Put the finite difference in place of the curve's ``slope`` at pixels far brighter than their samples."""
         coding = self._coding
-        slope = coding_slope(picture, coding)
         displayed = np.float32(0.5) * (noisy[0] + noisy[1])
-        scatter = np.abs(noisy[0] - noisy[1]).mean(axis=2)
+        scatter = over_channels(np.add, np.abs(noisy[0] - noisy[1])) / np.float32(3)
         nearby = mean_around(scatter, 1, Bands(self._threads))[..., None]
         truth = displayed + np.float32(TUNING.far_above) * nearby
         if coding == "pbr-neutral":
             # A tone map mixes colours, so they keep their proportions; and it clips nothing.
-            far = (truth < np.float32(0.9) * picture).any(axis=2)
+            far = over_channels(np.logical_or, truth < picture)
             high = picture[far]
-            low = high * np.clip(truth[far] / np.maximum(high, np.float32(1e-6)), 0, 1).min(axis=1, keepdims=True)
+            share = np.divide(truth[far], high, out=np.ones_like(high), where=high > 0)
+            low = high * np.clip(share, 0, 1).min(axis=1, keepdims=True)
         else:
             truth = np.where(picture > 1, np.minimum(displayed, 1), truth)
-            far = picture - truth > 1e-4  # smaller differences are mostly rounding
+            far = truth < picture
             low, high = truth[far], picture[far]
         slope[far] = coding_chord(low, high, coding)
-        return slope
 
 
 def clean_light(noisy: Floats, specular: Floats | None, denoise: Denoise, samples: int, turned: bool = False) -> Floats:
@@ -249,12 +249,12 @@ def exchange_coverage(pixels: Floats, paths: Coverage, further: Coverage, *, thr
         around is of one side.
     """
     lacking = (paths + further).share - paths.share
-    rows, columns = np.nonzero(lacking.any(axis=2))
+    rows, columns = np.nonzero(over_channels(np.logical_or, lacking))
     if not len(rows):
         return pixels
     result = pixels.astype(np.float32)
     # One coverage for all colours, also where sub-pixels have rays of their own.
-    covered = paths.share.mean(axis=2, dtype=np.float64)
+    covered = over_channels(np.add, paths.share.astype(np.float64)) / paths.share.shape[2]
     # Colours are averaged with the fourth power of the coverage as weight: mixed pixels hardly count.
     of_surface, behind = (np.pad(np.square(np.square(share)), 1) for share in (covered, 1 - covered))
     colors = np.pad(pixels, ((1, 1), (1, 1), (0, 0)))
