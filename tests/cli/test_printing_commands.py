@@ -227,7 +227,7 @@ def test_a_woven_print_has_its_trim_whatever_the_bleed(lippmann, tmp_path):
     np.testing.assert_array_equal(tifffile.imread(sheet)[39:-39, 39:-39], tifffile.imread(bled)[:, ::-1])
 
 
-def test_a_job_sheet_is_one_page(lippmann, tmp_path):
+def test_a_job_sheet_is_one_page(lippmann, tmp_path, monkeypatch):
     views = tmp_path / "views"
     views.mkdir()
     for number in range(2):
@@ -242,9 +242,11 @@ def test_a_job_sheet_is_one_page(lippmann, tmp_path):
     alone = tmp_path / "alone.pdf"
     assert lippmann("marks", sheet, "--job-sheet", alone, "--json").json["output"] is None
     assert alone.exists()
+    monkeypatch.chdir(tmp_path)
+    assert lippmann("marks", picture, "--json").json["output"] == "print-marks.tif"
+    assert lippmann("pitch-test", *SHEET, "--json").json["output"] == "pitch-test.tif"
     for words, said in (
         ((picture, "--job-sheet", tmp_path / "job.png"), "a job sheet is a .pdf file"),
-        ((picture,), "--output: is missing"),
         ((picture, "-o", sheet, "--bleed", "3mm"), "--bleed: needs --display"),
         ((sheet, "-o", tmp_path / "twice.tif"), "sheet.tif: has a margin with marks already"),
     ):

@@ -10,7 +10,7 @@ import typer
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.command_options import only, with_options
 from lippmann.cli.shared.console import Console, naming
-from lippmann.cli.shared.scene_source import print_of
+from lippmann.cli.shared.scene_source import output_of, print_of
 from lippmann.errors import OutputError, UsageError
 from lippmann.options.prints import FinishOptions, PrintOptions
 
@@ -22,7 +22,13 @@ if TYPE_CHECKING:
 def marks(
     picture: options.Picture,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The file to write; its ending names the format.")
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="The file to write; its ending names the format. By default NAME-marks.tif in this folder, or with "
+            "--job-sheet none.",
+        ),
     ] = None,
     margin: Annotated[
         str, typer.Option("--margin", "--marks", help="Width of the margin with a unit, such as 10mm.")
@@ -52,8 +58,8 @@ def marks(
     from lippmann.image.write import check_output
 
     console = Console(quiet, as_json)
-    if output is None and job_sheet is None:
-        raise UsageError("is missing", where="--output", rule="marks writes a picture, a job sheet or both")
+    if job_sheet is None:
+        output = output_of(output, picture, "-marks.tif")
     if output is not None:
         check_output(output, bits)
     if job_sheet is not None:
@@ -99,7 +105,7 @@ def _display_with_bleed(display: Display | None, bleed: str | None) -> Display |
 
 @with_options
 def pitch_test(
-    output: Annotated[Path, typer.Option("--output", "-o", help="TIFF file to write.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="TIFF file to write.")] = Path("pitch-test.tif"),
     strips: Annotated[int, typer.Option("--strips", help="Number of strips.")] = 21,
     step: Annotated[
         float | None,
