@@ -390,6 +390,9 @@ def test_without_any_depth_there_is_no_scene(tmp_path):
         match=r"^photo\.png: needs a depth map; .*quilts.* own; add depth_map=\.\.\., or lay photo_depth\.png",
     ):
         load_scene(tmp_path / "photo.png")
+    (tmp_path / "pair.png").write_bytes(encoded(np.zeros((4, 9, 3), np.uint8)))
+    with pytest.raises(SceneError, match=r"where its right half is the depth, name it pair_rgbd\.png"):
+        load_scene(tmp_path / "pair.png")
     slices = Pillow.new("L", (4, 4))
     slices.save(tmp_path / "cells.tif", save_all=True, append_images=[slices])
     with pytest.raises(SceneError, match=r"^cells\.tif: needs a depth map; .*; slices of a volume are read as \.npy"):
@@ -475,6 +478,20 @@ def test_no_view_sees_between_the_layers():
     covered = {*map(tuple, layers.faces), *map(tuple, layers.behind_faces)}
     assert len(covered) == 2 * 39 * 39
     assert np.ptp(layers.nearness.ravel()[layers.faces], axis=1).max() <= EDGE
+
+
+@pytest.mark.parametrize("quality", [95, 75])
+def test_ripples_of_jpeg_are_no_edges(tmp_path, quality):
+    """Beside its true edges a JPEG depth map has ripples; all of what is near hides the far side nevertheless."""
+    y, x = np.mgrid[-1:1:96j, -1:1:96j]
+    is_near = x**2 + y**2 < 0.36
+    Pillow.fromarray(np.where(is_near, 210, 60).astype(np.uint8)).save(tmp_path / "d.jpg", quality=quality)
+    inverse = read_depth_map(tmp_path / "d.jpg").inverse
+    layers = split_layers(inverse, np.zeros((96, 96, 3), np.float32), "d.jpg")
+    assert layers.behind[x**2 + y**2 < 0.3].max() < 0.1
+    sides = is_near.ravel()[layers.faces]
+    assert len(layers.faces) > 0.95 * 2 * 95 * 95
+    assert (sides.all(axis=1) | ~sides.any(axis=1)).mean() > 0.999
 
 
 def test_a_flat_map_has_one_layer():

@@ -39,6 +39,8 @@ _EXTENSION_HEAD = 40
 #: Widths in pixels of the means that take the stairs out of whole numbers: plateaus of up to about the first are slopes
 #: after that, the others make what is narrower even.
 _SMOOTHING = (65, 33, 17, 9, 5, 3)
+#: Side in pixels of the median that takes JPEG's ringing beside edges out of depth: 3 leaves it at quality 75.
+_RINGING = 5
 #: The prefix that XMP has for the namespace of GDepth, or of Dynamic Depth, which took its place; and a property with
 #: such a prefix: an attribute, or an element.
 _GDEPTH = re.compile(rb"""xmlns:([\w.-]+)\s*=\s*["']http://ns\.google\.com/photos/(?:dd/)?1\.0/depthmap/["']""")
@@ -93,6 +95,13 @@ def without_stairs(levels: NDArray[np.generic]) -> NDArray[np.float32]:
         mean = ndimage.uniform_filter(smooth, width, mode="nearest")
         smooth = np.clip(mean, whole - np.float32(0.5), whole + np.float32(0.5))
     return smooth
+
+
+def without_ringing(levels: NDArray[np.generic], data: bytes) -> NDArray[np.generic]:
+    """Levels ``(h, w, ...)`` of the picture file ``data``, without JPEG's ripples, which would be edges."""
+    if not data.startswith(_START_OF_IMAGE):
+        return levels
+    return np.asarray(ndimage.median_filter(levels, (_RINGING, _RINGING, 1)[: levels.ndim]))
 
 
 def read_depth_map(path: Path) -> DepthMap:
@@ -204,7 +213,7 @@ def _gray(data: bytes, where: str, turn: int | None = None) -> tuple[NDArray[np.
                 return upright(np.asarray(picture).astype(np.int64), turn), True
             if len(picture.getbands()) > 2 or picture.mode == "P":
                 _check_grey(np.asarray(picture.convert("RGB")), where)
-            return upright(np.asarray(picture.convert("L")), turn), False
+            return upright(without_ringing(np.asarray(picture.convert("L")), data), turn), False
     except SceneError:
         raise
     except MemoryLimitError as error:

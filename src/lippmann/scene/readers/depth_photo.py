@@ -21,7 +21,14 @@ from lippmann.errors import SceneError
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import decoding, read_bytes, texels_of_codes
 from lippmann.scene.readers.depth_layers import Layers, split_layers
-from lippmann.scene.readers.depth_map import DepthMap, embedded_depth, of_nearness, read_depth_map, says_disparity
+from lippmann.scene.readers.depth_map import (
+    DepthMap,
+    embedded_depth,
+    of_nearness,
+    read_depth_map,
+    says_disparity,
+    without_ringing,
+)
 from lippmann.scene.values.description import Image, Instance, Material, Mesh, SceneDescription, Texture
 
 #: How the name of a depth map goes on after that of its photograph, and how it ends.
@@ -79,11 +86,13 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
         elif form is None:
             own = embedded_depth(data, path.name, turn)
         else:
-            image, own = _color_and_depth(image, form)
+            image, own = _color_and_depth(image, form, data)
     if depth_map is None and own is None:
         depth_map = depth_beside(path)
         if depth_map is None:
             fix = f"add depth_map=..., or lay {path.stem[:40]}_depth.png beside it"
+            if image.pixels.shape[1] > 2 * image.pixels.shape[0]:
+                fix += f"; where its right half is the depth, name it {path.stem[:40]}_rgbd{path.suffix}"
             rule = "pictures are read as photographs with depth: 'lippmann weave' takes quilts, 'lippmann view' our own"
             if data.endswith(_SAMSUNG):
                 fix += "; Samsung's own is taken out by: exiftool -b -SingleShotDepthMapTiff a.jpg > a_depth.tif"
@@ -118,13 +127,14 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
     return replace(description, notes=[*notes, *description.notes])
 
 
-def _color_and_depth(image: Image, form: RgbdForm) -> tuple[Image, DepthMap]:
+def _color_and_depth(image: Image, form: RgbdForm, data: bytes) -> tuple[Image, DepthMap]:
     """The two halves of a picture whose name says that it has depth beside colour."""
     width = image.pixels.shape[1]
     if width % 2 or image.pixels.shape[2] < 3:
         rule = "colour and depth have one width, in red, green and blue"
         raise SceneError(f"is {width} pixels wide", where=image.name, rule=rule)
     color, depth = np.split(image.pixels[..., :3], 2, axis=1)
+    depth = without_ringing(depth, data)
     if form.half:
         color = np.repeat(color, 2, axis=1)
         depth = np.repeat(depth, 2, axis=1)
