@@ -131,11 +131,24 @@ def test_cameras_and_lamps():
 
 def test_what_has_no_faces():
     scene = box().scene()
-    scene.add_geometry(trimesh.PointCloud(np.eye(3)), geom_name="cloud")
-    found = load_scene(scene)
-    assert "'cloud' has no faces and is not rendered" in found.notes
+    scene.add_geometry(trimesh.Trimesh(), geom_name="nothing")
+    assert "'nothing' has no faces and is not rendered" in load_scene(scene).notes
     with pytest.raises(SceneError, match="holds no triangles"):
         load_scene(trimesh.Scene())
+
+
+def test_points_and_paths_lie_where_their_nodes_are():
+    scene = box().scene()
+    cloud = trimesh.PointCloud([*np.eye(3), (np.nan, 0, 0)], colors=[(255, 0, 0, 255)] * 4)
+    scene.add_geometry(cloud, transform=trimesh.transformations.translation_matrix((10, 0, 0)))
+    scene.add_geometry(trimesh.load_path(np.array([(0, 0, 5), (4, 0, 5), (4, 4, 5)], float)))
+    found = load_scene(scene).description
+    solid, balls, rods = found.meshes
+    assert balls.positions.reshape(3, -1, 3).mean(axis=1) == pytest.approx(np.eye(3) + np.array([10, 0, 0]), abs=1e-5)
+    assert (balls.colors[:, :3] == [1, 0, 0]).all()
+    assert rods.positions.reshape(2, -1, 3).mean(axis=1) == pytest.approx(np.array([(2, 0, 5), (4, 2, 5)]), abs=1e-5)
+    assert [found.materials[mesh.material].unlit for mesh in (solid, balls, rods)] == [False, True, False]
+    assert len(load_scene(cloud).description.meshes) == 1
 
 
 class Values(dict):

@@ -6,14 +6,18 @@ The library is not imported here: whoever has an object of it has loaded it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lippmann.errors import SceneError
+from lippmann.scene.matrices import transform_points
 from lippmann.scene.parsing.files import texels_of
-from lippmann.scene.parsing.vertex_colors import GREY, linear_colors, material_of
+from lippmann.scene.parsing.points_lines import MOST, thin_out
+from lippmann.scene.parsing.vertex_colors import COLORED, GREY, linear_colors, material_of
+from lippmann.scene.point_clouds import draw_thin
 from lippmann.scene.values.description import (
     AlphaMode,
     Camera,
@@ -38,16 +42,17 @@ _LIGHT_KINDS: dict[str, Literal["point", "spot", "directional"]] = {
 }
 
 
-def from_trimesh(source: trimesh.Scene | trimesh.Trimesh) -> SceneDescription:
-    """A ``trimesh.Scene`` or ``trimesh.Trimesh``: geometry, instances, materials, camera, light sources.
+def from_trimesh(source: trimesh.Scene | trimesh.parent.Geometry) -> SceneDescription:
+    """A ``trimesh.Scene``, ``Trimesh``, ``PointCloud`` or ``Path``: geometry, instances, materials, camera, lights.
 
-    Vertex normals are taken where the mesh already holds them; otherwise its facets are flat. Vertex and face colours
-    are taken as sRGB-coded. A Phong (simple) material becomes a rough dielectric of its diffuse colour.
+    Points become balls, paths rods, in their colours. Vertex normals are taken where the mesh already holds them;
+    otherwise its facets are flat. Vertex and face colours are taken as sRGB-coded. A Phong (simple) material becomes a
+    rough dielectric of its diffuse colour.
 
     Raises
     ------
     SceneError
-        The scene holds no triangles.
+        The scene holds no triangles, points or paths.
     """
     scene = source if hasattr(source, "graph") else source.scene()
     meshes: list[Mesh] = []
@@ -55,26 +60,66 @@ def from_trimesh(source: trimesh.Scene | trimesh.Trimesh) -> SceneDescription:
     index_of: dict[str, int] = {}
     notes: list[str] = []
     images: dict[int, Image] = {}
+    thin: dict[str, Mesh] = {}
     for name, geometry in scene.geometry.items():
         if not hasattr(geometry, "faces") or len(geometry.faces) == 0:
+            drawn = None if hasattr(geometry, "faces") else _thin(geometry, str(name), len(materials))
+            if drawn is not None:
+                thin[name] = drawn
+                plain = GREY if drawn.colors is None else COLORED
+                materials.append(replace(plain, name=str(name), unlit=drawn.colors is not None))
+                continue
             notes.append(f"'{name}' has no faces and is not rendered")
             continue
         index_of[name] = len(meshes)
         mesh, material = _from_trimesh_mesh(geometry, str(name), len(materials), images)
         meshes.append(mesh)
         materials.append(material)
-    if not meshes:
-        raise SceneError("the trimesh scene holds no triangles", rule="there must be at least one mesh with faces")
-    instances = []
+    if not meshes and not thin:
+        raise SceneError(
+            "the trimesh scene holds no triangles", rule="there must be a mesh with faces, points or a path"
+        )
+    instances: list[Instance] = []
+    placed: list[Mesh] = []
     for node in scene.graph.nodes_geometry:
         matrix, name = scene.graph[node]
         if name in index_of:
             instances.append(Instance(index_of[name], np.asarray(matrix, np.float64)))
+        elif name in thin:
+            places = transform_points(np.asarray(matrix, np.float64), thin[name].positions.astype(np.float64))
+            placed.append(replace(thin[name], positions=places.astype(np.float32)))
+    for size, what in ((1, "points"), (2, "lines")):
+        chosen = [mesh for mesh in placed if mesh.faces.shape[1] == size]
+        step = -(-sum(len(mesh.faces) for mesh in chosen) // MOST)
+        if step > 1:
+            notes.append(f"of the {what} one in {step} is drawn")
+        if step:
+            solid, width = draw_thin([thin_out(mesh, step) for mesh in chosen])
+            notes.append(width.note)
+            instances += [Instance(len(meshes) + number, np.eye(4)) for number in range(len(solid))]
+            meshes += solid
     cameras = [_from_trimesh_camera(scene)] if scene.has_camera else []
     # Asking for `lights` would invent some where there are none.
     lights = [_from_trimesh_light(scene, light) for light in getattr(scene, "_lights", None) or ()]
     name = str(scene.metadata.get("name") or "trimesh")
     return SceneDescription(name, meshes, materials, instances, lights, cameras, notes=notes)
+
+
+def _thin(geometry: Any, name: str, material: int) -> Mesh | None:
+    """Points, or the straight pieces of a path; None without any."""
+    if hasattr(geometry, "entities"):
+        every = (np.asarray(entity.discrete(geometry.vertices), np.float64) for entity in geometry.entities)
+        lines = [line for line in every if len(line) > 1]
+        pieces = [np.stack([line[:-1], line[1:]], axis=1) for line in lines]
+        points = np.concatenate(pieces).reshape(-1, lines[0].shape[1]) if pieces else np.zeros((0, 3))
+        points, colors = np.pad(points, ((0, 0), (0, 3 - points.shape[1]))), None
+    else:
+        points, colors = np.asarray(geometry.vertices, np.float64), np.asarray(getattr(geometry, "colors", ()))
+        finite = np.isfinite(points).all(axis=1)
+        colors = linear_colors(colors[finite])[:, :3] if len(colors) == len(points) else None
+        points = points[finite]
+    places = np.arange(len(points), dtype=np.uint32).reshape(-1, 2 if hasattr(geometry, "entities") else 1)
+    return Mesh(name, points.astype(np.float32), places, material, colors=colors) if len(points) else None
 
 
 def _from_trimesh_mesh(
@@ -190,7 +235,8 @@ def _from_trimesh_light(scene: trimesh.Scene, light: trimesh.scene.lighting.Ligh
 
 def adapter_for(source: object) -> Callable[[Any], SceneDescription] | None:
     """The function that reads an object of trimesh's; None for one that is no scene."""
-    return from_trimesh if hasattr(source, "graph") or hasattr(source, "faces") else None
+    is_scene = any(hasattr(source, name) for name in ("graph", "faces", "entities"))
+    return from_trimesh if is_scene or type(source).__name__ == "PointCloud" else None
 
 
 def _fraction(color: ArrayLike | None, default: tuple[int, ...]) -> NDArray[np.float64]:
