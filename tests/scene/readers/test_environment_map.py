@@ -79,6 +79,13 @@ def test_shapes_that_are_no_panorama(tmp_path, pixels):
         read_environment(save_exr(tmp_path / "sky.exr", {"RGB": np.ascontiguousarray(pixels[:1, :2])}))
 
 
+def test_a_single_pixel_is_light_from_everywhere(tmp_path, pixels):
+    """As Blender writes a world of one colour beside a stage."""
+    sky = read_environment(save_exr(tmp_path / "sky.exr", {"RGB": np.ascontiguousarray(pixels[:1, :1])}))
+    assert sky.pixels.shape == (2, 4, 3)
+    assert (sky.pixels == pixels[0, 0]).all()
+
+
 def test_channels_that_are_no_colour(tmp_path, pixels):
     with pytest.raises(SceneError, match=r"has the channels Z; R, G and B"):
         read_environment(save_exr(tmp_path / "sky.exr", {"Z": np.ascontiguousarray(pixels[..., 0])}))

@@ -23,20 +23,25 @@ _COLORS = (("R", "G", "B"), ("Y", "Y", "Y"), ("R", "R", "R"))
 
 
 def read_environment(path: Path) -> Environment:
-    """Read an equirectangular picture, row 0 straight up.
+    """Read an equirectangular picture, row 0 straight up; a single pixel is light alike from everywhere.
 
     Raises
     ------
     SceneError
-        The file is missing, damaged or neither EXR nor HDR; it has no three colours; it is less than two pixels high
-        or wide, or not about twice as wide as high.
+        The file is missing, damaged or neither EXR nor HDR; it has no three colours; it is not about twice as wide as
+        high.
     """
     pixels, notes = read_linear(path, check_size=lambda height, width: _check_size(height, width, path.name))
     light = possible_light(pixels)
     if changed := int((light != pixels).any(axis=-1).sum()):
         what = "negative light or none that is a finite number, which counts as 0, infinite light as 65504"
         notes = (*notes, f"{path.name}: {changed} pixels hold {what}")
-    return Environment(light, name=path.name, notes=notes)
+    return Environment(panorama(light), name=path.name, notes=notes)
+
+
+def panorama(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Pixels ``(h, w, 3)`` of the surroundings: a single one repeated, as Blender writes a world of one colour."""
+    return np.tile(pixels, (2, 4, 1)) if pixels.shape[:2] == (1, 1) else pixels
 
 
 def possible_light(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -101,7 +106,7 @@ def _read_hdr(data: bytes, where: str, check_size: Callable[[int, int], None]) -
 
 
 def _check_size(height: int, width: int, where: str) -> None:
-    if min(height, width) < 2 or not 1.8 < width / height < 2.2:
+    if (height, width) != (1, 1) and (min(height, width) < 2 or not 1.8 < width / height < 2.2):
         raise SceneError(
             f"is {width}x{height} pixels",
             where=where,

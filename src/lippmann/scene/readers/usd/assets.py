@@ -21,6 +21,7 @@ from lippmann.scene.parsing.texture_maps import unit
 from lippmann.scene.parsing.udim import is_tiled, read_tiles
 from lippmann.scene.readers.environment_map import (
     LINEAR_SUFFIXES,
+    panorama,
     possible_light,
     read_environment,
     read_linear,
@@ -127,7 +128,7 @@ class Assets:
         if image is None:
             return _WHITE_SKY
         values = unit(image)[..., :3]
-        return np.asarray(decode_srgb(np.broadcast_to(values, (*values.shape[:2], 3))), np.float32)
+        return panorama(np.asarray(decode_srgb(np.broadcast_to(values, (*values.shape[:2], 3))), np.float32))
 
     @contextmanager
     def _file(self, asset: Record) -> Iterator[Path]:
