@@ -37,8 +37,8 @@ from films_scenes import Film, films
 from harness import save, saved
 
 #: Frames of the two commands whose times are taken from each other; a film of one frame is a still. The earlier version
-#: renders all frames alike; of today's the frames 1 to 16 hold as many key frames as any 16, of camera paths one.
-MANY, FEW = {"other": 5, "today": 17}, 1
+#: renders all frames alike; of today's the frames 1 to 32 hold as many key frames as any 32, of camera paths one.
+MANY, FEW = {"other": 5, "today": 33}, 1
 #: Runs of each command, whose median counts: single ones differ by a quarter.
 RUNS = 3
 #: Frames that are judged, and samples of each of their two references.

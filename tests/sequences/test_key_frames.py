@@ -15,8 +15,10 @@ from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 from lippmann.rendering.preview import Preview
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.values.whitted_scene import CameraPose
+from lippmann.sequences.cuts import Moment
 from lippmann.sequences.frames import place_frames, render_frames, render_sequence
-from lippmann.sequences.key_frames import estimate_next, find_frame_before
+from lippmann.sequences.key_frames import KeyFrames, estimate_next, find_frame_before
+from lippmann.sequences.key_light import LightOfSurfaces
 from lippmann.sequences.motion import Flight
 from lippmann.sequences.turntable import open_turntable
 
@@ -48,9 +50,9 @@ def asked_of(motion, display, frames, estimate=ESTIMATE, **options):
     return asked
 
 
-def test_every_fourth_frame_is_followed_and_follows_another_where_light_is_passed_on():
-    assert [find_frame_before(frame, False) for frame in range(9)] == [None, 0, 0, 0, None, 4, 4, 4, None]
-    assert [find_frame_before(frame, True) for frame in range(3, 18)] == [0, 0, *[4] * 4, *[8] * 4, *[12] * 3, None, 16]
+def test_frames_between_follow_a_key_frame_or_one_that_passes_on_its_light():
+    assert [find_frame_before(frame, 4, 4) for frame in range(9)] == [None, 0, 0, 0, None, 4, 4, 4, None]
+    assert [find_frame_before(frame, 2, 8) for frame in range(1, 10)] == [0, 0, 2, 2, 4, 4, 6, None, 8]
 
 
 def test_frames_after_a_key_frame_take_three_quarters_of_its_samples_in_one_stream(motion, display):
@@ -79,8 +81,19 @@ def test_frames_along_a_camera_path_follow_the_first_up_to_a_cut(display, jump, 
     motion = Flight(scene, [CameraPose(view=camera.view, up=camera.up, center=place) for place in places])
     every = asked_of(motion, display, range(6))
     assert [frame for frame, (*_, has_halves) in enumerate(every) if has_halves] == halves
-    before = [4] if jump else [0, 4]
+    before = [4] if jump else [0, 2, 4]
     assert asked_of(motion, display, [5]) == [every[number] for number in [*before, 5]]
+
+
+def test_frames_after_a_step_of_the_light_take_none_from_before_it(display):
+    shared = LightOfSurfaces()
+    shared.holds = lambda key, moment: (key.number, moment.number) != (0, 2)
+    keys = KeyFrames(display, None, None, shared)
+    key = keys.add(Moment(0, None, None), Provenance(method="pooled", spp=8), None)
+    for number, through in enumerate((shared.trace_next, shared.trace_key, shared.trace_next, shared.pass_on), 1):
+        moment = Moment(number, None, None)
+        assert keys.make_request(RenderRequest(), moment, key).trace_through == through
+        keys.add(moment, key.made, key)
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ after a key frame have no half-buffers. They take three quarters of its samples,
 from the key frame's.
 
 Where nothing but a camera moves, and where the display is at rest, frames take a key frame's light
-(:mod:`lippmann.sequences.key_light`). Then every fourth frame passes on the light that it took, without halves, and
-only every sixteenth has them.
+(:mod:`lippmann.sequences.key_light`). Then only every 32nd frame has halves. Every second frame of a moving camera, and
+every fourth before a display at rest, passes on the light that it took.
 
 Which frames are key frames follows from their numbers, so that a frame is the same whether it is rendered alone or with
 all others. A frame that shows another scene than its key frame, as after a cut, has halves itself.
@@ -63,12 +63,13 @@ class KeyFrames:
         self._moment = moment
         self._render = render
         self._shared = shared
+        self._step = TUNING.frames_of_key if shared is None else shared.frames_of_link
         self._last: tuple[Moment, Key] | None = None  # the last frame that others follow, and its key frame
         self._light = KeptLight()
 
     def make_request(self, request: RenderRequest, moment: Moment, key: Key | None) -> RenderRequest:
         """The request of a frame, which follows a ``key`` frame or, None, has halves of its own."""
-        has_next = moment.number % TUNING.frames_of_key == 0
+        has_next = moment.number % self._step == 0
         if key is not None:
             assert key.made.spp is not None
             assert self._last is not None
@@ -76,9 +77,11 @@ class KeyFrames:
             frame = key.moment.number
             source = f"the estimate of the error follows from frame {frame}'s, with three quarters of its samples"
             own = replace(request, spp=samples, judged_by=source, keep_light=self._light.reuse_key)
-            if self._shared is None or not self._shared.holds(self._last[0], moment):
+            if self._shared is None:
                 return own
-            return replace(own, trace_through=self._shared.pass_on if has_next else self._shared.trace_next)
+            if self._shared.holds(self._last[0], moment):
+                return replace(own, trace_through=self._shared.pass_on if has_next else self._shared.trace_next)
+            return replace(own, trace_through=self._shared.trace_key) if has_next else own
         if not (has_next and _is_open(request)):
             return request
         own = replace(request, keep_light=self._light.keep_key)
@@ -92,7 +95,7 @@ class KeyFrames:
     def add(self, moment: Moment, made: Provenance, key: Key | None) -> Key:
         """Remember how a frame was made, and return its key frame: ``key``, or itself where that is None."""
         key = key or Key(moment, made)
-        if moment.number % TUNING.frames_of_key == 0:
+        if moment.number % self._step == 0:
             self._last = moment, key
         return key
 
@@ -103,15 +106,16 @@ class KeyFrames:
         where the key frame's picture is no denoised one, and after a cut. A frame to follow that is missing is
         rendered.
         """
-        number = find_frame_before(moment.number, self._shared is not None)
+        halves = TUNING.frames_of_key if self._shared is None else TUNING.frames_of_light
+        number = find_frame_before(moment.number, self._step, halves)
         if number is None or not _is_open(request):
             return None
         kept = self._last if self._last is not None and self._last[0].number == number else None
         last = self._moment(number) if kept is None else kept[0]
-        is_link = moment.number % TUNING.frames_of_key == 0
+        may_have_halves = moment.number % TUNING.frames_of_key == 0
         if is_cut(last, moment, self._display):
             return None
-        if is_link and not (self._shared and self._shared.holds(last, moment)):
+        if may_have_halves and not (self._shared and self._shared.holds(last, moment)):
             return None
         if kept is None:
             before = self.before(last, request)
@@ -123,11 +127,9 @@ class KeyFrames:
         return key if has_estimate and not is_cut(key.moment, moment, self._display) else None
 
 
-def find_frame_before(frame: int, passes_light_on: bool) -> int | None:
-    """The frame that a frame follows, by their numbers; None of those that always have halves."""
-    if frame % TUNING.frames_of_key:
-        return frame - frame % TUNING.frames_of_key
-    return frame - TUNING.frames_of_key if passes_light_on and frame % TUNING.frames_of_light else None
+def find_frame_before(frame: int, step: int, halves: int) -> int | None:
+    """The frame that a frame follows, one of every ``step``; None of every ``halves``, which always have them."""
+    return (frame - 1) // step * step if frame % halves else None
 
 
 def estimate_next(key: Figures) -> Figures:

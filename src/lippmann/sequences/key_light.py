@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.sequences.cuts import Moment, is_light_at_rest
+from lippmann.sequences.tuning import TUNING
 
 if TYPE_CHECKING:
     from lippmann.device.pbr.diffuse_pixels import DiffusePixels, KeyPicture
@@ -37,6 +38,8 @@ class KeyLight(ABC):
 
     #: Whether pixels keep their noise, too, so that it would jump at the next key frame with another seed.
     keeps_noise = False
+    #: Every so many frames one passes on the light that it took.
+    frames_of_link = TUNING.frames_of_key
 
     def trace_key(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
         """Trace a key frame; parameters as of ``trace_through`` in
@@ -73,6 +76,8 @@ class KeyLight(ABC):
 
 class LightOfSurfaces(KeyLight):
     """The irradiance of diffuse surfaces of a scene at rest, for a display that moves."""
+
+    frames_of_link = TUNING.frames_of_link
 
     def __init__(self) -> None:
         self._key: tuple[PreparedLight, KeyPicture] | None = None

@@ -12,8 +12,10 @@ class FilmTuning:
     Attributes
     ----------
     frames_of_key, frames_of_light:
-        Every so many frames one has half-buffers, or passes on the light that it took; and one has half-buffers where
-        light is passed on.
+        Every so many frames one has half-buffers; and where light is passed on.
+    frames_of_link:
+        Every so many frames of a moving display one passes on the light that it took; of one at rest every
+        ``frames_of_key``.
     samples_kept:
         Samples of a frame after a key frame, as a share of the key frame's (``docs/research/films.md`` has all and
         half).
@@ -35,7 +37,8 @@ class FilmTuning:
     """
 
     frames_of_key: int = 4
-    frames_of_light: int = 16
+    frames_of_light: int = 32
+    frames_of_link: int = 2
     samples_kept: float = 0.75
     farthest: float = 1 / 3
     pixels_of_probe: int = 4
