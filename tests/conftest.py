@@ -10,7 +10,7 @@ import os
 import re
 import signal
 import tempfile
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TextIO
 
@@ -26,9 +26,15 @@ BY_CLOCK = [HealthCheck.too_slow]
 # Each round of a search has its own instance of a test's class.
 OF_ROUNDS = [HealthCheck.differing_executors]
 PATIENT = settings(settings.get_profile("default"), deadline=None, print_blob=True, suppress_health_check=BY_CLOCK)
-settings.register_profile("ci", PATIENT, derandomize=True, database=None)
+settings.register_profile("ci", PATIENT, derandomize=True, database=None, max_examples=50)
 settings.register_profile("search", PATIENT, suppress_health_check=[*BY_CLOCK, *OF_ROUNDS])
 settings.load_profile("ci")
+with suppress(ImportError, AttributeError):
+    # Hypothesis mixes in numbers and words of all modules that are loaded: each worker would read them all, and take
+    # other examples than the next.
+    from hypothesis.internal.conjecture import providers
+
+    providers._get_local_constants = lambda: providers._local_constants
 
 #: The folder in which a worker that crashes says where, one file a worker; and, in a worker, its file.
 CRASHES = pytest.StashKey[tempfile.TemporaryDirectory]()
