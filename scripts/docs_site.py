@@ -10,6 +10,7 @@ import html
 import re
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +100,7 @@ def options() -> str:
     return "\n\n".join(parts) + "\n"
 
 
+@cache
 def command_tree() -> Any:
     """The command line as a tree of Click's commands."""
     from lippmann.cli.app import make_app

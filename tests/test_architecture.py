@@ -188,7 +188,7 @@ def imports_of(module: str, source: str) -> Iterator[Import]:
                 whole = f"{base}.{alias.name}"
                 imported = whole if whole.removeprefix("lippmann.") in modules() else base
                 yield Import(module, imported, node.lineno, in_function, for_annotations)
-        is_guard = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        is_guard = isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"
         below = in_function or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
         for child in ast.iter_child_nodes(node):
             if not isinstance(child, ast.expr):  # no import stands in an expression
