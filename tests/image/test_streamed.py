@@ -38,6 +38,11 @@ LAYOUTS = [
 ]
 
 
+#: Each layout in one format, and each format: which pieces a file has is the same to all layouts.
+PAIRS = [*(("tiled.tif", layout) for layout in LAYOUTS), ("strips.tif", LAYOUTS[4]), ("a.zarr", LAYOUTS[1])]
+in_pieces = pytest.mark.parametrize(("saved", "layout"), PAIRS, indirect=["saved"], ids=range(len(PAIRS)))
+
+
 @pytest.fixture(autouse=True, scope="module")
 def all_are_large():
     with pytest.MonkeyPatch.context() as patch:
@@ -165,9 +170,8 @@ def test_every_view_shows_the_same_pixels_without_a_table(random_displays, data)
         assert ((some[1] >= top) & (some[1] < bottom))[some[0]].all()
 
 
-@pytest.mark.long_cases("tiled.tif-3", "tiled.tif-4", "tiled.tif-5", "strips.tif-3", "strips.tif-5")
 @pytest.mark.slow
-@pytest.mark.parametrize("layout", LAYOUTS, ids=range(len(LAYOUTS)))
+@in_pieces
 def test_replay_and_refocus_see_the_same(saved, display, layout):
     opened, whole = saved(display(**layout))
     for options in ({}, {"filter": "linear"}, {"subpixels": True}, {"filter": "linear", "subpixels": True}):
@@ -178,7 +182,7 @@ def test_replay_and_refocus_see_the_same(saved, display, layout):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("layout", LAYOUTS, ids=range(len(LAYOUTS)))
+@in_pieces
 @pytest.mark.parametrize("write", [write_views, write_micro_images])
 def test_folders_are_the_same(saved, display, layout, write, tmp_path, monkeypatch):
     opened, image = saved(display(**layout))

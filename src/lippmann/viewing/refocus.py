@@ -120,7 +120,8 @@ def _refocus_compiled(image: IntegralImage, planes: Sequence[float], width: int,
     from lippmann.viewing.refocus_kernel import add_views
 
     display, lattice = image.display, image.display.lattice
-    views, masks = (values.reshape(-1, *values.shape[2:]) for values in image.views_and_mask())
+    # In one order whatever the lenses: the kernel is compiled for each.
+    views, masks = (np.ascontiguousarray(values.reshape(-1, *values.shape[2:])) for values in image.views_and_mask())
     eyes = np.array(list(_eyes(display).values()))
     numbers = [lattice.pitch, lattice.row_pitch, lattice.origin_x, lattice.origin_y, lattice.tolerance]
     numbers.append(display.magnification)
