@@ -20,7 +20,7 @@ from lippmann.runtime import machine
 if sys.argv[1] == "keep":
     machine.keep_freed_memory()
 before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
-for _ in range(50):
+for _ in range(20):
     first, second, third, fourth = (np.ones(5 << 19) for _ in range(4))
     del first, second, third, fourth
 print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
