@@ -25,6 +25,10 @@ REFUSED = {
 }
 
 
+#: All tests of a target run one after the other, by one process of its library.
+each_target = pytest.mark.parametrize("name", TARGETS, scope="module")
+
+
 @cache
 def warmed(name: str) -> bool:
     """Loads the libraries of a reader, which is not to count as an input's time."""
@@ -54,7 +58,7 @@ def test_the_corpus_is_that_of_the_targets():
 
 @pytest.mark.long_cases("rendered-gltf", "rendered-obj", "rendered-mitsuba-xml")
 @pytest.mark.slow
-@pytest.mark.parametrize("name", TARGETS)
+@each_target
 def test_sound_inputs_are_read(name, tmp_path):
     sound = named_seeds(name)
     assert sound
@@ -67,7 +71,7 @@ def test_sound_inputs_are_read(name, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", TARGETS)
+@each_target
 def test_what_broke_a_reader_once_does_so_no_more(name, looked_at):
     assert {path.name: broken for path in found(name) if (broken := looked_at(name, path.read_bytes()))} == {}
 
@@ -90,7 +94,7 @@ def test_long_inputs_end_in_time(name, data, looked_at):
 
 @pytest.mark.long_cases("rendered-obj")
 @pytest.mark.slow
-@pytest.mark.parametrize("name", TARGETS)
+@each_target
 def test_damaged_inputs_end_in_a_result_or_an_error(name, looked_at):
     target = TARGETS[name]
     mutator = Mutator(seeds(name), target.words, tree=target.tree, repair=target.repair, seed=20)
@@ -100,7 +104,7 @@ def test_damaged_inputs_end_in_a_result_or_an_error(name, looked_at):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", TARGETS)
+@each_target
 @settings(
     deadline=None, max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 )

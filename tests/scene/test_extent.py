@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -13,7 +12,7 @@ from lippmann.scene.extent import extreme_points_of
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 
 
-@pytest.mark.slow
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 300), flat=st.booleans(), away=st.sampled_from([0.0, 1e3]))
 def test_copies_within_others_change_nothing(seed, count, flat, away):
     rng = np.random.default_rng(seed)

@@ -114,8 +114,9 @@ def test_nonsense_is_refused_in_one_line(load, text, said):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("layout", ["lenticular", "square", "hexagonal"])
-@pytest.mark.parametrize("value", ["nan", "-1", "'thick'", "inf"])
+@pytest.mark.parametrize(
+    ("layout", "value"), [("lenticular", "nan"), ("square", "-1"), ("hexagonal", "'thick'"), ("hexagonal", "inf")]
+)
 @pytest.mark.parametrize(
     ("table", "key"), [("lens", "thickness"), ("lens", "radius"), ("pixel", "width"), ("pixel", "blur")]
 )

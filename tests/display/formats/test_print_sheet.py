@@ -50,7 +50,7 @@ def test_the_preset_can_be_said_so():
     thickness=st.none() | st.floats(0.3, 3),
     measured=st.booleans(),
 )
-@settings(deadline=None)
+@settings(deadline=None, max_examples=25)
 def test_pitches_gaps_and_fields_agree(lpi, distance, field, thickness, measured):
     if thickness:
         # Thick sheets of fine lenses have no field to speak of, and thin ones no focus on the print.

@@ -127,7 +127,7 @@ def test_normals_point_outward():
 @pytest.mark.slow
 def test_volume_of_the_body():
     """Divergence theorem over the triangles and the flat lid on its rim, against the integral along the profile."""
-    mesh = teapot.tessellate(64, ["body"])
+    mesh = teapot.tessellate(32, ["body"])
     a, b, c = (mesh.positions[mesh.faces[:, k]] for k in range(3))
     volume = np.einsum("tk,tk->", a, np.cross(b, c)) / 6
     top = np.array((0.0, 2.4, 0.0))
