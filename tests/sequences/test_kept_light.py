@@ -32,8 +32,8 @@ def prepared(monkeypatch):
 
 
 class Prepared:
-    def __init__(self, photons=None, light_vertices=None):
-        self.photons, self.light_vertices = photons, light_vertices
+    def __init__(self, photons=None, light_vertices=None, pilot=None):
+        self.photons, self.light_vertices, self.pilot = photons, light_vertices, pilot
 
 
 @pytest.mark.parametrize(
@@ -50,10 +50,13 @@ class Prepared:
     ],
 )
 def test_light_is_prepared_anew_where_what_it_depends_on_has_changed(light, scene, built, exposure, is_kept):
-    kept, anew = KeptLight(), Prepared()
+    kept = KeptLight()
     assert kept.keep_key(lambda: light, "scene", "built", 1.0) is light
-    assert kept.reuse_key(lambda: anew, scene, built, exposure) is (light if is_kept else anew)
-    assert kept.reuse_key(lambda: anew, "scene", "built", 1.0) is light
+    light.pilot = "pilot"
+    next_light = kept.reuse_key(Prepared, scene, built, exposure)
+    assert (next_light is light) == is_kept
+    assert next_light.pilot == "pilot"  # also of light that is prepared anew
+    assert kept.reuse_key(Prepared, "scene", "built", 1.0) is light
 
 
 def test_without_a_key_frame_light_is_prepared():

@@ -34,16 +34,18 @@ class KeptLight:
         return light
 
     def reuse_key(
-        self, prepare: Callable[[], PreparedLight], scene: Scene, built: BuiltScene, own_exposure: float
+        self, prepare: Callable[..., PreparedLight], scene: Scene, built: BuiltScene, own_exposure: float
     ) -> PreparedLight:
-        """The light of a frame after the key frame: the same where it depends on nothing that has changed."""
-        if self._last is not None:
-            light, before, built_before, exposure_before = self._last
-            is_placed = light.photons is not None or light.light_vertices is not None
-            is_same = built is built_before and own_exposure == exposure_before
-            if is_same and (scene is before or not is_placed):
-                return light
-        return prepare()
+        """The light of a frame after the key frame: the same where it depends on nothing that has changed.
+
+        Else it is prepared by the key frame's pilot, which decides how samples are spread, not what they show.
+        """
+        if self._last is None:
+            return prepare()
+        light, before, built_before, exposure_before = self._last
+        is_placed = light.photons is not None or light.light_vertices is not None
+        is_same = built is built_before and own_exposure == exposure_before
+        return light if is_same and (scene is before or not is_placed) else prepare(pilot=light.pilot)
 
 
 __all__ = ["KeptLight"]

@@ -202,6 +202,7 @@ def prepare_light(
     own_exposure: float = 0.0,
     stands_alone: bool = True,
     weighs_emitters: bool = True,
+    pilot: Pilot | None = None,
 ) -> PreparedLight:
     """The prepared light of a picture, for :meth:`PathIntegrator.lit_by`.
 
@@ -223,14 +224,18 @@ def prepare_light(
         Whether the integrator's radiance is all that is seen: nothing, such as splats, is composited over it.
     weighs_emitters:
         Whether emitters are sampled by their contribution to the picture, not by the scene's weights.
+    pilot:
+        That of a frame a little earlier; None to trace one.
 
     Raises
     ------
     MemoryLimitError
         ``memory`` bytes do not hold the photons that were asked for.
     """
-    light, choices = PreparedLight(), dict[str, object]()
-    pilot = trace_pilot(paths.lit_by(light), source)
+    choices = dict[str, object]()
+    if pilot is None or len(pilot.moments) != len(paths.scene.emitters()):
+        pilot = trace_pilot(paths.lit_by(PreparedLight()), source)
+    light = PreparedLight(pilot=pilot)
     if weighs_emitters:
         light = replace(light, sampler=make_light_sampler(paths.scene, pilot))
     if own_exposure:

@@ -84,6 +84,8 @@ class PreparedLight:
         Specular chains per path, see :mod:`.specular_chains`; None for none.
     choices:
         Decisions and measured values for the picture's metadata.
+    pilot:
+        The :class:`~lippmann.rendering.preparation.prepare.Pilot` by which it was prepared.
     """
 
     sampler: LightSampler | None = None
@@ -95,6 +97,7 @@ class PreparedLight:
     vertex_passes: LightVertexPasses | None = None
     chains: UInt32 | None = None
     choices: Mapping[str, object] = field(default_factory=dict)
+    pilot: Any = None
 
     def at(self, sample: int) -> tuple[PreparedLight, int | None]:
         """The light for sample number ``sample`` of each pixel, and how many samples from there on use it.
