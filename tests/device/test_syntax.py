@@ -9,16 +9,17 @@ import sys
 import pytest
 
 PROGRAM = """
+import importlib, sys
 import mitsuba as mi
 mi.set_variant("llvm_ad_rgb")
-import drjit as dr
 from lippmann.device import syntax
-from kernels import halvings
 
 transform = syntax.transform_syntax
 syntax.transform_syntax = lambda kernel: print("transformed") or transform(kernel)
-print("defined", halvings.__name__)
-print(halvings(mi.Float(8, 2, 1)), halvings(mi.Float(8), least=3))
+for name in sys.argv[1:]:
+    halvings = importlib.import_module(name).halvings
+    print("defined", halvings.__name__)
+    print(halvings(mi.Float(8, 2, 1)), halvings(mi.Float(8), least=3))
 """
 KERNELS = """
 import mitsuba as mi
@@ -35,35 +36,37 @@ def halvings(x, least=1):
 """
 
 
+MODULES = "other_kernel", "of_no_bytes", "of_other_bytes", "of_fewer_bytes"
+
+
 @pytest.fixture
 def run(tmp_path, engine):
-    """Runs the program with this source of the kernel; the lines that it prints."""
+    """Runs the program; by module, whether its kernel was transformed, and what it gave."""
+    (tmp_path / "program.py").write_text(PROGRAM)
+    base = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    command = [sys.executable, str(tmp_path / "program.py"), *MODULES]
 
-    def program(kernels=KERNELS, **environment):
-        (tmp_path / "program.py").write_text(PROGRAM)
-        (tmp_path / "kernels.py").write_text(kernels)
-        base = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-        command = [sys.executable, str(tmp_path / "program.py")]
+    def program(**environment):
         done = subprocess.run(command, env={**base, **environment}, capture_output=True, text=True, check=True)
-        return done.stdout.splitlines()
+        told = [part.splitlines()[1:] for part in done.stdout.split("defined ")[1:]]
+        assert all(part[:-1] in ([], ["transformed"]) for part in told)
+        return [len(part) == 2 for part in told], [part[-1] for part in told]
 
     return program
 
 
-def test_a_kernel_is_transformed_once_at_its_first_call(run, tmp_path):
-    first = ["defined halvings", "transformed", "[3, 1, 0] [2]"]
-    assert run(PYTHONDONTWRITEBYTECODE="1") == first
+def test_a_kernel_is_transformed_once_at_its_first_call_or_where_what_is_kept_is_not_its_code(run, tmp_path):
+    for name in MODULES:
+        (tmp_path / f"{name}.py").write_text(KERNELS)
+    results = ["[3, 1, 0] [2]"] * 4
+    assert run(PYTHONDONTWRITEBYTECODE="1") == ([True] * 4, results)
     assert not list(tmp_path.glob("**/*.syntax"))
-    assert run() == first
-    assert run() == ["defined halvings", "[3, 1, 0] [2]"]
+    assert run() == ([True] * 4, results)
     # Of another length: Python takes a module of the same second and size for the same.
-    assert run(KERNELS.replace("x / 2", "x / 4.0"))[1:] == ["transformed", "[2, 1, 0] [1]"]
-
-
-def test_what_is_kept_may_be_damaged(run, tmp_path):
-    run()
-    (kept,) = tmp_path.glob("__pycache__/kernels.*.halvings.syntax")
-    for content in (b"", b"\xff" * 40, kept.read_bytes()[:50]):
-        kept.write_bytes(content)
-        assert run()[1:] == ["transformed", "[3, 1, 0] [2]"]
-        assert run()[1:] == ["[3, 1, 0] [2]"]
+    (tmp_path / "other_kernel.py").write_text(KERNELS.replace("x / 2", "x / 4.0"))
+    kept = [next(tmp_path.glob(f"__pycache__/{name}.*.halvings.syntax")) for name in MODULES]
+    for path, content in zip(kept[1:], (b"", b"\xff" * 40, kept[3].read_bytes()[:50]), strict=True):
+        path.write_bytes(content)
+    results[0] = "[2, 1, 0] [1]"
+    assert run() == ([True] * 4, results)
+    assert run() == ([False] * 4, results)

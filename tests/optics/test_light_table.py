@@ -37,7 +37,7 @@ def test_both_tables_of_a_cylinder_are_one(lens, along):
 
 @pytest.mark.parametrize("lens", MICRO_LENSES.values(), ids=MICRO_LENSES)
 def test_both_tables_of_a_micro_lens_are_one(lens):
-    fast, readable = (make(lens, SLOPES[2:5], 0.3, places_per_lens=24) for make in (light_table, readable_light_table))
+    fast, readable = (make(lens, SLOPES[2:4], 0.3, places_per_lens=24) for make in (light_table, readable_light_table))
     assert fast.squares == pytest.approx(readable.squares, abs=1e-12)
     assert fast.shares == pytest.approx(fast.squares.sum(axis=1))
 

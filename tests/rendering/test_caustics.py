@@ -21,7 +21,7 @@ DISPLAYS = {
 
 
 #: Holds the picture, but not the photons of MANY samples.
-SMALL, MANY = 4 << 20, 512
+SMALL, MANY = 4 << 20, 32
 
 
 def place(x, y, z):

@@ -14,9 +14,9 @@ pytestmark = pytest.mark.usefixtures("engine")
 DISPLAY = load_display("seed-lenticular").resized(128, 32)
 
 
-def rendered(**options):
+def rendered(scene="room", display=DISPLAY, **options):
     chosen = {"integrator": "path", "method": "full", "spp": 8, "seed": 2, "caustics": "paths"}
-    return lippmann.render("room", DISPLAY, **(chosen | options))
+    return lippmann.render(scene, display, **(chosen | options))
 
 
 @pytest.mark.long
@@ -46,8 +46,14 @@ def test_direct_light_is_never_clamped():
 @pytest.mark.slow
 def test_the_limit_is_that_of_what_is_shown():
     """With an exposure of one stop light is twice as bright, and so is what is cut off."""
-    plain = rendered(clamp_indirect=0.5, exposure=0, tone_map="none")
-    brighter = rendered(clamp_indirect=1.0, exposure=1, tone_map="none")
+    ball = {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.9}}}
+    sky = {"type": "constant", "radiance": {"type": "rgb", "value": 1.0}}
+    balls = {f"ball {x}": ball | {"center": [x, 0, 0], "radius": 0.5} for x in (-1, 0, 1)}
+    scene = lippmann.load_scene({"type": "scene", "sky": sky, **balls})
+    asked = {"scene": scene, "display": DISPLAY.resized(32, 16), "tone_map": "none"}
+    plain, whole = (rendered(clamp_indirect=limit, exposure=0, **asked) for limit in (0.05, None))
+    brighter = rendered(clamp_indirect=0.1, exposure=1, **asked)
+    assert (plain.pixels < whole.pixels - 0.02).mean() > 0.1
     np.testing.assert_allclose(brighter.pixels, 2 * plain.pixels, rtol=1e-4, atol=1e-5)
 
 

@@ -16,7 +16,7 @@ def test_noise_is_taken_out_where_that_is_asked_for():
     def shown(**options):
         return lippmann.preview("teapot", size=(64, 64), **options)
 
-    many = shown(spp=256).pixels
+    many = shown(spp=96).pixels
     noisy, clean = shown(spp=4, seed=3), shown(spp=4, seed=3, denoise="oidn")
     assert "denoise" not in noisy.provenance.options
     assert clean.provenance.options["denoise_effort"] == "fast"

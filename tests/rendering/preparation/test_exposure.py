@@ -22,6 +22,7 @@ from lippmann.scene.values.description import Camera, Instance, Light, Material,
 pytestmark = pytest.mark.usefixtures("engine")
 
 SUN = 100_000.0  # lux
+DISPLAY = load_display("mla-square").resized(120, 120)
 
 
 def scene(*, physical=True, illuminance=SUN, **rest):
@@ -47,7 +48,7 @@ LINEAR = {"integrator": "direct", "tone_map": "none"}
 
 
 def picture(what, **options):
-    return api.render(what, "mla-square", spp=4, method="full", **LINEAR, **options)
+    return api.render(what, DISPLAY, spp=4, method="full", **LINEAR, **options)
 
 
 @pytest.mark.slow
@@ -97,7 +98,7 @@ def test_an_automatic_exposure_leaves_the_cameras_out_and_says_so():
     assert any("own exposure (+2.00 EV) counts with a fixed one alone" in note for note in image.provenance.notes)
     # A sequence holds what was measured: the camera's own comes on top again.
     request = RenderRequest(integrator="direct", method="full", spp=4, placement=PlacementOptions(camera="eye"))
-    held = choose_exposure(scene(cameras=[EYE]), load_display("mla-square"), request)
+    held = choose_exposure(scene(cameras=[EYE]), DISPLAY, request)
     assert held == pytest.approx(image.provenance.options["exposure"] - 2.0)
 
 
@@ -111,7 +112,7 @@ def test_light_of_the_studio_knows_no_exposure_of_a_camera():
 def test_live_pictures_count_the_cameras_exposure_once():
     request = RenderRequest(exposure=-10.0, placement=PlacementOptions(camera="eye"))
     plain, raised = (
-        LiveRenderer(scene(cameras=[replace(EYE, exposure=stops)]), load_display("mla-square")).frame(
+        LiveRenderer(scene(cameras=[replace(EYE, exposure=stops)]), DISPLAY).frame(
             LiveView((0.0, 0.0, 400.0), (32, 32), request=replace(request, tone_map="none", exposure=exposure))
         )
         for stops, exposure in ((0.0, -8.0), (2.0, -10.0))
@@ -137,25 +138,23 @@ def test_previews_quilts_tiles_and_reuse_choose_alike(tmp_path):
     whole = picture(scene())
     preview = api.preview(scene(), size=(64, 64), spp=4, **LINEAR)
     assert np.median(preview.pixels[preview.pixels.max(-1) > 0]) == pytest.approx(0.18, rel=0.05)
-    reused = api.render(scene(), "mla-square", spp=1, method="lens-view", **LINEAR)
+    reused = api.render(scene(), DISPLAY, spp=1, method="lens-view", **LINEAR)
     assert reused.provenance.options["exposure"] == pytest.approx(whole.provenance.options["exposure"], abs=0.02)
     path = tmp_path / "a.exr"
-    done = api.render_to_file(scene(), path, "mla-square", spp=4, method="full", **LINEAR)
+    done = api.render_to_file(scene(), path, DISPLAY, spp=4, method="full", **LINEAR)
     assert done.provenance.options["exposure"] == whole.provenance.options["exposure"]
     np.testing.assert_allclose(read_picture(path).pixels, whole.pixels, rtol=2e-3)
 
 
 def test_values_that_are_no_light_have_no_exposure():
     with pytest.raises(UsageError, match=r"exposure: .*no amounts of light"):
-        api.render(scene(), "mla-square", integrator="normal", exposure=1.0)
+        api.render(scene(), DISPLAY, integrator="normal", exposure=1.0)
     with pytest.raises(UsageError, match=r"exposure: .*stops from -40 to 40"):
-        api.render(scene(), "mla-square", exposure=41.0)
+        api.render(scene(), DISPLAY, exposure=41.0)
 
 
 @pytest.mark.slow
 def test_a_sequence_keeps_the_exposure_of_the_motions_first_frame():
-    from lippmann.display import load_display
-    from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.scene.placement import place
     from lippmann.sequences.frames import hold_exposure
 
@@ -163,12 +162,11 @@ def test_a_sequence_keeps_the_exposure_of_the_motions_first_frame():
         def scene(self, frame):
             return scene(illuminance=SUN / 2**frame)
 
-    display = load_display("mla-square")
     request = RenderRequest(integrator="direct", method="full", spp=4)
-    held = hold_exposure(request, Sunset(), display, lambda frame: place(scene().bounds, display))
+    held = hold_exposure(request, Sunset(), DISPLAY, lambda frame: place(scene().bounds, DISPLAY))
     assert held.exposure == picture(scene()).provenance.options["exposure"]
     assert picture(Sunset().scene(3), exposure=held.exposure).pixels.max() < 0.05
-    assert hold_exposure(RenderRequest(exposure=2.0), Sunset(), display, place).exposure == 2.0
+    assert hold_exposure(RenderRequest(exposure=2.0), Sunset(), DISPLAY, place).exposure == 2.0
 
 
 def lit_by_few_paths(seed):
