@@ -47,8 +47,8 @@ def hard_scenes():
     return module.HARD_SCENES
 
 
-#: Scenes whose light the others have, too.
-LONG = ("crack", "mixed")
+#: Scenes whose light the others have, too, and such with caustics, whose photons' noise `test_caustics` finds stated.
+LONG = ("crack", "mixed", "mirrors", "water")
 
 
 @pytest.fixture(
@@ -62,7 +62,7 @@ def case(request, judged_scene):
     return judged_scene(request.param, lippmann.load_scene(hard_scenes()[request.param]()), display, REFERENCE)
 
 
-@pytest.mark.long_cases("mirrors", "stripes", "water")
+@pytest.mark.long_cases("stripes")
 @pytest.mark.slow
 def test_the_error_falls_with_samples_and_the_mean_is_right(case):
     errors = [case.errors(case.picture(samples))[0] for samples in SAMPLES]
@@ -75,7 +75,7 @@ def test_the_error_falls_with_samples_and_the_mean_is_right(case):
     assert abs(float(found.mean() - case.mean.mean())) < allowed
 
 
-@pytest.mark.long_cases("mirrors-32", "mirrors-128", "stripes-32", "water-32", "water-128")
+@pytest.mark.long_cases("stripes-32")
 @pytest.mark.slow
 @pytest.mark.parametrize("samples", SAMPLES[1:])
 def test_what_a_picture_says_of_itself_holds(case, samples):
@@ -88,7 +88,6 @@ def test_what_a_picture_says_of_itself_holds(case, samples):
     assert stated["worst_low"] - 0.5 <= worst <= stated["worst_high"] + better
 
 
-@pytest.mark.long_cases("water")
 @pytest.mark.slow
 def test_a_promised_quality_is_kept(case):
     quality = CASES[case.name][1]
@@ -97,7 +96,7 @@ def test_a_promised_quality_is_kept(case):
     assert case.psnr(image)[1] >= quality - 1
 
 
-@pytest.mark.long_cases("mirrors", "stripes", "water")
+@pytest.mark.long_cases("stripes")
 def test_denoised_pictures_get_better_and_do_not_flatter_themselves(case):
     found = [case.picture(samples, denoise="oidn") for samples in SAMPLES]
     errors = [case.errors(image)[0] for image in found]
@@ -109,7 +108,6 @@ def test_denoised_pictures_get_better_and_do_not_flatter_themselves(case):
         assert worst >= stated["worst_low"] - 0.5
 
 
-@pytest.mark.long_cases("water")
 @pytest.mark.slow
 def test_a_quality_that_auto_goes_for_is_kept(case):
     """Whichever of the two pictures it takes, its own word for it is true."""
@@ -119,7 +117,6 @@ def test_a_quality_that_auto_goes_for_is_kept(case):
     assert case.psnr(image)[1] >= quality - 1
 
 
-@pytest.mark.long_cases("water")
 @pytest.mark.slow
 def test_errors_flicker_no_more_than_noise_does(case):
     """Noise of neighbouring views is their own; whatever is done to a picture must not set them against each other."""

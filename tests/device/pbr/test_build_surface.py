@@ -118,7 +118,7 @@ def draw(bsdf, wi, count, seed=0, *, asked=0):
     rng = np.random.default_rng(seed)
     u = [mi.Float(rng.random(count, dtype=np.float32)) for _ in range(3)]
     si = dr.zeros(mi.SurfaceInteraction3f, count)
-    si.wi = mi.Vector3f(*(float(x) for x in wi))
+    si.wi = dr.opaque(mi.Vector3f, [float(x) for x in wi])  # no literal: directions share a kernel
     context = mi.BSDFContext()
     context.type_mask |= asked
     bs, factor = bsdf.sample(context, si, u[0], mi.Point2f(u[1], u[2]))
@@ -146,7 +146,7 @@ unit = st.floats(0, 1)
     coat_roughness=st.floats(0.1, 1),
     transmission=st.sampled_from([0.0, 0.7]),
 )
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=25)
 def test_formula(build, parts, base, metallic, roughness, ior, specular, tint, clearcoat, coat_roughness, transmission):
     material = Material(
         base_color=base,
@@ -160,21 +160,20 @@ def test_formula(build, parts, base, metallic, roughness, ior, specular, tint, c
         transmission=transmission,
     )
     bsdf = bsdf_of(build, parts, material, exact=True)
-    wi, wo = directions(60, 1), directions(60, 2)
-    value, _ = evaluate(bsdf, wi, wo)
+    wi, wo, down = directions(60, 1), directions(60, 2), directions(60, 3, below=True)
+    mirror = [1, 1, -1]
+    values, _ = evaluate(bsdf, np.concatenate([wi, wi * mirror, wi]), np.concatenate([wo, wo * mirror, down]))
+    value, behind, below = np.split(values, 3)
     expected = reference(material, wi, wo)
     np.testing.assert_allclose(value, expected, rtol=2e-3, atol=1e-3)
     # From behind, an opaque or thin surface looks the same.
-    behind, _ = evaluate(bsdf, wi * [1, 1, -1], wo * [1, 1, -1])
     np.testing.assert_allclose(behind, value, rtol=1e-5, atol=1e-6)
-    down = directions(60, 3, below=True)
-    value, _ = evaluate(bsdf, wi, down)
     share = clearcoat * (F0 + (1 - F0) * weight(wi[:, 2]))[:, None]
     through = Material(base_color=base, metallic=metallic, roughness=roughness, ior=ior, transmission=transmission)
     if specular == 1 and tint == (1, 1, 1):
-        np.testing.assert_allclose(value, through_sheet(through, wi, down) * (1 - share), rtol=2e-4, atol=2e-5)
+        np.testing.assert_allclose(below, through_sheet(through, wi, down) * (1 - share), rtol=2e-4, atol=2e-5)
     elif transmission == 0:
-        assert not value.any()
+        assert not below.any()
 
 
 def test_light_through_a_frosted_sheet(build, parts):
@@ -293,7 +292,7 @@ def test_one_call_gives_what_evaluation_and_sampling_give(build, parts, name):
 def test_draws_follow_their_density_and_weigh_right(build, parts, name, cosine):
     """Share of draws per bin of directions equals the integral of the density, and of light that of the value."""
     bsdf = bsdf_of(build, parts, CASES[name])
-    count, wi = 400_000, at(cosine)
+    count, wi = 200_000, at(cosine)
     wo, factor, pdf, kinds = draw(bsdf, wi, count)
     from mitsuba import BSDFFlags
 
@@ -301,7 +300,7 @@ def test_draws_follow_their_density_and_weigh_right(build, parts, name, cosine):
     drawn = binned(wo[scattered], np.full(scattered.sum(), 1 / count))
     light = binned(wo[scattered], factor[scattered, 0] / count)
 
-    steps = 96  # midpoints per bin and axis
+    steps = 48  # midpoints per bin and axis
     z = (np.arange(BINS[0] * steps) + 0.5) / (BINS[0] * steps) * 2 - 1
     phi = ((np.arange(BINS[1] * steps) + 0.5) / (BINS[1] * steps) * 2 - 1) * np.pi
     z, phi = (part.ravel() for part in np.meshgrid(z, phi, indexing="ij"))
@@ -334,7 +333,9 @@ NARROW = {
 }
 
 
-@pytest.mark.long_cases("cloudy glass-0.9")
+@pytest.mark.long_cases(
+    "cloudy glass-0.9", *(f"{name}--0.6" for name in NARROW if NARROW[name].transmission == 0 and "bumps" not in name)
+)
 @pytest.mark.parametrize("cosine", [0.9, -0.6])
 @pytest.mark.parametrize("name", NARROW)
 def test_narrow_lobes_first_show_the_same_light(build, parts, name, cosine):
@@ -344,18 +345,20 @@ def test_narrow_lobes_first_show_the_same_light(build, parts, name, cosine):
     from lippmann.device.pbr.gltf_bsdf import SHARP_FIRST
 
     bsdf = bsdf_of(build, parts, NARROW[name])
-    count, wi = 400_000, at(cosine)
-    sums, chances = [], []
+    count, wi = 200_000, at(cosine)
+    sums, chances, drawn = [], [], []
     for asked in (0, SHARP_FIRST):
         wo, factor, pdf, kinds = draw(bsdf, wi, count, seed=1 + asked % 7, asked=asked)
         scattered = (kinds != int(BSDFFlags.Null)) & (factor[:, 0] > 0)
         wo, light = wo[scattered], factor[scattered, 0] / count
         sums.append([binned(wo, part) for part in (light, light**2)])
         chances.append((pdf[scattered] > 2).mean())
-        # The density is that of plain draws; below a thousandth float32 has nothing to say about narrow lobes.
-        told = evaluate(bsdf, wi, wo)[1]
-        assert np.median(np.abs(pdf[scattered] - told) / told) < 1e-4
+        drawn.append((wo, pdf[scattered]))
         assert factor.max() < 25
+    # The density is that of plain draws; below a thousandth float32 has nothing to say about narrow lobes.
+    told = evaluate(bsdf, wi, np.concatenate([wo for wo, _ in drawn]))[1]
+    for (_, pdf), density in zip(drawn, np.split(told, [len(drawn[0][1])]), strict=True):
+        assert np.median(np.abs(pdf - density) / density) < 1e-4
     (plain, plain_noise), (first, first_noise) = sums
     assert (np.abs(plain - first) < 6 * np.sqrt(plain_noise + first_noise) + 1e-4).all()
     assert chances[1] > max(0.7, chances[0])
@@ -412,7 +415,7 @@ def test_white_matte_surface_loses_nothing(build, parts):
 @pytest.mark.parametrize("cosine", [1.0, 0.6, 0.2, 0.05])
 def test_white_plastic_neither_makes_nor_loses_light(build, parts, roughness, cosine):
     bsdf = bsdf_of(build, parts, Material(base_color=(1, 1, 1), roughness=roughness))
-    _, factor, _, _ = draw(bsdf, at(cosine), 200_000)
+    _, factor, _, _ = draw(bsdf, at(cosine), 50_000)
     assert factor.mean() == pytest.approx(1, abs=0.01)
 
 

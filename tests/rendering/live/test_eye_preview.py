@@ -61,6 +61,7 @@ FINE = Display("fine", Panel(360, 240, 0.125), LensArray("lenticular", 0.6, 12.0
 BLOCKS = Display("blocks", Panel(192, 128, 0.25), LensArray("square", 1.0), 1.0, "", 400.0, 20.0)
 
 
+@pytest.mark.long_cases("blocks")
 @pytest.mark.slow
 @pytest.mark.parametrize(("display", "most"), [(FINE, 0.43), (BLOCKS, 0.5)], ids=["fine", "blocks"])
 def test_noise_is_taken_out_of_the_eyes_view(display, most):

@@ -98,6 +98,7 @@ def test_with_care_every_micro_image_is_right(case, name, method):
     assert frame.shares["traced"] < 0.75
 
 
+@pytest.mark.long_cases("gears-lens-view-mla-square", "gears-lens-view-mla-hexagonal")
 @pytest.mark.slow
 @pytest.mark.parametrize("preset", ["mla-square", "mla-hexagonal"])
 @pytest.mark.parametrize(("name", "method"), [("tree", "lens-view"), ("tree", "interpolated"), ("gears", "lens-view")])

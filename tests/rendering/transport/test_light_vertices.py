@@ -145,7 +145,7 @@ def test_light_of_every_emitter_is_whole_and_less_noisy(name):
     assert noise(joined) < 0.8 * noise(plain)
 
 
-@pytest.mark.long_cases(but=["matt"])
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["matt", "plastic", "principled", "metal", "mirror", "frosted", "bumps", "hole"])
 def test_every_surface_scatters_as_much(name):
     integrator, source = prepared(room("sphere", surface=surfaces()[name]), has_null=name == "hole")

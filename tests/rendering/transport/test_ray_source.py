@@ -26,7 +26,6 @@ ROUND = replace(HEXAGONAL, name="mla-discs", lens=LensProfile(6.0, 9.0, diameter
         "mla-hexagonal-True",
         "mla-hexagons-False",
         "mla-square-True",
-        "panel-8k-True",
         "print-60lpi-True",
         "seed-lenticular-True",
     ]
