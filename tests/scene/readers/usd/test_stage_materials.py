@@ -187,6 +187,30 @@ def test_plain_opacity_blends(read, mode):
     assert scene.notes == (told if mode == "transparent" else [])
 
 
+@pytest.mark.parametrize(("more", "is_glass"), [("", True), ("float inputs:metallic = 1", False)])
+def test_what_is_clear_and_shines_is_glass(read, more, is_glass):
+    """As Blender writes it: its highlights stay."""
+    inputs = "float inputs:opacity = 0\nfloat inputs:roughness = 0.1\ncolor3f inputs:diffuseColor = (0.5, 0, 0)\n"
+    (material,) = read(surface(inputs + more)).materials
+    assert (material.transmission, material.thickness, material.alpha) == (is_glass, 0.0, is_glass)
+    assert (material.base_color == (1.0, 1.0, 1.0)) == is_glass
+    assert not read(surface(inputs + 'token inputs:opacityMode = "presence"')).materials[0].transmission
+    assert not read(surface(inputs.replace("0.1", "0.5"))).materials[0].transmission  # hidden, and not frosted
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_only_coordinates_are_taken_for_those_of_another_name(read, count):
+    body = surface("color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>", texture()).replace(
+        'varname = "st"', 'varname = "_"'
+    )
+    if count == 1:
+        body = "\n".join(line for line in body.splitlines() if "primvars:other" not in line)
+    scene = read(body, files={"t.png": png(PICTURE)})
+    assert bool(np.ptp(scene.meshes[0].uvs[0])) == (count == 1)
+    told = "its only ones, 'st', are taken" if count == 1 else "its textures show one texel"
+    assert scene.notes == [f"mesh /m has no texture coordinates '_': {told}"]
+
+
 @pytest.mark.parametrize("purpose", ["", ":preview", ":full"])
 def test_materials_are_bound_for_a_purpose_or_for_all(read, purpose):
     body = surface("color3f inputs:diffuseColor = (0.1, 0.2, 0.3)")

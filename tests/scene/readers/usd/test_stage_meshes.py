@@ -362,7 +362,9 @@ def test_schemas_that_change_what_is_shown_are_named(read):
         "/x: colours in the space 'lin_ap1_scene' are taken as linear Rec. 709",
     ]
     body = body.replace("cards", "default").replace("lin_ap1_scene", "lin_rec709_scene")
-    assert read(body + triangle() + "}").notes == []
+    image = 'def Shader "i" (prepend apiSchemas = ["ColorSpaceAPI"]) {\n'  # whose sourceColorSpace says so
+    image += 'uniform token colorSpace:name = "srgb_rec709_display"\n}\n'
+    assert read(body + triangle() + image + "}").notes == []
 
 
 @pytest.mark.parametrize(("scheme", "flat"), [("none", True), ("bilinear", True), ("loop", False)])

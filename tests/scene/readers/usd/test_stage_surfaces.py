@@ -462,10 +462,16 @@ def test_coordinates_times_a_value_repeat_an_image(read):
     place = """float2 inputs:texcoord.connect = </mat/p.outputs:out>
     }
     def Shader "p" {
-        uniform token info:id = "ND_multiply_vector2FA"
-        float2 inputs:in1.connect = </mat/c.outputs:out>
+        uniform token info:id = "ND_multiply_vector3FA"
+        float3 inputs:in1.connect = </mat/r.outputs:out>
         float inputs:in2 = 3
-        float2 outputs:out
+        float3 outputs:out
+    }
+    def Shader "r" {
+        uniform token info:id = "ND_rotate3d_vector3"
+        float3 inputs:in.connect = </mat/c.outputs:out>
+        float inputs:amount = 0
+        float3 outputs:out
     }
     def Shader "c" {
         uniform token info:id = "ND_texcoord_vector2"
@@ -486,3 +492,17 @@ def test_linear_spaces_named_after_srgb_are_linear(read, space, srgb):
     image = IMAGE.replace("@t.png@", f'@t.png@ (colorSpace = "{space}")') + "}\n"
     body = computed("dot_color3", "color3f inputs:in.connect = </mat/t.outputs:out>", image)
     assert read(body, files={"t.png": png(PICTURE)}).materials[0].base_color_texture.srgb is srgb
+
+
+def test_what_blender_puts_in_place_of_a_preview_gives_way_to_materialx(read):
+    body = material_x(OPEN_PBR, "color3f inputs:base_color = (1, 0, 0)")
+    plain = """
+    token outputs:surface.connect = </mat/previewShader.outputs:surface>
+    def Shader "previewShader" {
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:diffuseColor = (0.8, 0.8, 0.8)
+        token outputs:surface
+    }
+"""
+    scene = read(body.replace("    token outputs:mtlx", plain + "    token outputs:mtlx", 1))
+    assert scene.materials[0].base_color == (1.0, 0.0, 0.0)

@@ -18,6 +18,8 @@ from lippmann.scene.values.description import AlphaMode, Color, Image, Material,
 #: Others are black beyond the picture: ``black``, and ``useMetadata``, of which pictures that are read have none.
 _WRAPS: dict[str, Wrap] = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp"}
 _CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
+#: The roughness of surfaces that say nothing of it.
+_DULL = 0.5
 #: Of no reflection but what the specular colour says.
 _ENDLESS_IOR = 1000.0
 #: v upwards to v downwards, and back.
@@ -87,8 +89,8 @@ class SurfaceReader:
         material = self._with_opacity(material, inputs)
         material = self._with_coat(material, inputs)
         material = self._with_highlight_and_sheen(material, inputs)
-        transmission = min(max(self._number(inputs, "transmission", 0.0), 0.0), 1.0)
-        is_solid = transmission > 0.0 and not self._number(inputs, "thinWalled", 0.0)
+        transmission = min(max(self._number(inputs, "transmission", material.transmission), 0.0), 1.0)
+        is_solid = transmission > material.transmission and not self._number(inputs, "thinWalled", 0.0)
         material = replace(material, transmission=transmission, thickness=float(is_solid))
         material = replace(material, normal_texture=self._normal_map(inputs))
         by_color, by_opacity = self._reads(inputs, "diffuseColor"), self._reads(inputs, "opacity")
@@ -121,7 +123,7 @@ class SurfaceReader:
         self.notes[f"{name} by the primvar '{source['primvar']}' is not read: its fallback is taken"] = None
 
     def _with_reflection(self, material: Material, inputs: Record) -> Material:
-        roughness, rough = self._scalar(inputs, "roughness", 0.5)
+        roughness, rough = self._scalar(inputs, "roughness", _DULL)
         if self._number(inputs, "useSpecularWorkflow", 0.0):
             specular, texture = self._color(inputs, "specularColor", (0.0, 0.0, 0.0))
             material = replace(
@@ -148,8 +150,15 @@ class SurfaceReader:
             image = texture_maps.with_alpha(None if own is None else _encode(own), alpha, texture.image.name)
             carrier = texture if own is None else own
             material = replace(material, base_color_texture=replace(carrier, image=image, srgb=True))
+        is_presence = inputs.get("opacityMode", {}).get("value") == "presence"
+        is_plain = texture is None and "primvar" not in inputs.get("opacity", {}) and not threshold
+        if is_plain and opacity == 0.0 and not is_presence and material.metallic == 0.0 and material.roughness < _DULL:
+            # Glass, as Blender writes it: the highlights stay, and what lies behind is neither blurred nor tinted.
+            return replace(
+                material, base_color=(1.0, 1.0, 1.0), base_color_texture=None, roughness=0.0, transmission=1.0
+            )
         mode: AlphaMode = "mask" if threshold > 0.0 else "blend"
-        if mode == "blend" and inputs.get("opacityMode", {}).get("value") != "presence":
+        if mode == "blend" and not is_presence:
             self.notes["highlights fade with opacity, as opacityMode 'presence' has it"] = None
         return replace(material, alpha=opacity, alpha_mode=mode, alpha_cutoff=threshold or 0.5)
 

@@ -318,6 +318,11 @@ class MeshReader:
         uvs = []
         for uv_name in self._surface(material).uv_names:
             entry = record["uvs"].get(uv_name)
+            if entry is None and len(record["uvs"]) == 1:  # exporters name it otherwise in materials
+                ((only, entry),) = record["uvs"].items()
+                self.notes[
+                    f"mesh {name} has no texture coordinates '{uv_name}': its only ones, '{only}', are taken"
+                ] = None
             if entry is None:
                 self._note_no_uvs(record, uv_name)
                 uvs.append(np.zeros((len(polygons.indices), 2), np.float32))

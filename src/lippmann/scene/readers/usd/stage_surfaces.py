@@ -19,6 +19,8 @@ from pxr import Usd, UsdShade
 from lippmann.scene.readers.usd.records import Record
 
 PREVIEW = "UsdPreviewSurface"
+#: Blender's surface of a plain colour for what it writes for MaterialX alone.
+_PLACEHOLDER = "previewShader"
 #: Contexts of rendering whose surfaces are looked at where that for all of them is not read.
 _CONTEXTS = ("mtlx", "mdl", "arnold")
 
@@ -192,6 +194,8 @@ def surface_of(material: UsdShade.Material) -> tuple[UsdShade.Shader, str]:
     """The surface that is read, and its kind; of a kind that is not read, if there is no other."""
     surfaces = [material.ComputeSurfaceSource(context)[0] for context in ("", *_CONTEXTS)]
     kinds = [_kind_of(surface) if surface else "" for surface in surfaces]
+    if surfaces[0] and surfaces[0].GetPrim().GetName() == _PLACEHOLDER and any(map(is_read, kinds[1:])):
+        kinds[0] = ""
     best = next((number for number, kind in enumerate(kinds) if is_read(kind)), None)
     if best is None:
         best = next((number for number, kind in enumerate(kinds) if kind), 0)
@@ -468,6 +472,11 @@ def _remap(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | N
     return _computed(kind, _fed(given, node, "in", 0.0), factor, to_low - factor * low)
 
 
+def _rotate(kind: str, channel: str, given: Record, node: Usd.Prim) -> Record | None:
+    """What is turned by nothing, as Blender's placed textures are three times; None of others."""
+    return given.get("in") if _fed(given, node, "amount", 0.0).get("value") == 0.0 else None
+
+
 def _fed(given: Record, node: Usd.Prim, name: str, usual: float) -> Record:
     """An input, or its default; nothing, where a node feeds it that is not read."""
     attribute = node.GetAttribute(f"inputs:{name}")
@@ -477,7 +486,7 @@ def _fed(given: Record, node: Usd.Prim, name: str, usual: float) -> Record:
 
 def _computed(kind: str, source: Record, factor: ArrayLike, shift: ArrayLike) -> Record | None:
     """A value, an image, or coordinates by their places, times a factor, plus a shift; None of what meshes have."""
-    if "vector2" in kind and source.keys() & {"primvar", "transform"}:
+    if "vector" in kind and source.keys() & {"primvar", "transform"}:
         scale, translation = ({"value": np.resize(each, 2).tolist()} for each in (factor, shift))
         return {"transform": {"in": source, "scale": scale, "translation": translation}}
     return _affine(source, factor, shift) if source.keys() & {"texture", "value"} else None
@@ -526,6 +535,7 @@ _NODES: dict[str, Callable[[str, str, Record, Usd.Prim], Record | None]] = {
     "ND_mix_": _blend,
     "ND_invert_": _invert,
     "ND_remap_": _remap,
+    "ND_rotate3d_": _rotate,
     "ND_combine3_": _join,
     "ND_swizzle_": _separate,
     "ND_geomcolor_": _coordinates,

@@ -15,6 +15,7 @@ from lippmann.scene.readers.usd.stage_meshes import PRIMITIVES, THIN, mesh_recor
 from lippmann.scene.readers.usd.stage_shading import MaterialTable
 from lippmann.scene.readers.usd.stage_skinning import Skinning
 from lippmann.scene.readers.usd.stage_splats import PARTICLES, splat_record
+from lippmann.scene.readers.usd.stage_surfaces import is_coded
 
 Matrices = NDArray[np.float64]
 
@@ -127,6 +128,8 @@ class Traversal:
         if "GeomModelAPI" in applied and (mode := prim.GetAttribute("model:drawMode").Get()) not in _AS_MESHES:
             self.notes[f"{prim.GetPath()}: model:drawMode '{mode}' is not honoured: its meshes are shown"] = None
         if "ColorSpaceAPI" in applied and (space := prim.GetAttribute("colorSpace:name").Get()) not in _AS_REC709:
+            if prim.IsA(UsdShade.Shader) and is_coded(space):
+                return  # of an image, whose sourceColorSpace says so
             self.notes[f"{prim.GetPath()}: colours in the space '{space}' are taken as linear Rec. 709"] = None
 
     def _leave_out(self, kind: str) -> None:
