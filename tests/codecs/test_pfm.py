@@ -12,7 +12,7 @@ from lippmann.codecs.pfm import read_pfm, write_pfm
 from lippmann.errors import PictureError
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(arrays.arrays(np.float32, arrays.array_shapes(min_dims=2, max_dims=2, max_side=9), elements=st.floats(width=32)))
 def test_floats_come_back_bit_by_bit(tmp_path_factory, values):
     path = tmp_path_factory.getbasetemp() / "x.pfm"

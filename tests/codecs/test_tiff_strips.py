@@ -51,7 +51,7 @@ def test_a_print_beyond_four_gigabytes_is_a_bigtiff(tmp_path):
 
 
 @given(ppi=st.integers(10, 20_000))
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 def test_whole_resolutions_are_exact(tmp_path_factory, ppi):
     path = tmp_path_factory.getbasetemp() / "resolution.tif"
     pixel = 25.4 / ppi

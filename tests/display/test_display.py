@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from lippmann.display import Display, LensArray, Panel, load_display
 from lippmann.errors import DisplayError
 
-many = settings(deadline=None, max_examples=60)
+many = settings(deadline=None, max_examples=30)
 
 
 def panel_points(display, seed=0, count=400):

@@ -21,7 +21,7 @@ from lippmann.display import (
 )
 from lippmann.display.micro_image_layout import lens_indices, row_blocks
 
-many = settings(deadline=None, max_examples=60)
+many = settings(deadline=None, max_examples=30)
 
 
 @given(data=st.data())

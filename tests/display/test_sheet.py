@@ -35,7 +35,7 @@ def lens_centers_from_trim(display):
     margin=st.integers(0, 300),
     distance=st.sampled_from([math.inf, 300.0, 700.0]),
 )
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 def test_lenses_keep_their_distance_from_the_trim(lpi, size, bleed, margin, distance):
     plain = Print(ppi=720, size=size, lpi=lpi, viewing_distance=distance).display()
     bled = with_bleed(plain, bleed)

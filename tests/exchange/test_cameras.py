@@ -27,7 +27,7 @@ def pixel_of(display, point, ky, kx):
     return np.array([lens_x / pitch, -lens_y / pitch])
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(st.data())
 def test_disparity_is_how_far_a_point_moves_from_view_to_view(random_displays, data):
     display = data.draw(random_displays())
@@ -61,7 +61,7 @@ def test_the_grid_s_centre_follows_lenses_that_stand_beside_their_pixels():
     assert min(map(abs, center)) > 1
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(st.data())
 def test_the_panel_shows_the_point_where_the_disparity_says(random_displays, data):
     """The same from the other side: a point is projected onto the panel, lens by lens."""
@@ -77,7 +77,7 @@ def test_the_panel_shows_the_point_where_the_disparity_says(random_displays, dat
     assert under_lens[1] - under_lens[0] == pytest.approx(1 / disparity, rel=1e-6)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(st.data())
 def test_depth_and_disparity_follow_the_published_formula(random_displays, data):
     display = data.draw(random_displays())
@@ -123,7 +123,7 @@ def test_where_nothing_is_seen_depth_is_infinite_disparity_nan_and_both_come_bac
     assert cameras.depth_of_disparity(disparity)[0] == np.inf
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(st.data())
 def test_the_display_made_from_cameras_has_these_cameras(data):
     views, size = data.draw(st.integers(2, 9)), data.draw(st.integers(1, 9))

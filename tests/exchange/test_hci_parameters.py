@@ -71,7 +71,7 @@ def test_the_cameras_pose_places_the_display(tmp_path):
 LENGTHS = st.floats(1e-3, 1e6)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(st.integers(1, 40), st.integers(1, 40), st.integers(1, 999), st.integers(1, 999), LENGTHS, LENGTHS, LENGTHS)
 def test_what_is_written_is_read(tmp_path_factory, across, down, width, height, baseline, focus, pitch):
     path = tmp_path_factory.getbasetemp() / NAME

@@ -24,7 +24,7 @@ from lippmann.viewing.replay import eye_of_offset
 TYPES = st.sampled_from(["uint8", "uint16", "float16", "float32"])
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(st.data(), TYPES)
 def test_a_picture_comes_back_bit_by_bit(random_displays, picture, same, data, stored):
     display = data.draw(random_displays(("square", "lenticular", "hexagonal")))

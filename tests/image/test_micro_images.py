@@ -14,7 +14,7 @@ def numbered(display):
     return np.arange(panel.height * panel.width).reshape(panel.height, panel.width) + 1
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(data=st.data())
 def test_splitting_and_joining_any_display_loses_nothing(data, random_displays):
     display = data.draw(random_displays())
@@ -27,7 +27,7 @@ def test_splitting_and_joining_any_display_loses_nothing(data, random_displays):
     np.testing.assert_array_equal(permutation.join(micro_images), values)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(data=st.data())
 def test_a_micro_image_holds_the_pixels_of_its_lens_in_their_order(data, random_displays):
     display = data.draw(random_displays())

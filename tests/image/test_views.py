@@ -25,7 +25,7 @@ def lenticular(pixels, *, width=60, height=5, slant=0.0):
     return Display("sheet", Panel(width, height, PIXEL), LensArray("lenticular", pitch, slant=slant), gap=6.8)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(data=st.data())
 def test_exact_views_come_back(data, random_displays, picture):
     display = data.draw(random_displays(whole=True))
@@ -36,7 +36,7 @@ def test_exact_views_come_back(data, random_displays, picture):
     np.testing.assert_array_equal(IntegralImage.from_views(views, display).pixels, image.pixels)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(data=st.data())
 def test_a_view_holds_the_pixels_at_its_place_behind_every_lens(data, random_displays):
     display = data.draw(random_displays())
@@ -63,7 +63,7 @@ def test_a_view_holds_the_pixels_at_its_place_behind_every_lens(data, random_dis
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(data=st.data())
 def test_resampled_views_take_own_pixels_only(data, random_displays):
     display = data.draw(random_displays(whole=False))
@@ -156,7 +156,7 @@ def test_a_place_between_two_pixels_takes_the_right_one_behind_every_lens(pixel_
     np.testing.assert_array_equal(middle[between], np.round(places[between]) + 0.5)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(data=st.data())
 def test_linear_views_of_one_colour_have_that_colour(data, random_displays):
     display = data.draw(random_displays(whole=False))

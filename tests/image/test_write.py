@@ -158,25 +158,28 @@ import imagecodecs, OpenEXR, tifffile
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 pixels = np.random.default_rng(0).random((300, 300, 3), dtype=np.float32)
-try:
-    write_plain_picture(pixels, Path(sys.argv[1]))
-except OutputError as error:
-    sys.exit(f"refused: {error}")
+for name in sys.argv[1:]:
+    try:
+        write_plain_picture(pixels, Path(name))
+    except OutputError as error:
+        print(f"refused: {error}")
 """
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="the system has no limit on the size of files")
-@pytest.mark.parametrize("name", ["a.png", "a.exr", "a.tif"])
-def test_a_disk_that_takes_no_more_leaves_the_old_file(tmp_path, name):
-    path = tmp_path / name
-    path.write_bytes(b"the old one")
-    run = subprocess.run([sys.executable, "-c", WRITE_TOO_MUCH, str(path)], capture_output=True, text=True, check=False)
-    assert run.stderr.startswith("refused: ")
-    assert run.stderr.count("\n") == 1
-    assert str(path) in run.stderr
-    assert os.listdir(tmp_path) == [name]
-    assert path.read_bytes() == b"the old one"
+def test_a_disk_that_takes_no_more_leaves_the_old_file(tmp_path):
+    paths = [tmp_path / name for name in ("a.png", "a.exr", "a.tif")]
+    for path in paths:
+        path.write_bytes(b"the old one")
+    words = [sys.executable, "-c", WRITE_TOO_MUCH, *map(str, paths)]
+    run = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert run.stderr == ""
+    for path, line in zip(paths, run.stdout.splitlines(), strict=True):
+        assert line.startswith("refused: ")
+        assert str(path) in line
+        assert path.read_bytes() == b"the old one"
+    assert sorted(tmp_path.iterdir()) == sorted(paths)
 
 
 def test_a_plain_picture_carries_no_display(tmp_path):
@@ -189,7 +192,7 @@ def test_a_plain_picture_carries_no_display(tmp_path):
 
 
 def test_every_number_of_a_display_comes_back_exactly(tmp_path, random_displays, picture):
-    @settings(deadline=None, max_examples=30)
+    @settings(deadline=None, max_examples=20)
     @given(random_displays())
     def check(display):
         image = picture(display)

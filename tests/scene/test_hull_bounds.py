@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -27,7 +26,7 @@ def scene_of(seed, count, spread):
 SPREADS = [(1, 1, 1), (1, 1, 0), (1, 0, 0)]
 
 
-@pytest.mark.slow
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 400), spread=st.sampled_from(SPREADS))
 def test_boxes_are_those_of_all_vertices(seed, count, spread):
     scene, _, _ = scene_of(seed, count, spread)

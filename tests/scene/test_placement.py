@@ -266,7 +266,7 @@ class TestFit:
         assert placed.depth_range[1] <= found.aperture_distance + 1e-9
         assert not any("blurred" in warning for warning in placed.warnings)
 
-    @settings(deadline=None, max_examples=60)
+    @settings(deadline=None, max_examples=30)
     @given(
         st.tuples(*[st.floats(0, 10)] * 3),
         st.sampled_from([math.inf, 300.0, 60.0]),
@@ -325,7 +325,7 @@ def panel_points(found, points):
     return np.stack([x[own], y[own]], axis=1)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(
     displays(),
     st.integers(0, 2**32 - 1),

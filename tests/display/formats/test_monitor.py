@@ -113,7 +113,7 @@ def test_numbers_at_a_limit_are_given_back_though_they_are_rounded():
 
 
 @given(monitor=monitors())
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=40)
 def test_a_display_gives_its_numbers_back(monitor):
     again = Monitor.of_display(monitor.display())
     # A number of upright lenses that is nearly whole is taken as whole: to a millionth of a lens over the panel.

@@ -95,7 +95,7 @@ def test_what_has_a_default_may_be_left_out(load):
     title=st.text(st.characters(codec="utf-8", exclude_categories=("Cs",)), max_size=20),
     cells=st.booleans(),
 )
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=25)
 def test_what_is_saved_comes_back_exactly(tmp_path_factory, pitch, slope, center, cone, distance, title, cells):
     panel = Panel(3840, 2160, 0.0899, subpixel_cells=((MEANT.panel.subpixel_offsets,),) if cells else None)
     monitor = Monitor("own", panel, pitch, slope, center, cone, distance, title)

@@ -56,7 +56,7 @@ def star(radii, tilt):
     return flat @ turn.T, turn[:, 2]
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(st.lists(st.floats(0.2, 3.0), min_size=4, max_size=14), st.floats(0, 6.28))
 def test_star_shaped_polygons_are_covered_once(radii, tilt):
     outline, normal = star(np.array(radii), tilt)
@@ -107,7 +107,7 @@ def flat_star(radii: list[float]) -> np.ndarray:
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(st.integers(4, 20).flatmap(lambda n: st.lists(st.lists(st.floats(0.1, 10), min_size=n, max_size=n), min_size=1)))
 def test_triangles_cover_the_outline_once(radii):
     outlines = np.stack([flat_star(each) for each in radii[:5]])

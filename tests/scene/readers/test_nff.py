@@ -60,12 +60,13 @@ def test_gears_are_cut_without_overlap_and_keep_their_winding(shared_scenes):
 
 def test_big_files_are_read_fast(shared_scenes):
     path = shared_scenes / "spd" / "gears.nff"
-    seconds = []
-    for _ in range(3):
+
+    def seconds():
         start = time.process_time()
         read_nff(path)
-        seconds.append(time.process_time() - start)
-    assert min(seconds) < 1.0
+        return time.process_time() - start
+
+    assert any(seconds() < 1.0 for _ in range(3))
 
 
 def test_viewpoint(read):

@@ -106,7 +106,7 @@ def test_scene_without_finite_primitives_has_no_bounds():
     assert builder.build().bounds() is None
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(base=vectors, axis=vectors, radii=st.tuples(st.floats(0, 10), st.floats(0.1, 10)))
 def test_bounds_of_a_tube_touch_its_rims(base, axis, radii):
     base, axis = np.array(base), np.array(axis)

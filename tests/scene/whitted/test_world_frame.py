@@ -39,7 +39,7 @@ def every_shape(handedness="left", material=None):
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(st.integers(0, 2**32 - 1))
 def test_bounds_in_a_frame_hold_every_point_and_touch_it(seed):
     rng = np.random.default_rng(seed)

@@ -6,7 +6,7 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lippmann.scene.extent import bounds_of, extreme_points_of
@@ -62,7 +62,7 @@ def read(tmp_path_factory):
     return through_a_file
 
 
-@pytest.mark.slow
+@settings(max_examples=25)
 @given(width=SIZES, height=SIZES, color=COLORS, strength=st.floats(1e-3, 1e6), is_round=st.booleans(), unit=SIZES)
 def test_area_lights_keep_radiance_and_area(read, width, height, color, strength, is_round, unit):
     glb = document("A")
@@ -83,7 +83,7 @@ def test_area_lights_keep_radiance_and_area(read, width, height, color, strength
     assert -normals[:, 2].sum() / 2.0 == pytest.approx(area, rel=1e-4)
 
 
-@pytest.mark.slow
+@settings(max_examples=25)
 @given(color=COLORS, strength=st.floats(1e-3, 1e6), unit=SIZES)
 def test_irradiance_is_the_same_in_metres(read, color, strength, unit):
     glb = document("P", "S")

@@ -52,14 +52,14 @@ def test_rotations_take_the_shorter_way():
 quaternions = st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(before=quaternions, after=quaternions, share=st.floats(0, 1))
 def test_rotations_keep_unit_length(before, after, share):
     found = sampler([0, 1], [before, after], turning=True).at(share)
     assert np.linalg.norm(found) == pytest.approx(1)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(times=st.lists(st.floats(0, 100), min_size=2, max_size=6, unique=True), share=st.floats(0, 1))
 def test_linear_keys_are_met_and_nothing_overshoots(times, share):
     times = sorted(times)

@@ -86,7 +86,7 @@ def encode_indices(indices):
     return data + bytes(4)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     count=st.sampled_from([1, 15, 16, 17, 100, 255, 256, 257, 600]),
     stride=st.sampled_from([4, 8, 12, 64, 256]),

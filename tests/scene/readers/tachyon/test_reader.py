@@ -62,8 +62,7 @@ def test_tree(shared_scenes):
 
 def test_big_files_are_read_fast(shared_scenes):
     path = shared_scenes / "tachyon" / "tree_fcyl.dat"
-    seconds = min(_cpu_seconds(read_tachyon, path) for _ in range(3))
-    assert seconds < 0.5
+    assert any(_cpu_seconds(read_tachyon, path) < 0.5 for _ in range(3))
 
 
 def _cpu_seconds(function, *arguments) -> float:

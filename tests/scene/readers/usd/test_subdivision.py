@@ -100,7 +100,7 @@ def test_values_at_corners_are_linear_over_faces():
     assert taken == pytest.approx(places[:, :2] * 3.0 + 1.0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 2), st.sampled_from(["cube", "grid", "mixed"]))
 def test_refinement_keeps_what_every_surface_has(seed, levels, kind):
     """Weights add up to 1, so that it moves with its points; faces are whole; each has a parent."""
