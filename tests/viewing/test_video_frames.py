@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lippmann.display import load_display
 from lippmann.errors import OutputError, PictureError
 from lippmann.image import read_picture
-from lippmann.quilts.quilt import QuiltLayout
+from lippmann.quilts.quilt import Quilt, QuiltLayout
 from lippmann.viewing.replay import default_eye, replay
-from lippmann.viewing.video_frames import WIDEST_QUILT, projection_of, quilt_of
+from lippmann.viewing.video_frames import WIDEST_QUILT, projection_of, quilt_of, quilt_of_video, view_toward
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +44,16 @@ def test_the_views_of_a_quilt_go_from_left_to_right_across_the_field(image):
     for number, place in enumerate((-1 / 3, 0, 1 / 3)):
         assert np.array_equal(quilt.view(number), replay(image, (x + place * reach, y, z), size=size))
     assert not np.array_equal(quilt.view(0), quilt.view(2))
+
+
+def test_what_a_quilt_leaves_free_on_the_right_and_on_top_is_left_out():
+    values = np.arange(7 * 9, dtype=np.uint8).repeat(3).reshape(7, 9, 3)
+    assert np.array_equal(quilt_of_video(Quilt(values, QuiltLayout(2, 2, None), "uint8")), values[1:, :8])
+
+
+def test_an_eye_on_the_right_sees_a_view_on_the_right():
+    display = load_display("looking-glass-portrait")
+    assert [view_toward(display, 48, (x, 0.0, 600.0)) for x in (-900, -1, 1, 900)] == [0, 23, 24, 47]
 
 
 def test_quilts_keep_within_what_players_take(image):
