@@ -315,6 +315,15 @@ def test_what_lies_behind_has_the_far_sides_colour(tmp_path):
     assert all(material.unlit for material in scene.materials)
 
 
+def test_colours_mixed_at_an_edge_are_not_those_behind_even_a_low_step():
+    inverse, colors = np.zeros((24, 48), np.float32), np.full((24, 48, 3), 60, np.float32)
+    inverse[:, :16], inverse[:, 40:] = 0.15, 1.0
+    colors[:, 14:18] = 150
+    layers = split_layers(inverse, colors, "x")
+    assert layers.behind[:, :16].max() == 0
+    assert (layers.behind_colors[:, 8:16] == 60).all()
+
+
 def test_the_front_is_the_photograph(tmp_path):
     """Seen along its axis each point lies where its pixel is; faces look at the viewer."""
     scene = scene_of(tmp_path, np.tile(1 / np.linspace(1, 1.7, 32, dtype=np.float32), (24, 1)))
