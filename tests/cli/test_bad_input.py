@@ -36,6 +36,7 @@ def kept(tmp_path):
 
 
 def test_an_output_without_its_option_is_told_of_it(lippmann, kept):
+    refuse(lippmann("info", "a.png", "b.png"), "extra argument(s) (b.png); see 'lippmann info --help'")
     refuse(lippmann("render", "teapot", kept.name), f"{kept.name}; outputs are named by -o: -o {kept.name}; see")
 
 

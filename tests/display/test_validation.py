@@ -29,7 +29,7 @@ def test_sizes(text, expected):
 
 
 def test_a_size_without_a_unit_is_refused_with_both_readings():
-    with pytest.raises(DisplayError, match="size: '8x10' has no unit; inches or millimetres\\?; say 8x10in or 8x10mm"):
+    with pytest.raises(DisplayError, match="size: '8x10' has no unit; say 8x10mm, 8x10cm or 8x10in"):
         validation.size("8x10", "size")
 
 

@@ -28,7 +28,10 @@ def test_a_display_shows_what_its_whole_picture_shows_to_the_eye():
     small = lippmann.load_display("seed-lenticular").resized(96, 64)
     exact = {"integrator": "albedo", "spp": 1, "pixel_filter": "point", "placement": {"turn": 20}}
     eye = (30.0, 0.0, 600.0)
-    shown = lippmann.preview("teapot", small, size=(48, 48), eye=eye, **exact).pixels
+    made = lippmann.preview("teapot", small, size=(48, 48), eye=eye, **exact)
+    shown = made.pixels
+    assert repr(made) == "<Preview 48 x 32 pixels>"
+    assert made._repr_png_().startswith(b"\x89PNG")
     replayed = lippmann.render("teapot", small, method="full", **exact).replay(eye, size=(48, 32), filter="nearest")
     assert shown.shape == (32, 48, 3)
     assert (np.abs(shown - replayed).max(axis=2) > 1e-4).mean() < 0.02

@@ -300,10 +300,10 @@ def _usage(error: BaseException) -> str:
         option, word, known = listed[1], listed[2].strip("'"), listed[3].replace("'", "").split(", ")
         return str(UsageError.unknown("value", word, known, where=option))
     extra = _EXTRA.fullmatch(message)
-    if extra is not None:
-        message = f"Got unexpected extra argument {extra[1]}; outputs are named by -o: -o {extra[1]}."
     context: Any = getattr(error, "ctx", None)
     command = getattr(context, "command_path", "lippmann")
+    if extra is not None and any(each.name == "output" for each in context.command.params):
+        message = f"Got unexpected extra argument {extra[1]}; outputs are named by -o: -o {extra[1]}."
     if " " in command and _NO_COMMAND.fullmatch(message):
         message += f" Known are {', '.join(context.command.commands)}."
     return f"{message.rstrip('.')}; see '{command} --help'"

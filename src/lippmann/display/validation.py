@@ -173,7 +173,7 @@ def length(
         raise DisplayError(f"{text!r} is not a length", where=key, rule=rule)
     amount, symbol = float(match[1]), match[2] or unit
     if not symbol:
-        raise _no_unit(match[1], key)
+        raise _no_unit(match[1], key, "mm", "cm", "mil", "in")
     if symbol in scales:
         return amount * scales[symbol]
     if symbol in per_inch:
@@ -207,7 +207,7 @@ def size(text: str, key: str) -> tuple[float, float]:
         raise DisplayError(f"{text!r} is not a size", where=key, rule=rule)
     unit_of_height = match[4] or match[2]
     if not unit_of_height:
-        raise _no_unit(f"{match[1]}x{match[3]}", key)
+        raise _no_unit(f"{match[1]}x{match[3]}", key, "mm", "cm", "in")
     sides = []
     for amount, unit in ((match[1], match[2] or unit_of_height), (match[3], unit_of_height)):
         if unit not in MILLIMETRES:
@@ -216,9 +216,9 @@ def size(text: str, key: str) -> tuple[float, float]:
     return sides[0], sides[1]
 
 
-def _no_unit(bare: str, key: str) -> DisplayError:
-    fix = f"say {bare}in or {bare}mm"
-    return DisplayError(f"{bare!r} has no unit", where=key, rule="inches or millimetres?", fix=fix)
+def _no_unit(bare: str, key: str, *units: str) -> DisplayError:
+    *others, last = (bare + unit for unit in units)
+    return DisplayError(f"{bare!r} has no unit", where=key, fix=f"say {', '.join(others)} or {last}")
 
 
 def plain_number(text: str, key: str) -> float:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.codecs.png import encode_png
+from lippmann.color.transfer import quantize
 from lippmann.image.metadata import Provenance
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.provenance import make_provenance
@@ -24,6 +26,14 @@ class Preview:
 
     pixels: NDArray[np.float32]
     provenance: Provenance
+
+    def __repr__(self) -> str:
+        return f"<Preview {self.pixels.shape[1]} x {self.pixels.shape[0]} pixels>"
+
+    def _repr_png_(self) -> bytes:
+        """The picture as PNG, for notebooks."""
+        transfer = self.provenance.transfer
+        return encode_png(quantize(self.pixels, 8, transfer), text={}, srgb=transfer == "srgb")
 
 
 @exclusive()

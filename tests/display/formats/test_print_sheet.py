@@ -123,7 +123,7 @@ def test_lengths_have_units():
         (
             {"viewing-distance": "500"},
             "viewing-distance",
-            "'500' has no unit; inches or millimetres?; say 500in or",
+            "'500' has no unit; say 500mm, 500cm, 500mil or 500in",
         ),
         ({"viewing-distance": "far"}, "viewing-distance", "'far' is not a length"),
         *(
