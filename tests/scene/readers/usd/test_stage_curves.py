@@ -6,6 +6,8 @@ import pytest
 from lippmann.errors import SceneError
 from lippmann.scene.readers.usd.curves import Curves
 
+from .conftest import HEAD
+
 POINTS = """
 def Points "p" {{
     point3f[] points = [(0, 0, 0), (4, 0, 0)]
@@ -49,6 +51,14 @@ def test_points_are_balls_of_their_widths_and_colours(read):
 def test_a_single_width_is_that_of_all(read):
     (mesh,) = read(POINTS.format(more="float[] widths = [0.5]")).meshes
     assert np.ptp(mesh.positions[:, 1]) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("writer", "width"), [("Blender v5.3.0", 2), ("Blender v5.3.0", 1), ("Houdini", 2)])
+def test_widths_of_blender_s_curves_are_none(read, writer, width):
+    head = HEAD.replace("(", f'(\n    doc = "{writer}"', 1)
+    (mesh,) = read(curves(more=f'float[] widths = [{width}, {width}] (interpolation = "varying")'), head=head).meshes
+    is_thin = np.ptp(mesh.positions[:, 2]) < 0.1
+    assert is_thin == (writer.startswith("Blender") and width == 2)
 
 
 def test_points_without_widths_are_as_those_of_other_formats(read):

@@ -30,6 +30,9 @@ _PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsDefined & 
 #: Prototypes may lie below an ``over``, which keeps them from being shown by themselves (UsdImaging's own rule).
 _OF_PROTOTYPES = Usd.TraverseInstanceProxies(Usd.PrimIsActive & ~Usd.PrimIsAbstract & Usd.PrimIsLoaded)
 
+#: Widths of Blender's curves: twice the radius 1 that they have beside the bevel, which makes them wide.
+_BLENDER_WIDTH = 2.0
+
 #: Ways of drawing a model that show its meshes; others put cards, its bounds or its origin in their place.
 _AS_MESHES = (None, "", "default", "inherited")
 #: Names of colour spaces whose values are taken as they stand.
@@ -48,6 +51,7 @@ class Traversal:
     def __init__(self, stage: Usd.Stage, time: Usd.TimeCode, arrays: Arrays, notes: dict[str, None]) -> None:
         self.notes = notes
         self._stage, self._time, self._arrays = stage, time, arrays
+        self._writer = stage.GetRootLayer().documentation
         self._transforms = UsdGeom.XformCache(time)
         self._materials = MaterialTable(time, notes)
         self._skinning = Skinning(stage, time, _PREDICATE)
@@ -116,9 +120,10 @@ class Traversal:
                 self._cameras.append(camera_record(UsdGeom.Camera(prim), (base @ place)[0], self._time, self.notes))
             elif prim.HasAPI(UsdLux.LightAPI):
                 self._lights += [light_record(prim, world, self._time, self.notes) for world in base @ place]
-                writer = self._stage.GetRootLayer().documentation
-                if kind == "DistantLight" and writer.startswith("Blender"):
-                    self.notes[f"{writer[:40]} writes suns at a quarter of the strength of its other lights"] = None
+                if kind == "DistantLight" and self._writer.startswith("Blender"):
+                    self.notes[f"{self._writer[:40]} writes suns at a quarter of the strength of its other lights"] = (
+                        None
+                    )
             elif prim.IsA(UsdGeom.Boundable) and not prim.IsA(UsdSkel.Root) and not prim.IsA(UsdSkel.Skeleton):
                 self._leave_out(kind)
 
@@ -165,6 +170,11 @@ class Traversal:
         if key not in self._meshes:
             if kind in THIN:
                 record = thin_record(prim, self._time, self._arrays, self._materials)
+                if record["widths"] is not None and self._are_blender_s(prim, record["widths"]["values"]):
+                    record["widths"] = None
+                    self.notes["Blender writes curves as wide as 2, whatever their bevel: drawn as without a width"] = (
+                        None
+                    )
             elif prim.IsA(UsdGeom.Mesh):
                 record = mesh_record(UsdGeom.Mesh(prim), self._time, self._arrays, self._materials, skin)
             else:
@@ -174,6 +184,11 @@ class Traversal:
                 record["colors"]["displayColor"] = {"values": values, "interpolation": "constant"}
             self._meshes[key] = {**record, "name": str(prim.GetPath()), "material": material}
         self._worlds.setdefault(key, []).append(worlds)
+
+    def _are_blender_s(self, prim: Usd.Prim, widths: int) -> bool:
+        """Whether widths of curves are those that Blender gives all that have no radius of their own."""
+        is_curve = prim.GetTypeName() == "BasisCurves" and self._writer.startswith("Blender")
+        return is_curve and bool((self._arrays.stored[widths] == _BLENDER_WIDTH).all())
 
     def _shows_color(self, prim: Usd.Prim, material: int) -> bool:
         """Whether a prim has no display colour of its own, and would show one that its copy has."""
