@@ -104,6 +104,7 @@ def evaluate(bsdf, wi, wo):
     si = dr.zeros(mi.SurfaceInteraction3f, len(wo))
     si.wi = vectors(np.broadcast_to(wi, wo.shape))
     value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, vectors(wo))
+    dr.eval(value, pdf)  # by one kernel
     return np.array(value).T, np.array(pdf)
 
 
@@ -122,6 +123,7 @@ def draw(bsdf, wi, count, seed=0, *, asked=0):
     context = mi.BSDFContext()
     context.type_mask |= asked
     bs, factor = bsdf.sample(context, si, u[0], mi.Point2f(u[1], u[2]))
+    dr.eval(bs, factor)  # by one kernel
     return np.array(bs.wo).T, np.array(factor).T, np.array(bs.pdf), np.array(bs.sampled_type)
 
 
@@ -274,13 +276,12 @@ def test_one_call_gives_what_evaluation_and_sampling_give(build, parts, name):
     points = mi.Point2f(u, dr.sqrt(u))
     value, pdf, bs, factor = bsdf.eval_pdf_sample(context, si, vectors(ways), u, points)
     alone, factor_alone = bsdf.sample(context, si, u, points)
-    pairs = zip(
-        (value, pdf, bs.wo, bs.pdf, bs.sampled_type, factor),
-        (*bsdf.eval_pdf(context, si, vectors(ways)), alone.wo, alone.pdf, alone.sampled_type, factor_alone),
-        strict=True,
-    )
-    for together, apart in pairs:
-        np.testing.assert_allclose(np.array(together), np.array(apart), rtol=1e-6)
+    together = value, pdf, bs.wo, bs.pdf, bs.sampled_type, factor
+    apart = *bsdf.eval_pdf(context, si, vectors(ways)), alone.wo, alone.pdf, alone.sampled_type, factor_alone
+    dr.eval(together)  # by one kernel each
+    dr.eval(apart)
+    for one, other in zip(together, apart, strict=True):
+        np.testing.assert_allclose(np.array(one), np.array(other), rtol=1e-6)
 
 
 @pytest.mark.long_cases("oiled glass-0.3")

@@ -58,7 +58,7 @@ def test_it_looks_like_its_picture(emitters):
 def test_samples_come_by_their_density(emitters):
     emitter = emitters[0]
     ds, weight, pdf = sampled(emitter)
-    assert np.array(ds.pdf) == pytest.approx(pdf, rel=1e-3)
+    np.testing.assert_allclose(np.array(ds.pdf), pdf, rtol=1e-3)
     toward = np.array(ds.d)
     assert np.linalg.norm(toward, axis=0) == pytest.approx(1, abs=1e-5)
     assert weight * pdf == pytest.approx(seen(emitter, toward), rel=1e-3)

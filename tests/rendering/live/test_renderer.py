@@ -186,10 +186,10 @@ def test_large_pictures_get_their_samples_part_by_part(renderers, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_move_compiles_nothing(teapot):
+def test_a_move_compiles_nothing(renderers):
     import drjit as dr
 
-    renderer = LiveRenderer(teapot, DISPLAYS["square"])
+    renderer = renderers("square")
     views = [
         LiveView(
             (5.0 * number, 0.0, 300.0 + number),
