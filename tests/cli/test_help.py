@@ -29,6 +29,11 @@ def commands(command=None, words=()):
     return found
 
 
+def test_help_may_be_a_word(lippmann):
+    assert lippmann("help").out == lippmann("--help").out
+    assert lippmann("help", "quilt", "sizes").out == lippmann("quilt", "sizes", "--help").out
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", commands())
 def test_each_command_has_two_examples_that_parse(name):

@@ -128,7 +128,7 @@ def app_of(words: Sequence[str]) -> typer.Typer:
     if _COMPLETION in os.environ:
         return make_app()
     first = words[0] if words else "--help"
-    if first in ("--help", "-h", "--version"):
+    if first in ("--help", "-h", "--version", "help"):
         return _outline()
     if first not in COMMANDS:
         return make_app()
@@ -195,6 +195,8 @@ def run(words: list[str], *, debug: bool = False) -> int:
     """Run one command; errors become one line on standard error unless ``debug`` asks for the traceback."""
     standard_streams.begin_command()
     atomic_write.remark("")
+    if words[:1] == ["help"]:  # as of git, gh and uv
+        words = [*words[1:], "--help"]
     try:
         code = app_of(words)(words, prog_name="lippmann", standalone_mode=False)
         sys.stdout.flush()
