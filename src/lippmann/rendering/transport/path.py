@@ -52,7 +52,7 @@ from lippmann.rendering.transport.path_techniques import (
     Techniques,
     WithoutSpecularLight,
 )
-from lippmann.rendering.transport.path_vertex import DIMENSIONS, LastVertex, Scattering, Vertex
+from lippmann.rendering.transport.path_vertex import LastVertex, Scattering, Trail, Vertex
 from lippmann.rendering.transport.tuning import TUNING
 
 if TYPE_CHECKING:
@@ -193,15 +193,11 @@ class PathIntegrator:
         scene = self.scene
         techniques = self._techniques_without_specular if without_specular else self._techniques
 
-        o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)  # current ray
+        trail = Trail.along(ray)
         active = mi.Bool(active)
         radiance = mi.Spectrum(0)
         throughput = mi.Spectrum(1)
         eta = mi.Float(1)  # product of relative indices, so that roulette sees unitless throughput
-        depth = mi.UInt32(0)  # surfaces hit so far, straight-through ones excluded
-        crossings = mi.UInt32(0)  # straight-through surfaces hit so far
-        last = LastVertex.eye()
-        all_specular = mi.Bool(True)  # no emitter has been sampled yet
         states = techniques.begin()
         secondary = mi.UInt32(0)
         shadow = mi.UInt32(0)
@@ -211,33 +207,32 @@ class PathIntegrator:
         view_dependent = mi.Bool(False)
 
         while dr.hint(active, label="paths", exclude=[scene, stream]):
-            toward = mi.Ray3f(o, d)
+            toward = trail.ray
             si = pi.compute_surface_interaction(toward)
             bsdf = si.bsdf(toward)
             shiny = (bsdf.flags() & int(mi.BSDFFlags.Glossy | mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
-            view_dependent |= (depth == 0) & si.is_valid() & shiny
+            view_dependent |= (trail.depth == 0) & si.is_valid() & shiny
             throughput = techniques.travel(states, si, throughput)
 
             # ---- emission ----
-            emission = self.emission(si, last, depth, techniques, states, mi.UInt32(stream.half))
+            depth = trail.depth
+            emission = self.emission(si, trail.last, depth, techniques, states, mi.UInt32(stream.half))
             radiance += self.clamp_indirect(throughput * techniques.meet_emitter(states, depth, si, emission), depth)
 
             # ---- next-event estimation ----
             continues = si.is_valid() & (depth < self.depth)
-            dimension = (depth * 2 + crossings) * DIMENSIONS + 1
-            vertex = Vertex(si, bsdf, d, depth, continues, throughput, stream, dimension, states)
-            state = radiance, shadow, eta, crossings, o, d, last, all_specular
-            states, throughput, depth, continues, passes, *rest = self._leave(vertex, techniques, state)
-            radiance, shadow, eta, crossings, o, d, last, all_specular = rest
+            vertex = Vertex(si, bsdf, trail, continues, throughput, stream, states)
+            state = radiance, shadow, eta, trail
+            states, throughput, continues, passes, radiance, shadow, eta, trail = self._leave(vertex, techniques, state)
 
             # ---- Russian roulette ----
             survival = roulette_survival(throughput, eta)
-            at_risk = continues & (depth >= TUNING.roulette_depth) & ~passes
+            at_risk = continues & (trail.depth >= TUNING.roulette_depth) & ~passes
             throughput = dr.select(at_risk, throughput * dr.rcp(survival), throughput)
-            continues &= ~at_risk | (stream.next_1d(dimension + 3) < survival)
+            continues &= ~at_risk | (stream.next_1d(vertex.dimension + 3) < survival)
 
             active = continues
-            pi = scene.ray_intersect_preliminary(mi.Ray3f(o, d), coherent=False, active=active)
+            pi = scene.ray_intersect_preliminary(trail.ray, coherent=False, active=active)
             secondary += dr.select(active, mi.UInt32(1), mi.UInt32(0))
 
         return self.expose(radiance), RayCounts(secondary, shadow), FirstHit(first_distance, view_dependent)
@@ -249,12 +244,12 @@ class PathIntegrator:
         In a branch, so that the processor skips it for a vector of lanes that have all left the scene.
         """
         si, bsdf, stream, dimension = vertex.si, vertex.bsdf, vertex.stream, vertex.dimension
-        states, throughput, depth, continues = vertex.states, vertex.throughput, vertex.depth, vertex.active
-        radiance, shadow, eta, crossings, o, d, last, all_specular = state
+        states, throughput, continues = vertex.states, vertex.throughput, vertex.active
+        radiance, shadow, eta, trail = state
         context, passes = mi.BSDFContext(), mi.Bool(False)
         if continues:
             radiance, shadow = techniques.arrive(vertex, radiance, shadow)
-            samples, number = self._count_emitter_samples(stream.index, all_specular)
+            samples, number = self._count_emitter_samples(stream.index, trail.all_specular)
             count, last_number = mi.Float(samples), number + samples - 1
             sampling = vertex.smooth & (number != last_number)
             while dr.hint(sampling, label="emitters", exclude=[stream, dimension, si, bsdf, count, last_number]):
@@ -274,22 +269,14 @@ class PathIntegrator:
             light, tests = self._reflect_emitter(vertex, techniques, ds, emitted, value, pdf, count, vertex.smooth)
             radiance += light
             shadow += tests
-            passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
-            states = techniques.scatter(vertex, Scattering(vertex, bs, weight))
+            scattering = Scattering(vertex, bs, weight)
+            passes = scattering.passes
+            states = techniques.scatter(vertex, scattering)
             throughput *= weight
             eta *= bs.eta
-            onward = si.spawn_ray(si.to_world(bs.wo))
-            o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
-            if ~passes:
-                is_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-                last = LastVertex(mi.Point3f(si.p), bs.pdf, is_delta, samples)
-                all_specular &= ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-                depth += 1
-            else:
-                crossings += 1
-            continues &= (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
-        state = radiance, shadow, eta, crossings, o, d, last, all_specular
-        return states, throughput, depth, continues, passes, *state
+            trail = trail.extend(vertex, scattering, samples)
+            continues &= (dr.max(throughput) > 0) & (trail.crossings < MAX_CROSSINGS)
+        return states, throughput, continues, passes, radiance, shadow, eta, trail
 
     def expose(self, radiance: Spectrum) -> Spectrum:
         """``radiance`` times the gain."""

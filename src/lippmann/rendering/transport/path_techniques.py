@@ -259,7 +259,7 @@ class LightVertexJoins(Technique):
         return radiance + self._clamp.apply(vertex.throughput * light), shadow + tests
 
     def _arrival(self, state: _Joint, vertex: Vertex) -> Arrival:
-        reach = reach_of(vertex.si, vertex.bsdf, vertex.d, state.departure, vertex.active)
+        reach = reach_of(vertex.si, vertex.bsdf, vertex.trail.d, state.departure, vertex.active)
         return Arrival(self._vertices, vertex.albedo, reach, mi.UInt32(vertex.stream.half))
 
     def _joins(self, vertex: Vertex) -> Bool:

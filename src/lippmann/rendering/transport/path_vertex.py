@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.pbr.surface_lobes import is_sharp_event
@@ -17,6 +18,7 @@ from lippmann.device.types import (
     Color3f,
     Float,
     Point3f,
+    Ray3f,
     Spectrum,
     SurfaceInteraction3f,
     UInt32,
@@ -63,10 +65,8 @@ class Vertex:
     ----------
     si, bsdf:
         The point, and its BSDF.
-    d:
-        World-space direction of the ray that came here.
-    depth:
-        Surfaces that the path has met before, straight-through ones excluded.
+    trail, depth:
+        How the path came here, and its ``depth``.
     active:
         Lanes that go on from here.
     throughput:
@@ -85,17 +85,15 @@ class Vertex:
         self,
         si: SurfaceInteraction3f,
         bsdf: BSDFPtr,
-        d: Vector3f,
-        depth: UInt32,
+        trail: Trail,
         active: Bool,
         throughput: Spectrum,
         stream: SampleStream,
-        dimension: UInt32,
         states: list[Any],
     ) -> None:
-        self.si, self.bsdf, self.d = si, bsdf, d
-        self.depth, self.active, self.throughput = depth, active, throughput
-        self.stream, self.dimension, self.states = stream, dimension, states
+        self.si, self.bsdf, self.trail, self.states = si, bsdf, trail, states
+        self.active, self.throughput, self.stream = active, throughput, stream
+        self.depth, self.dimension = trail.depth, (trail.depth * 2 + trail.crossings) * DIMENSIONS + 1
         self.is_in_clear: Bool = mi.Bool(True)
         self.arrival: Arrival | None = None
 
@@ -136,3 +134,52 @@ class Scattering:
     def scattered(self) -> Color3f:
         """The BSDF times the cosine."""
         return mi.Color3f(self.weight) * self.bs.pdf
+
+
+@dataclass
+class Trail:
+    """How a path has come from the eye to its current ray.
+
+    Attributes
+    ----------
+    o, d:
+        World-space origin and direction of the ray.
+    depth, crossings:
+        Surfaces hit so far: those that scattered, and those that the path crossed straight through.
+    last:
+        Where it last scattered.
+    all_specular:
+        Whether no emitter has been sampled yet.
+    """
+
+    o: Point3f
+    d: Vector3f
+    depth: UInt32
+    crossings: UInt32
+    last: LastVertex
+    all_specular: Bool
+
+    @classmethod
+    def along(cls, ray: Ray3f) -> Trail:
+        """That of a path that begins with ``ray``."""
+        o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
+        return cls(o, d, mi.UInt32(0), mi.UInt32(0), LastVertex.eye(), mi.Bool(True))
+
+    @property
+    def ray(self) -> Ray3f:
+        """The current ray."""
+        return mi.Ray3f(self.o, self.d)
+
+    def extend(self, vertex: Vertex, scattering: Scattering, samples: UInt32) -> Trail:
+        """The trail after ``vertex``, where ``samples`` emitter samples are taken."""
+        bs, passes = scattering.bs, scattering.passes
+        onward = vertex.si.spawn_ray(vertex.si.to_world(bs.wo))
+        here = LastVertex(mi.Point3f(vertex.si.p), bs.pdf, mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta), samples)
+        return Trail(
+            mi.Point3f(onward.o),
+            mi.Vector3f(onward.d),
+            self.depth + dr.select(passes, mi.UInt32(0), 1),
+            self.crossings + dr.select(passes, mi.UInt32(1), 0),
+            dr.select(passes, self.last, here),
+            self.all_specular & (passes | ~mi.has_flag(vertex.bsdf.flags(), mi.BSDFFlags.Smooth)),
+        )

@@ -41,7 +41,7 @@ from lippmann.device.types import (
 from lippmann.rendering.transport.integrator import FirstHit, PixelSample, RayCounts
 from lippmann.rendering.transport.light_sampling import MAX_CROSSINGS
 from lippmann.rendering.transport.path import PathIntegrator
-from lippmann.rendering.transport.path_vertex import DIMENSIONS, LastVertex, Scattering, Vertex
+from lippmann.rendering.transport.path_vertex import Scattering, Trail, Vertex
 from lippmann.rendering.transport.ray_source import PixelRays
 from lippmann.rendering.transport.tuning import TUNING
 
@@ -133,38 +133,33 @@ def _trace_chain(
     Shadow rays are None in scenes without delta emitters.
     """
     scene, techniques = integrator.scene, integrator.absorption
-    o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
+    trail = Trail.along(ray)
     active = mi.Bool(active)
     light, throughput = mi.Spectrum(0), mi.Spectrum(1)
-    depth, crossings = mi.UInt32(0), mi.UInt32(0)
     rays = dr.select(active, mi.UInt32(1), mi.UInt32(0))
     shadow = mi.UInt32(0) if len(integrator.without_size) > 0 else None
-    last = LastVertex.eye()
-    all_specular = mi.Bool(True)
     at_first = integrator.first_emitter_samples(path)
     states = techniques.begin()
 
     pi = scene.ray_intersect_preliminary(ray, active=active)
     active &= _may_show_light(pi)
     while dr.hint(active, label="chain", exclude=[integrator, scene, stream, at_first]):
-        toward = mi.Ray3f(o, d)
+        toward = trail.ray
         si = pi.compute_surface_interaction(toward)
         bsdf = si.bsdf(toward)
         throughput = techniques.travel(states, si, throughput)
-        emission = integrator.emission(si, last, depth, techniques, states, mi.UInt32(0))
-        light += integrator.clamp_indirect(throughput * emission, depth)
+        emission = integrator.emission(si, trail.last, trail.depth, techniques, states, mi.UInt32(0))
+        light += integrator.clamp_indirect(throughput * emission, trail.depth)
 
-        dimension = (depth * 2 + crossings) * DIMENSIONS + 1
-        continues = active & si.is_valid() & (depth < integrator.depth)
-        vertex = Vertex(si, bsdf, d, depth, continues, throughput, stream, dimension, states)
-        state = light, shadow, crossings, o, d, last, all_specular
-        states, throughput, depth, continues, *rest = _leave(integrator, vertex, at_first, state)
-        light, shadow, crossings, o, d, last, all_specular = rest
-        active = continues & (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
-        pi = scene.ray_intersect_preliminary(mi.Ray3f(o, d), coherent=False, active=active)
+        continues = active & si.is_valid() & (trail.depth < integrator.depth)
+        vertex = Vertex(si, bsdf, trail, continues, throughput, stream, states)
+        states, throughput, continues, *state = _leave(integrator, vertex, at_first, (light, shadow, trail))
+        light, shadow, trail = state
+        active = continues & (dr.max(throughput) > 0) & (trail.crossings < MAX_CROSSINGS)
+        pi = scene.ray_intersect_preliminary(trail.ray, coherent=False, active=active)
         rays += dr.select(active, mi.UInt32(1), mi.UInt32(0))
         # A chain that leaves the scene counts as sky, but not before its first event.
-        active &= _may_show_light(pi) | (integrator.has_surroundings & ~pi.is_valid() & (depth > 0))
+        active &= _may_show_light(pi) | (integrator.has_surroundings & ~pi.is_valid() & (trail.depth > 0))
     return light, rays, shadow
 
 
@@ -172,33 +167,23 @@ def _trace_chain(
 def _leave(integrator: PathIntegrator, vertex: Vertex, at_first: UInt32, state: tuple[Any, ...]) -> tuple[Any, ...]:
     """State of a chain after a vertex, in a branch as in paths."""
     si, bsdf, stream, dimension = vertex.si, vertex.bsdf, vertex.stream, vertex.dimension
-    states, throughput, depth, continues = vertex.states, vertex.throughput, vertex.depth, vertex.active
-    light, shadow, crossings, o, d, last, all_specular = state
+    states, throughput, continues = vertex.states, vertex.throughput, vertex.active
+    light, shadow, trail = state
     context = mi.BSDFContext()
     context.type_mask |= SHARP_FIRST
     if continues:
         if dr.hint(len(integrator.without_size) > 0, mode="scalar"):
             point = stream.next_2d(dimension + 2)
             reflection, tests = _reflect_delta_emitter(integrator, si, bsdf, vertex.lobe, point, continues)
-            light += integrator.clamp_indirect(throughput * reflection, depth + 1)
+            light += integrator.clamp_indirect(throughput * reflection, vertex.depth + 1)
             shadow += tests
         bs, weight = bsdf.sample(context, si, stream.next_1d(dimension), stream.next_2d(dimension + 1), continues)
         scattering = Scattering(vertex, bs, weight)
-        passes = scattering.passes
         states = integrator.absorption.scatter(vertex, scattering)
         continues &= is_sharp_event(bs)
         throughput *= weight
-        onward = si.spawn_ray(si.to_world(bs.wo))
-        o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
-        samples_here = dr.select(all_specular, at_first, mi.UInt32(1))
-        if ~passes:
-            is_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-            last = LastVertex(mi.Point3f(si.p), bs.pdf, is_delta, samples_here)
-            all_specular &= ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-            depth += 1
-        else:
-            crossings += 1
-    return states, throughput, depth, continues, light, shadow, crossings, o, d, last, all_specular
+        trail = trail.extend(vertex, scattering, dr.select(trail.all_specular, at_first, mi.UInt32(1)))
+    return states, throughput, continues, light, shadow, trail
 
 
 def _reflect_delta_emitter(
