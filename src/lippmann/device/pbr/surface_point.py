@@ -19,7 +19,6 @@ from lippmann.device.pbr.gltf_bsdf_parameters import (
     SurfaceModel,
 )
 from lippmann.device.pbr.textures import Place, Signal
-from lippmann.device.pbr.thin_film import thin_film_reflectance
 from lippmann.device.types import Bool, Color3f, Float, Vector3f
 
 #: Reflectance of the clear coat seen head-on (refractive index 1.5).
@@ -150,7 +149,7 @@ def _weigh_lobes(model: SurfaceModel, point: Point, place: Place, outside: Bool)
     else:
         albedo = _gloss_albedo(model, point.lobe)
         whole = albedo.x + albedo.y
-        f0, base = _tinted_f0(point, cosine, point.f0), _tinted_f0(point, cosine, point.base)
+        f0, base = (_under_film(point, cosine, bare, bare) for bare in (point.f0, point.base))
         metal = base * albedo.x + albedo.y
         if model.compensates:
             point.metal_gain = 1 + base * (1 - whole) / whole
@@ -216,18 +215,12 @@ def _interface_albedo(model: SurfaceModel, point: Point, outside: Bool) -> Float
     return dr.lerp(albedo(first), albedo(first + 1), place - first)
 
 
-def _tinted_f0(point: Point, cosine: Float, f0: Color3f) -> Color3f:
-    """Head-on reflectance, where there is a film that of the film at ``cosine``."""
-    if point.film is None:
-        return f0
-    share, ior, thickness = point.film
-    return dr.lerp(f0, thin_film_reflectance(cosine, ior, thickness, f0), share)
-
-
 def _under_film(point: Point, cosine: Float, f0: Color3f, bare: Color3f) -> Color3f:
-    """Reflectance ``bare``, blended with that of a thin film over it."""
+    """Reflectance ``bare`` at ``cosine``, blended with that of a thin film over a base of ``f0``."""
     if point.film is None:
         return bare
+    from lippmann.device.pbr.thin_film import thin_film_reflectance
+
     share, ior, thickness = point.film
     return dr.lerp(bare, thin_film_reflectance(cosine, ior, thickness, f0), share)
 

@@ -194,7 +194,7 @@ def clean_light(noisy: Floats, specular: Floats | None, denoise: Denoise, sample
     a mirrored emitter from it to the pixels beside.
 
     Elsewhere the network's input is clamped at ``far_beyond_white``: it would spread a single path that hit an emitter
-    over the pixels around. Where its output is still nearly as bright, the clamped part is added again.
+    over the pixels around. Where its output is at least half as bright (lone hits: a fifth), that part is added again.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def clean_light(noisy: Floats, specular: Floats | None, denoise: Denoise, sample
     clean = denoise(np.minimum(noisy - past, limit), samples, turned) + past
     rest = noisy - past
     if (rest > limit).any():
-        clean += np.where(clean - past >= np.float32(0.75) * limit, np.maximum(rest - limit, 0), np.float32(0))
+        clean += np.where(clean - past >= limit / 2, np.maximum(rest - limit, 0), np.float32(0))
     return clean
 
 
