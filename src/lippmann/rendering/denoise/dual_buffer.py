@@ -97,13 +97,13 @@ class Denoised:
         """Squared error of every pixel's code, estimated from the two halves."""
         noisy, clean = self._clean_halves()
         first, second = (encode(half, self._coding) for half in clean)
-        apart: Floats = over_channels(np.add, np.square(first - second)) / np.float32(12)
+        apart: Floats = over_channels(np.add, np.square(first - second)) * np.float32(1 / 12)
         picture = self._blend_halves()
         codes, slope = encode_with_slope(picture, self._coding)
         bend = codes - np.float32(0.5) * (first + second)
         self._take_chords(slope, picture, noisy)
         left = [slope * (half - smooth) + bend for half, smooth in zip(noisy, clean, strict=True)]
-        common = over_channels(np.add, left[0] * left[1]) / np.float32(3)
+        common = over_channels(np.add, left[0] * left[1]) * np.float32(1 / 3)
         limit = TUNING.hidden * max(1.0, REQUEST.usual / self._renderer.samples)
         hidden = over_channels(np.maximum, np.maximum(np.abs(left[0]), np.abs(left[1]))) > limit
         common[hidden] = np.float32(ESTIMATE.outlier_ratio) * apart[hidden]
@@ -169,7 +169,7 @@ class Denoised:
         """Put the finite difference in place of the curve's ``slope`` at pixels far brighter than their samples."""
         coding = self._coding
         displayed = np.float32(0.5) * (noisy[0] + noisy[1])
-        scatter = over_channels(np.add, np.abs(noisy[0] - noisy[1])) / np.float32(3)
+        scatter = over_channels(np.add, np.abs(noisy[0] - noisy[1])) * np.float32(1 / 3)
         nearby = mean_around(scatter, 1, Bands(self._threads))[..., None]
         truth = displayed + np.float32(TUNING.far_above) * nearby
         if coding == "pbr-neutral":
