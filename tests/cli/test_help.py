@@ -6,6 +6,7 @@ import re
 import shlex
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from lippmann.cli.shared.examples import EXAMPLES
 from lippmann.cli.shared.scene_source import output_of
 
 
+@cache
 def commands(command=None, words=()):
     """All commands by their words."""
     command = command or typer.main.get_command(make_app())

@@ -44,6 +44,14 @@ def unbroken(engine, moving_ball, display, tmp_path_factory):
     return contents(folder)
 
 
+@pytest.fixture(scope="module")
+def begun(engine, moving_ball, display, tmp_path_factory):
+    """The folder of a run that ended after its first frame."""
+    folder = tmp_path_factory.mktemp("begun")
+    run(moving_ball, display, folder, most=1)
+    return folder
+
+
 def run(
     scene, display, folder, *, frames=FRAMES, most=99, resume=False, motion=None, bits=None, runner=None, **changes
 ):
@@ -154,20 +162,16 @@ def test_what_was_half_written_is_swept(unbroken, moving_ball, display, tmp_path
         ({"frames": range(3, 12, 3)}, r"the first frame \(was 0, is 3\)"),
     ],
 )
-def test_other_options_are_refused(engine, moving_ball, display, tmp_path, options, said):
-    run(moving_ball, display, tmp_path, most=1)
-    before = contents(tmp_path)
+def test_other_options_are_refused(begun, moving_ball, display, options, said):
+    before = contents(begun)
     with pytest.raises(PictureError, match=f"the unfinished sequence is another one: {said}"):
-        run(moving_ball, display, tmp_path, resume=True, **options)
-    assert contents(tmp_path) == before
+        run(moving_ball, display, begun, resume=True, **options)
+    assert contents(begun) == before
 
 
 @pytest.mark.slow
-def test_other_scenes_and_displays_are_refused(engine, moving_ball, display, tmp_path):
-    out = tmp_path / "out"
-    out.mkdir()
-    run(moving_ball, display, out, most=1)
-    scene = tmp_path / "scene"
+def test_other_scenes_and_displays_are_refused(begun, moving_ball, display, tmp_path):
+    out, scene = begun, tmp_path / "scene"
     shutil.copytree(moving_ball.parent, scene)
     assert run(scene / moving_ball.name, display, out, most=1, resume=True)[0].resumed
     tree = json.loads((scene / moving_ball.name).read_text())

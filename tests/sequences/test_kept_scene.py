@@ -114,9 +114,21 @@ def test_a_scene_that_stays_as_it_is_is_built_once(engine, display, builds):
     assert np.array_equal(first[1].pixels, second[1].pixels)
 
 
+@pytest.fixture(scope="module")
+def lit_teapot():
+    return teapot(environment=sky(), lights=[light_source()])
+
+
+@pytest.fixture(scope="module")
+def begun_there(engine, display, lit_teapot):
+    """Frames 1 and 2 after a cut, without the frame before it."""
+    motion = Cut(teapot(), lit_teapot, lit_teapot)
+    return [image for _, image in render_sequence(motion, display, [1, 2], integrator="path", device="cpu")]
+
+
 @pytest.mark.parametrize("change", ["surfaces", "object", "light", "dark"])
-def test_a_film_after_a_cut_is_one_that_begins_there(engine, display, change):
-    scene = teapot(environment=sky(), lights=[light_source()])
+def test_a_film_after_a_cut_is_one_that_begins_there(engine, display, lit_teapot, begun_there, change):
+    scene = lit_teapot
     before = {
         "surfaces": teapot(environment=sky(), lights=[light_source()], materials=scene.physical.materials[::-1]),
         "object": teapot(environment=sky(), lights=[light_source()], instances=scene.physical.instances[:-1]),
@@ -125,8 +137,7 @@ def test_a_film_after_a_cut_is_one_that_begins_there(engine, display, change):
     }[change]
     motion, options = Cut(before, scene, scene), {"integrator": "path", "device": "cpu"}
     together = [image for _, image in render_sequence(motion, display, [0, 1, 2], **options)]
-    alone = [image for _, image in render_sequence(motion, display, [1, 2], **options)]
-    for one, other in zip(together[1:], alone, strict=True):
+    for one, other in zip(together[1:], begun_there, strict=True):
         assert np.array_equal(one.pixels, other.pixels)
         assert one.provenance.estimate == other.provenance.estimate
         assert not any("frame 0's" in note for note in one.provenance.notes)

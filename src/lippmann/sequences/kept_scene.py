@@ -25,11 +25,18 @@ class KeptScene:
 
     def __init__(self) -> None:
         self._last: tuple[Scene, BuiltScene] | None = None
+        self._unknown: Scene | None = None
 
     def known(self, scene: Scene) -> Scene:
-        """The scene that was built last where nothing but cameras is different, else ``scene``."""
-        last = None if self._last is None else self._last[0]
-        return scene if last is None or not _is_equal(_without_cameras(last), _without_cameras(scene)) else last
+        """The scene that was built last, or the last that was not known, where nothing but cameras is different.
+
+        ``scene`` itself where both are others.
+        """
+        for before in (None if self._last is None else self._last[0], self._unknown):
+            if before is not None and _is_equal(_without_cameras(before), _without_cameras(scene)):
+                return before
+        self._unknown = scene
+        return scene
 
     def build(self, scene: Scene, engine: Engine, *, memory: int | None = None) -> BuiltScene:
         """The scene on the device; parameters and errors as those of :func:`lippmann.device.pbr.build`."""
