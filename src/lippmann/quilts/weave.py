@@ -266,8 +266,7 @@ def weave_window(
     from lippmann.quilts.weave_kernel import weave_channel
 
     columns = columns or (0, display.panel.width)
-    shape = rows[1] - rows[0], columns[1] - columns[0]
-    result = np.empty((*shape, 3), dtype=np.float32)
+    result = np.empty((rows[1] - rows[0], columns[1] - columns[0], 3), dtype=np.float32)
     channels = _samples_of_window(quilt, display, choice, rows, columns, beside)
     # Only this part of the views is sampled.
     top, left = (min(int(samples[axis].min()) for samples in channels) for axis in (3, 2))
@@ -275,15 +274,7 @@ def weave_window(
     width, height = quilt.view_size
     views = quilt.view_rows(top, min(bottom, height), left, min(right, width))
     for channel, (number, share, across, down) in enumerate(channels):
-        weave_channel(
-            views,
-            channel,
-            np.broadcast_to(number, shape),
-            np.broadcast_to(share, shape),
-            np.broadcast_to(across - left, shape),
-            np.broadcast_to(down - top, shape),
-            result,
-        )
+        weave_channel(views, channel, number, share, across - left, down - top, result)
     return result
 
 
