@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ def picture(display=DISPLAY, seed=1):
     return IntegralImage(np.random.default_rng(seed).random(size, dtype=np.float32), display)
 
 
+@cache
 def whole(marks):
     panel = marks.sheet.panel
     return marks.draw(PixelWindow(0, 0, panel.width, panel.height))

@@ -42,7 +42,7 @@ def opened(image, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bits", [8, 16, 32])
+@pytest.mark.parametrize("bits", [8, pytest.param(16, marks=pytest.mark.long), 32])
 def test_piece_by_piece_gives_the_same(opened, tmp_path, bits):
     whole, large = opened(bits)
     paths = tmp_path / "whole.tif", tmp_path / "large.tif"

@@ -26,12 +26,21 @@ UPRIGHT = np.array([(60, 45), (740, 45), (740, 555), (60, 555)], float)
 OBLIQUE = np.array([(120, 80), (700, 40), (735, 550), (90, 480)], float)
 
 
-def photograph(codes, *, eye=None, corners=UPRIGHT, blur=0.0, fall=0.0, noise=0.005, ambient=0.005, display=DISPLAY):
-    """A photograph of 800 x 600 pixels by a camera of a warm white balance."""
+def seen_by(codes, eye=None, display=DISPLAY):
+    """What an eye sees of a picture, as a lens draws it: ``(H, W, 3)`` linear, a pixel for each of the panel."""
     image = IntegralImage(decode_srgb(codes.astype(np.float32) / 255), display)
-    width, height = display.panel.width, display.panel.height
-    seen = replay(image, eye, size=(width, height), subpixels=True)
-    seen = ndimage.gaussian_filter(seen, (0.8, 0.8, 0))
+    seen = replay(image, eye, size=(display.panel.width, display.panel.height), subpixels=True)
+    return ndimage.gaussian_filter(seen, (0.8, 0.8, 0))
+
+
+def photograph(codes, *, eye=None, display=DISPLAY, **camera):
+    """A photograph of a picture; ``camera`` as of :func:`photograph_of`."""
+    return photograph_of(seen_by(codes, eye, display), **camera)
+
+
+def photograph_of(seen, *, corners=UPRIGHT, blur=0.0, fall=0.0, noise=0.005, ambient=0.005):
+    """A photograph of 800 x 600 pixels by a camera of a warm white balance."""
+    height, width = seen.shape[:2]
     rows = []
     for (u, v), (x, y) in zip([(0, 0), (1, 0), (1, 1), (0, 1)], corners, strict=True):
         rows += [[x, y, 1, 0, 0, 0, -u * x, -u * y], [0, 0, 0, x, y, 1, -v * x, -v * y]]
@@ -80,10 +89,16 @@ CAMERAS = {
 }
 
 
+@pytest.fixture(scope="module", params=[1.0, 1.01])
+def scaled(codes, request):
+    """How much a system scales the pattern, and what is seen of that."""
+    return request.param, seen_by(moved(codes, right=request.param, down=request.param))
+
+
 @pytest.mark.parametrize("camera", CAMERAS.values(), ids=CAMERAS)
-@pytest.mark.parametrize("scale", [1.0, 1.01])
-def test_a_change_of_size_is_measured_by_any_camera(codes, camera, scale):
-    line = check_photograph(photograph(moved(codes, right=scale, down=scale), **camera), DISPLAY, 400.0)
+def test_a_change_of_size_is_measured_by_any_camera(scaled, camera):
+    scale, seen = scaled
+    line = check_photograph(photograph_of(seen, **camera), DISPLAY, 400.0)
     assert line.startswith("Native pixels reach") == (scale == 1.0)
     assert scale_in(line) == pytest.approx(scale, abs=0.0011)
 

@@ -33,12 +33,6 @@ def test_render_says_what_it_did(lippmann, tmp_path, engine):
     assert set(values["seconds"]) == {"load", "build", "compile", "trace", "reuse", "write", "total"}
     assert values["seconds"]["total"] >= values["seconds"]["trace"] > 0
     assert read_picture(out).provenance.depth == 2
-
-
-@pytest.mark.slow
-def test_render_prints_the_depth_range_beside_the_depth_budget(lippmann, tmp_path, engine):
-    done = lippmann("render", "teapot", "--spp", 1, "--integrator", "direct", "-o", tmp_path / "a.png")
-    assert done.code == 0
     assert "mm behind" in done.err
     # What `displays` says, too: rays are recorded from 10 mm in front on.
     assert "depth budget of the display from 54.4 mm behind to 10.0 mm in front" in done.err

@@ -1,6 +1,8 @@
 """What a command reads it does not write over, under whatever name."""
 
 import os
+import shutil
+from pathlib import Path
 
 import pytest
 
@@ -9,11 +11,9 @@ from lippmann.errors import OutputError
 
 
 @pytest.fixture
-def picture(lippmann, tmp_path, engine):
-    path = tmp_path / "p.png"
-    done = lippmann("render", "teapot", "--integrator", "depth", "--spp", "1", "-o", path)
-    assert done.code == 0, done.err
-    return path
+def picture(picture, tmp_path):
+    """A copy of the small picture."""
+    return Path(shutil.copy(picture, tmp_path / "p.png"))
 
 
 @pytest.mark.slow

@@ -88,8 +88,9 @@ def test_what_cannot_be_is_said_in_one_line(lippmann, moving_ball, tmp_path, mon
 
 
 @pytest.mark.slow
-def test_a_single_frame_may_have_a_plain_name(engine, lippmann, moving_ball, tmp_path):
-    done = lippmann("render", moving_ball, "--frames", "7", "-o", tmp_path / "seven.png", *QUICK)
+def test_a_single_frame_may_have_a_plain_name(engine, lippmann, moving_ball, cut_display, tmp_path):
+    words = ("-d", cut_display(128, 64), "--frames", "7", "-o", tmp_path / "seven.png")
+    done = lippmann("render", moving_ball, *words, *QUICK)
     assert done.code == 0, done.err
     assert (tmp_path / "seven.png").exists()
 
@@ -123,11 +124,22 @@ SMALL_QUILT = ("--views", "3x2", "--size", "384x288", *QUICK)
 
 
 @pytest.mark.slow
-def test_a_part_of_a_swing(engine, lippmann, tmp_path):
-    call = ("--turntable", "8", "--swing", "40", "--frames", "2:4", "-o", tmp_path / "out_%d.png")
+def test_a_part_of_a_swing(engine, lippmann, cut_display, tmp_path):
+    call = (
+        "-d",
+        cut_display(128, 64),
+        "--turntable",
+        "8",
+        "--swing",
+        "40",
+        "--frames",
+        "2:4",
+        "-o",
+        tmp_path / "out_%d.png",
+    )
     done = lippmann("render", "teapot", *call, *QUICK)
     assert done.code == 0, done.err
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["out_2.png", "out_3.png"]
+    assert sorted(path.name for path in tmp_path.glob("*.png")) == ["out_2.png", "out_3.png"]
 
 
 @pytest.mark.slow
@@ -144,10 +156,12 @@ def test_quilts_of_a_turn_and_their_film(engine, lippmann, tmp_path, film, eye, 
     from lippmann.viewing.video_frames import view_of_quilt
 
     call = ("quilt", "render", "teapot", "--turntable", "3", *SMALL_QUILT, *eye, "--video", tmp_path / film)
-    done = lippmann(*call, "-o", tmp_path / "out", "--json")
+    # In a folder, or named with a number, to which the ending of their kind is added.
+    done = lippmann(*call, "-o", tmp_path / ("out" if eye else "q_%d.png"), "--json")
     assert done.code == 0, done.err
     paths = [Path(frame["output"]) for frame in done.json["frames"]]
-    assert [path.name for path in paths] == [f"frame_{number:04}_qs3x2a0.75.png" for number in range(3)]
+    name = "frame_{:04}_qs3x2a0.75.png" if eye else "q_{}_qs3x2a0.75.png"
+    assert [path.name for path in paths] == [name.format(number) for number in range(3)]
     _, shown = frames_of(tmp_path / film)
     assert len(shown) == 3
     first = read_quilt(paths[0])
@@ -172,24 +186,21 @@ def test_an_output_that_is_a_film_is_made_of_the_frames_beside_it(engine, lippma
     assert len(list((tmp_path / "turn-frames").glob("frame_*_qs3x2a0.75.png"))) == 2
 
 
-def test_an_output_that_is_a_film_of_integral_images(engine, lippmann, moving_ball, tmp_path):
-    temporary_file(tmp_path / "ball.v1.mp4").write_bytes(b"what a killed run left")
-    done = lippmann("render", moving_ball, "--frames", "0:2", *QUICK, "--fps", "10", "-o", tmp_path / "ball.v1.mp4")
+def test_an_output_that_is_a_film_of_integral_images(engine, lippmann, moving_ball, cut_display, tmp_path):
+    film = tmp_path / "out" / "ball.v1.mp4"
+    film.parent.mkdir()
+    temporary_file(film).write_bytes(b"what a killed run left")
+    words = ("-d", cut_display(128, 64), "--frames", "0:2", *QUICK, "--fps", "10", "-o", film)
+    done = lippmann("render", moving_ball, *words)
     assert done.code == 0, done.err
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["ball-v1-frames", "ball.v1.mp4"]
-    assert frames_of(tmp_path / "ball.v1.mp4")[0] == 10
-
-
-def test_quilts_with_a_number_get_the_ending_of_their_kind(engine, lippmann, tmp_path):
-    done = lippmann("quilt", "render", "teapot", "--turntable", "2", *SMALL_QUILT, "-o", tmp_path / "q_%d.png")
-    assert done.code == 0, done.err
-    assert sorted(path.name for path in tmp_path.iterdir()) == [f"q_{number}_qs3x2a0.75.png" for number in (0, 1)]
+    assert sorted(path.name for path in film.parent.iterdir()) == ["ball-v1-frames", "ball.v1.mp4"]
+    assert frames_of(film)[0] == 10
 
 
 @pytest.mark.slow
-def test_a_film_of_native_pixels_and_one_of_colour_beside_depth(engine, lippmann, tmp_path, monkeypatch):
+def test_a_film_of_native_pixels_and_one_of_colour_beside_depth(engine, lippmann, cut_display, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    call = ("render", "teapot", "--turntable", "2", *QUICK, "--layers", "-o", "f_%d.exr")
+    call = ("render", "teapot", "-d", cut_display(160, 160), "--turntable", "2", *QUICK, "--layers", "-o", "f_%d.exr")
     done = lippmann(*call, "--video", "native.mp4", "--shows", "native")
     assert done.code == 0, done.err
     _, shown = frames_of("native.mp4")

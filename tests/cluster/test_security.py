@@ -76,14 +76,19 @@ PAGES = ("status", "info/main/workers.html", "json/identity.json", "metrics", "h
 
 
 @pytest.mark.slow
-def test_nobody_else_runs_code_in_a_cluster_of_this_machine(tmp_path):
-    """Scheduler, worker and nanny refuse all who have not the cluster's certificate; the cluster itself works."""
+def test_nobody_else_runs_code_in_a_cluster_of_this_machine_or_sees_its_pages(tmp_path, until):
+    """Scheduler, worker and nanny refuse all who have not the cluster's certificate; the cluster itself works.
+
+    A worker that takes the place of one that died shows no pages, either.
+    """
     from distributed.comm.addressing import unparse_address
 
     (tmp_path / "intruder.py").write_text(INTRUDER)
     marks = tmp_path / "marks"
     marks.mkdir()
-    with connect(Target(local=1)) as cluster:
+    remarks: list[str] = []
+    with connect(Target(local=1), remark=remarks.append) as cluster:
+        _check_ports()
         (worker,) = cluster.client.scheduler_info()["workers"].items()
         addresses = (cluster.client.scheduler.address, worker[0], worker[1]["nanny"])
         run = subprocess.run(
@@ -99,14 +104,6 @@ def test_nobody_else_runs_code_in_a_cluster_of_this_machine(tmp_path):
         assert [line for line in outcomes if "refused" not in line] == []
         assert {urlsplit(address).scheme for address in addresses} == {"tls"}
         assert cluster.client.submit(unparse_address, "tls", "served").result(timeout=30) == "tls://served"
-
-
-@pytest.mark.slow
-def test_a_cluster_of_this_machine_shows_its_pages_to_nobody(until):
-    """A worker that takes the place of one that died is no different."""
-    remarks: list[str] = []
-    with connect(Target(local=1), remark=remarks.append) as cluster:
-        _check_ports()
         ((address, process),) = cluster.client.run(os.getpid).items()
         os.kill(process, signal.SIGKILL)
         until(lambda: set(cluster.client.nthreads()) - {address})

@@ -37,6 +37,7 @@ def smooth(display):
     return (0.5 + 0.5 * np.sin(across + along)).astype(np.float32)
 
 
+@pytest.mark.long_cases("hexagonal-True")
 @pytest.mark.slow
 @pytest.mark.parametrize("subpixels", [True, False])
 @pytest.mark.parametrize("name", DISPLAYS)
