@@ -33,6 +33,8 @@ Matrix = NDArray[np.float64]
 _SAME_NORMAL = 0.97
 #: Distance from a surface's plane, as a share of its height, plus a share of the gap.
 _OFF_PLANE = 0.02, 0.1
+#: That of the point in the middle of a pixel, as a share of it: farther off, other surfaces are mixed in.
+_OFF_MIDDLE = 0.25
 #: Pixels from the mean of the points that views show to the point itself: it is to lie between them.
 _ASIDE = 0.5
 #: Largest difference of codes between pixels that agree.
@@ -95,13 +97,18 @@ class DiffusePixels:
         """Albedo of pixels."""
         return dr.gather(self.color, self.all_albedo, pixel)
 
-    def is_diffuse(self, ray: Ray3f, normal: Normal3f) -> Bool:
-        """Whether each pixel shows a single surface, which is diffuse and emits no light."""
+    def is_diffuse(self, ray: Ray3f, normal: Normal3f, point: Point3f, off_plane: Float) -> Bool:
+        """Whether each pixel shows a single surface, which is diffuse and emits no light.
+
+        The middle's hit lies no farther from the plane of the mean point than a share of ``off_plane``, world units.
+        """
         si = self._scene.ray_intersect(ray)
         flags = si.bsdf(ray).flags()
         directional = (flags & int(mi.BSDFFlags.Glossy | mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
         is_dark = dr.max(si.emitter(self._scene).eval(si)) == 0
-        return si.is_valid() & ~directional & is_dark & (dr.squared_norm(normal) > _SAME_NORMAL**2)
+        is_single = dr.squared_norm(normal) > _SAME_NORMAL**2
+        is_single &= dr.abs(dr.dot(normal, si.p - point)) < _OFF_MIDDLE * off_plane
+        return si.is_valid() & ~directional & is_dark & is_single
 
 
 class KeyPicture:
@@ -123,27 +130,29 @@ class KeyPicture:
         self._color, self._albedo, self._colors = pixels.color, pixels.all_albedo, upload(colors)
         self._to_frame, self._width = pixels.frame_from_world, colors.shape[1]
         self._views, self._step = views, step
-        self._mm = float(1 / np.linalg.norm(inverse(self._to_frame)[:3, 0]))
+        self._unit = dr.opaque(mi.Float, float(np.linalg.norm(inverse(self._to_frame)[:3, 0])))  # of 1 mm
         pixel = dr.arange(mi.UInt32, colors.shape[0] * colors.shape[1])
         ray, normal = pixels.ray(pixel), pixels.normal(pixel)
+        point = pixels.point(pixel, ray)
+        is_diffuse = pixels.is_diffuse(ray, normal, point, self._find_off_plane(_move(self._to_frame, point)[2]))
         # No normal of a surface is like the zero of pixels that show no diffuse surface.
-        normal = dr.select(pixels.is_diffuse(ray, normal), dr.normalize(normal), 0)
-        self._planes = dr.ravel(mi.Vector4f(*normal, dr.dot(normal, pixels.point(pixel, ray))))
+        normal = dr.select(is_diffuse, dr.normalize(normal), 0)
+        self._planes = dr.ravel(mi.Vector4f(*normal, dr.dot(normal, point)))
         dr.eval(self._planes)
 
     def irradiance(self, others: DiffusePixels, coding: Coding, pixel: UInt32) -> Vector4f:
         """Light over albedo of other pixels by their numbers, and 1 where it is known, else 0."""
         ray, normal = others.ray(pixel), others.normal(pixel)
         point, albedo = others.point(pixel, ray), others.albedo(pixel)
-        is_known = others.is_diffuse(ray, normal)
-        normal = dr.normalize(normal)
         to_key = self._to_frame
         in_key = [mi.Float64(value) for value in _move(to_key, point)]
+        off_plane = self._find_off_plane(mi.Float(in_key[2]))
+        is_known = others.is_diffuse(ray, normal, point, off_plane)
+        normal = dr.normalize(normal)
         origin, direction = _move(to_key, ray.o), _turn(to_key[:3, :3], ray.d)
         slopes = [mi.Float64(direction[axis] / -direction[2]) for axis in (0, 1)]
         x, y = (mi.Float64(origin[axis]) + mi.Float64(origin[2]) * slopes[axis] for axis in (0, 1))
         phase = others.place(pixel)[0] % self._step if self._step > 1 else mi.UInt32(0)
-        off_plane = _OFF_PLANE[0] * dr.abs(mi.Float(in_key[2])) + _OFF_PLANE[1] * self._views.display.gap
         mean, total = self._color(0), mi.Float(0)
         least, most = self._color(dr.inf), self._color(0)
         aside = mi.Vector2f(0)
@@ -161,6 +170,10 @@ class KeyPicture:
         reflected = mi.Color3f(albedo if len(albedo) == 3 else albedo.x)
         apart = encode(high * reflected, coding) - encode(low * reflected, coding)
         return mi.Vector4f(*mean, dr.select(is_known & (dr.max(apart) < _AGREEMENT), mi.Float(1), 0))
+
+    def _find_off_plane(self, height: Float) -> Float:
+        """Largest distance from a surface's plane, world units, at a ``height`` in mm."""
+        return (_OFF_PLANE[0] * dr.abs(height) + _OFF_PLANE[1] * self._views.display.gap) * self._unit
 
     def _mean(
         self,
@@ -186,7 +199,7 @@ class KeyPicture:
             there = mi.UInt32(dr.select(is_there, (row * (width // step) + column) * step, 0)) + phase
             *own_normal, offset = dr.gather(mi.Vector4f, self._planes, there, is_there)
             is_same = is_there & (dr.dot(mi.Normal3f(own_normal), normal) > _SAME_NORMAL)
-            is_same &= dr.abs(dr.dot(mi.Normal3f(own_normal), mi.Normal3f(point)) - offset) * self._mm < off_plane
+            is_same &= dr.abs(dr.dot(mi.Normal3f(own_normal), mi.Normal3f(point)) - offset) < off_plane
             weight = (1 - dr.abs(u - mi.Float(column))) * (1 - dr.abs(v - mi.Float(row)))
             weight = dr.select(is_same, weight, 0)
             own_light = dr.gather(self._color, self._colors, there, is_same)
