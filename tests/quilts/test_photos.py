@@ -10,8 +10,9 @@ import pytest
 from PIL import Image, ImageCms
 
 from lippmann.codecs.icc import read_profile
+from lippmann.codecs.stereo_pairs import encode_jps
 from lippmann.errors import PictureError, UsageError
-from lippmann.quilts.photos import Shift, natural_order, read_photos
+from lippmann.quilts.photos import Shift, natural_order, quilt_of_pair, read_photos
 
 PAPER = (100.0, 50.0)
 
@@ -61,6 +62,23 @@ def test_one_animation_is_its_frames(tmp_path):
         first.save(tmp_path / name, save_all=True, append_images=others, lossless=True)
         quilt = read_photos([tmp_path / name], (8, 4), PAPER).quilt
         assert [quilt.view_values(k)[2, 4, 0] for k in range(quilt.layout.views)] == [30, 90, 160]
+
+
+def test_transparent_parts_show_white_paper(tmp_path):
+    for channels in (2, 4):
+        codes = np.full((4, 8, channels), 100)
+        codes[:, 4:, -1], codes[:, :4, -1] = 255, 0
+        paths = [save(tmp_path / f"{channels}{k}.png", codes) for k in range(2)]
+        view = read_photos(paths, (8, 4), PAPER).quilt.view_values(1)
+        assert (view[2, 0] == 255).all()
+        assert (view[2, 7] == 100).all()
+
+
+def test_a_halved_pair_keeps_the_proportions_of_its_pictures(tmp_path):
+    view = np.full((30, 40, 3), 90, np.uint8)
+    (tmp_path / "pair.jps").write_bytes(encode_jps(view, view, half=False))
+    pair = quilt_of_pair(tmp_path / "pair.jps", half=True)
+    assert (pair.view_size, pair.layout.aspect) == ((20, 30), pytest.approx(4 / 3))
 
 
 def test_contain_leaves_white_paper_on_both_sides(tmp_path):
