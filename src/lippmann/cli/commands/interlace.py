@@ -34,7 +34,8 @@ FitOption = Annotated[
 @with_options
 def interlace(
     photos: Annotated[
-        list[Path], typer.Argument(help="Photographs or frames, in natural order, or stereo pairs; or their folder.")
+        list[Path],
+        typer.Argument(help="Photographs or frames, in natural order, stereo pairs, or an animation; or their folder."),
     ],
     output: options.OptionalOutput = None,
     display: Annotated[
