@@ -48,18 +48,8 @@ _MIDDLE = float(np.nextafter(np.float32(MAX_NULL_TRANSMITTANCE), np.float32(0)))
 class SurfaceHit:
     """Surface at the first hit of each ray; all 0 where ``hit`` is False.
 
-    Attributes
-    ----------
-    hit:
-        Whether the ray hits a surface.
-    p:
-        The point.
-    n:
-        Unit shading normal, on the side that the ray comes from.
-    albedo:
-        Reflectance in [0, 1].
-    shape:
-        Index of the shape.
+    ``n`` is the unit shading normal at the point ``p``, on the side that the ray comes from; ``albedo`` the reflectance
+    in [0, 1]; ``shape`` the index of the shape.
     """
 
     hit: Bool

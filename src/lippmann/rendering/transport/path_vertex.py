@@ -35,16 +35,8 @@ DIMENSIONS = 8
 class LastVertex:
     """Where a path last scattered; straight-through surfaces do not count.
 
-    Attributes
-    ----------
-    p:
-        The point.
-    pdf:
-        Per steradian, of the direction taken there.
-    is_delta:
-        Whether the lobe had no width.
-    emitter_samples:
-        How many are taken there.
+    ``pdf`` per steradian is that of the direction taken there, ``is_delta`` says that the lobe had no width;
+    ``emitter_samples`` is how many are taken at the point ``p``.
     """
 
     p: Point3f
@@ -138,18 +130,10 @@ class Scattering:
 
 @dataclass
 class Trail:
-    """How a path has come from the eye to its current ray.
+    """How a path has come from the eye to its current ray, from ``o`` along ``d`` in world space.
 
-    Attributes
-    ----------
-    o, d:
-        World-space origin and direction of the ray.
-    depth, crossings:
-        Surfaces hit so far: those that scattered, and those that the path crossed straight through.
-    last:
-        Where it last scattered.
-    all_specular:
-        Whether no emitter has been sampled yet.
+    ``depth`` and ``crossings`` count the surfaces hit so far, those that scattered and those passed straight through.
+    ``last`` is where it last scattered. ``all_specular`` says that no emitter has been sampled yet.
     """
 
     o: Point3f
