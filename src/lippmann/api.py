@@ -39,9 +39,9 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from lippmann.image import IntegralImage
+    from lippmann.image.preview import Preview
     from lippmann.quilts.quilt import Quilt
     from lippmann.rendering.forecast import Forecast
-    from lippmann.rendering.preview import Preview
     from lippmann.studio_app.notebook import NotebookStudio
     from lippmann.tiles.tiled_render import Rendered, Runner
 

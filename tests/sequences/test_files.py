@@ -20,8 +20,8 @@ import pytest
 from lippmann.display import load_display
 from lippmann.errors import PictureError
 from lippmann.image import Provenance
+from lippmann.image.preview import Preview
 from lippmann.options.placement import PlacementOptions
-from lippmann.rendering.preview import Preview
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime.atomic_write import temporary_file
 from lippmann.sequences.files import journal_of, save_sequence

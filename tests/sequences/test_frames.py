@@ -9,9 +9,9 @@ from lippmann import api
 from lippmann.display import load_display
 from lippmann.errors import SceneError, UsageError
 from lippmann.image import Provenance
+from lippmann.image.preview import Preview
 from lippmann.options.placement import PlacementOptions
 from lippmann.options.scene import SceneOptions
-from lippmann.rendering.preview import Preview
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import place
 from lippmann.sequences.frames import (

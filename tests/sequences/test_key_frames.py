@@ -10,9 +10,9 @@ import pytest
 import lippmann
 from lippmann.display import load_display
 from lippmann.image import Provenance
+from lippmann.image.preview import Preview
 from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
-from lippmann.rendering.preview import Preview
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.values.whitted_scene import CameraPose
 from lippmann.sequences.cuts import Moment

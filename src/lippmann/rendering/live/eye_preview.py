@@ -10,12 +10,12 @@ from dataclasses import replace
 
 from lippmann.display import Display
 from lippmann.display.visible_pixels import EyeMap, Floats, Vector
+from lippmann.image.preview import Preview
 from lippmann.options.choices import POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.film.memory_model import cut_wavefronts
 from lippmann.rendering.picture import describe_placement
-from lippmann.rendering.preview import Preview
 from lippmann.rendering.provenance import make_provenance
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
