@@ -47,7 +47,7 @@ def hard_scenes():
     return module.HARD_SCENES
 
 
-#: Scenes whose light the others have, too, and such with caustics, whose photons' noise `test_caustics` finds stated.
+#: Scenes whose light the others have, too, and such with caustics: `test_caustic_photons` judges their photons.
 LONG = ("crack", "mixed", "mirrors", "water")
 
 

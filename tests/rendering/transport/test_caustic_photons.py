@@ -322,7 +322,6 @@ def photons_of(scene_dict, **options):
     return CausticPhotons(scene, features, find_casters(scene), **({"samples": 1 << 18, "seed": 2} | options))
 
 
-@pytest.mark.long
 def test_passes_have_photons_of_their_own_and_shrinking_radii():
     from lippmann.rendering.transport.caustic_photons import radius_of_pass
 
