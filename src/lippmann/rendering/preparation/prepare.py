@@ -280,9 +280,7 @@ def trace_light_vertices(
     gain:
         Factor on radiance of the picture's exposure.
     """
-    if request.integrator != "path" or request.surfaces < 2:
-        return None
-    if gain * pilot.brightest_indirect <= 1:
+    if request.integrator != "path" or request.surfaces < 2 or gain * pilot.brightest_indirect <= 1:
         return None
     sampler, scene = integrator.light_sampler, integrator.scene
     passes = LightVertexPasses(scene, sampler, TUNING.pass_samples, request.seed, pilot.region)
