@@ -202,7 +202,7 @@ class PathIntegrator:
         secondary = mi.UInt32(0)
         shadow = mi.UInt32(0)
 
-        pi = scene.ray_intersect_preliminary(ray, active=active)
+        pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         first_distance = mi.Float(pi.t)
         view_dependent = mi.Bool(False)
 

@@ -141,7 +141,7 @@ def _trace_chain(
     at_first = integrator.first_emitter_samples(path)
     states = techniques.begin()
 
-    pi = scene.ray_intersect_preliminary(ray, active=active)
+    pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
     active &= _may_show_light(pi)
     while dr.hint(active, label="chain", exclude=[integrator, scene, stream, at_first]):
         toward = trail.ray
