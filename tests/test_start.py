@@ -24,6 +24,7 @@ RENDER = HELP | {"cython_runtime", "drjit", "imagecodecs", "mitsuba", "numpy"}
 BUDGETS = {
     "--help": (HELP, 21),
     "preview teapot": (RENDER, 197),
+    "render teapot": (RENDER, 202),
     "render model.glb": (RENDER, 226),
 }
 
@@ -45,10 +46,11 @@ def test_a_command_loads_no_more_than_it_may(command, tmp_path, cut_display, req
     if words != ["--help"]:
         request.getfixturevalue("engine")
         words += ["-q", "-o", "picture.png"]
+    if "render" in words:
+        words += ["-d", str(cut_display(96, 96))]
     if "model.glb" in words:
         import trimesh
 
-        words += ["-d", str(cut_display(96, 96))]
         trimesh.creation.box().export(tmp_path / "model.glb")
     modules = loaded(words, tmp_path)
     tops = {name.partition(".")[0] for name in modules}
