@@ -145,7 +145,7 @@ def length(
     key: str,
     scales: Mapping[str, float] = MILLIMETRES,
     per_inch: tuple[str, ...] = (),
-    unit: str = "",
+    unit: str = "mm",
     rule: str = LENGTH,
 ) -> float:
     """Millimetres of a text such as ``"6.8 mm"``.
@@ -153,13 +153,13 @@ def length(
     Parameters
     ----------
     text:
-        A number with a unit.
+        A number, with a unit or without one.
     key:
         Key that errors name.
     scales, per_inch:
         Units with their millimetres, and units that count per inch, which give the distance from one to the next.
     unit:
-        Unit of a number without one; empty: a number needs a unit.
+        Unit of a bare number; empty where it needs one.
     rule:
         What is said of a text that is no length.
 

@@ -70,7 +70,8 @@ def marks(
         printed = file.metadata_for(target).display
     else:
         icc = finishing.icc
-        finish = Finish(length(margin, "--margin"), finishing.mirror, None if icc is None else read_profile(icc))
+        profile = None if icc is None else read_profile(icc)
+        finish = Finish(length(margin, "--margin", unit=""), finishing.mirror, profile)
         image = picture_of_file(file, target)
         with naming(picture), console.progress() as progress:
             printed = write_finished(image, output, finish, icc=file.icc, bits=bits, progress=progress)
@@ -96,7 +97,7 @@ def _display_with_bleed(display: Display | None, bleed: str | None) -> Display |
     from lippmann.display.sheet_layout import with_bleed
     from lippmann.display.validation import length
 
-    width = length(bleed, "--bleed")
+    width = length(bleed, "--bleed", unit="")
     if display is None:
         rule = "a picture with its own record says its bleed itself; of others --display says the trim"
         raise UsageError("needs --display", where="--bleed", rule=rule)

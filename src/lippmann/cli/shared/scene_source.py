@@ -129,8 +129,8 @@ def sheet_of(display: Display, finishing: FinishOptions, *, in_frames: bool = Fa
     from lippmann.display.validation import length
 
     bleed, marks, icc = finishing.bleed, finishing.marks, finishing.icc
-    display = with_bleed(display, 0.0 if bleed is None else length(bleed, "--bleed"))
-    margin = None if marks is None else length(marks, "--marks")
+    display = with_bleed(display, 0.0 if bleed is None else length(bleed, "--bleed", unit=""))
+    margin = None if marks is None else length(marks, "--marks", unit="")
     finish = Finish(margin, finishing.mirror, None if icc is None else read_profile(icc))
     finish.display(display)  # which checks the margin
     return display, finish

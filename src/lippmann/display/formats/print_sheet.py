@@ -341,12 +341,13 @@ def print_of_texts(texts: Mapping[str, str]) -> Print:
             raise DisplayError(f"{key} is missing", where=key, rule="a print needs lpi (or print-lpi), ppi and size")
     numbers = {key: validation.plain_number(texts[key], key) for key in _NUMBERS if key in texts}
     lengths = {
-        key: validation.length(texts[key], key, rule=length_rule(key, validation.LENGTH))
+        key: validation.length(texts[key], key, unit="", rule=length_rule(key, validation.LENGTH))
         for key in _LENGTHS
         if key in texts
     }
     distance = texts.get("viewing-distance", f"{DEFAULT_DISTANCE}mm")
-    lengths["viewing-distance"] = math.inf if distance == INFINITE else validation.length(distance, "viewing-distance")
+    is_far = distance == INFINITE
+    lengths["viewing-distance"] = math.inf if is_far else validation.length(distance, "viewing-distance", unit="")
     values = {key.replace("-", "_"): value for key, value in (numbers | lengths).items()}
     try:
         return Print(size=validation.size(texts["size"], "size"), sheet=texts.get("sheet"), **values)
