@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import faulthandler
+import gc
 import json
 import math
 import os
@@ -60,6 +61,16 @@ def pytest_pycollect_makeitem():
             if (item.callspec.id in named) == bool(mark.args):
                 item.add_marker("long")
     return items
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Collect ten thousand tests without searching them for garbage again and again, now and while they run."""
+    gc.disable()
+    result = yield
+    gc.enable()
+    gc.freeze()
+    return result
 
 
 def pytest_generate_tests(metafunc):
