@@ -58,6 +58,13 @@ class Photograph:
         """An upright picture of decoded codes."""
         return Photograph((codes.shape[1], codes.shape[0]), icc, 1, notes, lambda: codes)
 
+    @staticmethod
+    def of_frame(picture: Image.Image, number: int, notes: tuple[str, ...] = ()) -> Photograph:
+        """Picture ``number`` of an open file of several, from 0 on, decoded and upright."""
+        picture.seek(number)
+        codes = orientations.upright(codes_of(picture), orientations.of_picture(picture))
+        return Photograph.of_codes(codes, picture.info.get("icc_profile") or b"", notes)
+
     def codes(self) -> Pixels:
         """Codes ``(H, W, 1 to 4)``, uint8 or uint16: grey or RGB, with or without alpha. Float TIFF gives floats."""
         return self._decode()

@@ -14,9 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lippmann.codecs import orientation as orientations
 from lippmann.codecs.photograph import Photograph, open_photograph
-from lippmann.codecs.pillow_formats import codes_of, open_picture
+from lippmann.codecs.pillow_formats import open_picture
 from lippmann.codecs.types import FILMS, Pixels
 from lippmann.errors import PictureError
 
@@ -129,9 +128,4 @@ def _read_mpo(path: Path) -> tuple[Photograph, Photograph]:
         if len(numbers) < 2:
             raise PictureError("holds one picture", where=str(path), rule="an MPO file of a pair holds two")
         notes = (f"it holds {len(numbers)} views: the first two are shown",) if len(numbers) > 2 else ()
-        views = []
-        for number in numbers[:2]:
-            picture.seek(number)
-            codes = orientations.upright(codes_of(picture), orientations.of_picture(picture))
-            views.append(Photograph.of_codes(codes, picture.info.get("icc_profile") or b"", notes))
-    return views[0], views[1]
+        return Photograph.of_frame(picture, numbers[0], notes), Photograph.of_frame(picture, numbers[1], notes)

@@ -18,7 +18,7 @@ import numpy as np
 from lippmann.codecs.icc import Profile, convert_picture
 from lippmann.codecs.photograph import Photograph, open_photograph, report_errors
 from lippmann.codecs.picture_notes import FileNotes
-from lippmann.codecs.pillow_formats import BYTES_PER_PIXEL, codes_of, open_picture
+from lippmann.codecs.pillow_formats import BYTES_PER_PIXEL, open_picture
 from lippmann.codecs.stereo_pairs import HEIF, PAIRS, read_pair
 from lippmann.codecs.types import Pixels
 from lippmann.color.transfer import quantize
@@ -232,16 +232,12 @@ def _views_in(path: Path) -> list[_Source]:
 
 def _frames_of(path: Path) -> list[_Source]:
     """The frames of an animation."""
-    views = []
     with report_errors(path), open_picture(path) as picture:
         count, (width, height) = getattr(picture, "n_frames", 1), picture.size
         check_input(
             BYTES_PER_PIXEL * width * height * count, f"{count} pictures of {width} x {height}", where=str(path)
         )
-        for number in range(count):
-            picture.seek(number)
-            views.append(Photograph.of_codes(codes_of(picture), picture.info.get("icc_profile") or b""))
-    return [_Source(path, view) for view in views]
+        return [_Source(path, Photograph.of_frame(picture, number)) for number in range(count)]
 
 
 class _Header(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.scene.matrices import transform_points
-from lippmann.scene.parsing.points_lines import MOST, POINTS_NOTE, Width, as_mesh, thin_out, width_of
+from lippmann.scene.parsing.points_lines import POINTS_NOTE, Width, as_mesh, thin_to_most, width_of
 from lippmann.scene.splat_clouds import bulk_of
 from lippmann.scene.values.description import Instance, Material, Matrix, Mesh, SceneDescription
 
@@ -51,10 +51,8 @@ def describe_cloud(cloud: Mesh, material: Material, notes: Sequence[str]) -> Sce
 
     Nearly all such points come from scanners, which record the light with the colour.
     """
-    step = max(1, -(-len(cloud.faces) // MOST))
-    what = "lines" if cloud.faces.shape[1] == 2 else "points"
-    left_out = [f"of {len(cloud.faces)} {what} one in {step} is drawn"] if step > 1 else []
-    meshes, width = draw_thin([thin_out(cloud, step)])
+    thinned, left_out = thin_to_most([cloud])
+    meshes, width = draw_thin(thinned)
     material = replace(material, unlit=cloud.colors is not None)
     instances = [Instance(number, np.eye(4)) for number in range(len(meshes))]
     return SceneDescription(cloud.name, meshes, [material], instances, notes=[*notes, *left_out, width.note])

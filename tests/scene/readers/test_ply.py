@@ -278,7 +278,7 @@ def test_points_without_coordinates_are_left_out(read):
 
 
 def test_of_too_many_points_some_are_drawn(read, monkeypatch):
-    monkeypatch.setattr("lippmann.scene.point_clouds.MOST", 2)
+    monkeypatch.setattr("lippmann.scene.parsing.points_lines.MOST", 2)
     scene = read((header("ascii", faces=0) + "".join(f"{x} {y} {z}\n" for x, y, z in VERTICES)).encode())
     assert scene.notes[0] == "of 5 points one in 3 is drawn"
     balls = np.split(scene.meshes[0].positions, 2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -88,6 +89,14 @@ def thin_out(thin: Mesh, step: int) -> Mesh:
         uvs=tuple(uvs[used] for uvs in thin.uvs),
         colors=None if thin.colors is None else thin.colors[used],
     )
+
+
+def thin_to_most(thin: Sequence[Mesh]) -> tuple[list[Mesh], list[str]]:
+    """As many of the points, or of the lines, of all meshes as are drawn, and a note where that is not all."""
+    count = sum(len(mesh.faces) for mesh in thin)
+    what = "lines" if thin[0].faces.shape[1] == 2 else "points"
+    step = max(1, -(-count // MOST))
+    return [thin_out(mesh, step) for mesh in thin], [f"of {count} {what} one in {step} is drawn"] if step > 1 else []
 
 
 def as_mesh(thin: Mesh, world_from_mesh: Points, width: float | FloatArray, material: int) -> Mesh:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from lippmann.errors import SceneError
 from lippmann.scene.matrices import transform_points
 from lippmann.scene.parsing.files import texels_of
-from lippmann.scene.parsing.points_lines import MOST, thin_out
+from lippmann.scene.parsing.points_lines import thin_to_most
 from lippmann.scene.parsing.vertex_colors import COLORED, GREY, linear_colors, material_of
 from lippmann.scene.point_clouds import draw_thin
 from lippmann.scene.values.description import (
@@ -88,14 +88,12 @@ def from_trimesh(source: trimesh.Scene | trimesh.parent.Geometry) -> SceneDescri
         elif name in thin:
             places = transform_points(np.asarray(matrix, np.float64), thin[name].positions.astype(np.float64))
             placed.append(replace(thin[name], positions=places.astype(np.float32)))
-    for size, what in ((1, "points"), (2, "lines")):
+    for size in (1, 2):  # points, lines
         chosen = [mesh for mesh in placed if mesh.faces.shape[1] == size]
-        step = -(-sum(len(mesh.faces) for mesh in chosen) // MOST)
-        if step > 1:
-            notes.append(f"of the {what} one in {step} is drawn")
-        if step:
-            solid, width = draw_thin([thin_out(mesh, step) for mesh in chosen])
-            notes.append(width.note)
+        if chosen:
+            thinned, left_out = thin_to_most(chosen)
+            solid, width = draw_thin(thinned)
+            notes += [*left_out, width.note]
             instances += [Instance(len(meshes) + number, np.eye(4)) for number in range(len(solid))]
             meshes += solid
     cameras = [_from_trimesh_camera(scene)] if scene.has_camera else []
