@@ -2,6 +2,7 @@
 
 import base64
 import io
+import re
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from lippmann.scene.extent import bounds_of
 from lippmann.scene.matrices import transform_points
 from lippmann.scene.placement import place
 from lippmann.scene.readers.depth_layers import EDGE, split_layers
-from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map, says_disparity
+from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map
 from lippmann.scene.readers.load import load_scene
 
 DEPTH = np.array([[1.0, 2.0, 4.0], [2.0, 0.0, np.nan]], np.float32)
@@ -385,7 +386,7 @@ def test_unknown_depth_is_filled_from_beside(tmp_path):
     depth[:, 10:] = 4.0
     depth[5:8, 2:5] = np.nan
     scene = scene_of(tmp_path, depth)
-    assert scene.notes == ["2.2 % of the depth map have no depth and are filled from beside"]
+    assert scene.notes[1:] == ["2.2 % of the depth map have no depth and are filled from beside"]
     left = scene.meshes[0].positions[scene.meshes[0].positions[:, 0] < -0.1]
     assert left[:, 2] == pytest.approx(0.5)
 
@@ -411,33 +412,66 @@ def test_without_any_depth_there_is_no_scene(tmp_path):
         load_scene(tmp_path / "pair.jpg")
 
 
-@pytest.mark.parametrize("name", ["photo_disparity.npy", "disp0GT.pfm", "gt_disp_lowres.pfm", "photo-disp.png"])
+@pytest.mark.parametrize(
+    "name", ["photo_disparity.npy", "disp0GT.pfm", "gt_disp_lowres.pfm", "photo-dpt_large_384.pfm", "photo-disp.png"]
+)
 def test_a_map_whose_name_says_disparity_is_nearer_where_it_is_larger(tmp_path, name):
     path, photo = tmp_path / name, tmp_path / "photo.png"
     disparity = np.array([[0.0, 8.0, 2.0]] * 3, np.float32)
     if name.endswith(".png"):
         Pillow.fromarray(disparity.astype(np.uint16)).save(path)
+        disparity[:, 0] = np.nan  # unknown, as in KITTI's and Cityscapes'
     else:
         disparity[1, 1] = np.inf  # unknown, as in Middlebury's
         saved(path, disparity)
-    np.testing.assert_array_equal(read_depth_map(path).inverse[0], disparity[0])
-    assert np.isnan(read_depth_map(path).inverse[1, 1]) == np.isinf(disparity[1, 1])
+    np.testing.assert_array_equal(read_depth_map(path).inverse, np.where(np.isinf(disparity), np.nan, disparity))
     photo.write_bytes(encoded(np.zeros((3, 3, 3), np.uint8)))
     assert f"{name} is taken for disparity" in " ".join(load_scene(photo, depth_map=path).notes)
-    assert not says_disparity(tmp_path / "display.npy")
+    assert "taken for distances" in read_depth_map(saved(tmp_path / "display.npy", DEPTH)).note
+
+
+@pytest.mark.parametrize("top", [254, 255])
+def test_0_of_a_disparity_in_8_bits_is_unknown_where_they_are_not_stretched(tmp_path, top):
+    """Middlebury's maps of 8 bits hold 0 where nothing was measured."""
+    Pillow.fromarray(np.array([[0, 40, top]] * 3, np.uint8)).save(tmp_path / "disp1.png")
+    assert np.isnan(read_depth_map(tmp_path / "disp1.png").inverse[:, 0]).all() == (top < 255)
 
 
 @pytest.mark.parametrize(
-    ("codes", "is_stretched"), [([0, 200, 30000, 65400, 65535], True), ([0, 400, 900, 4000, 65535], False)]
+    ("name", "codes", "note"),
+    [
+        ("photo_depth.png", [0, 200, 30000, 65400, 65535], "spans all of its 16 bits, .* brighter is taken as nearer"),
+        ("photo_depth-far.png", [0, 200, 30000, 65400, 65535], "without a unit: larger values are farther"),
+        ("photo_depth-far.png", np.array([0, 1, 90, 254, 255], np.uint8), "without a unit: larger values are farther"),
+        ("photo_depth.npy", [0.0, 0.002, 0.5, 0.999, 1.0], "without a unit: larger values are farther"),
+        ("photo_depth.png", [0, 400, 900, 4000, 65535], None),
+    ],
 )
-def test_16_bits_over_their_whole_range_are_no_distances(tmp_path, codes, is_stretched):
+def test_maps_over_their_whole_range_are_no_distances(tmp_path, name, codes, note):
     """As estimates of depth are written; a depth camera has 0 and 65535 for what it does not know."""
-    path, photo = tmp_path / "photo_depth.png", tmp_path / "photo.png"
-    Pillow.fromarray(np.array([codes] * 2, np.uint16)).save(path)
-    steps = np.diff(read_depth_map(path).inverse[0, 1:])
-    assert ((steps > 0) == is_stretched).all()
+    path, photo = tmp_path / name, tmp_path / "photo.png"
+    if name.endswith(".npy"):
+        np.save(path, np.array([[codes] * 2], np.float32)[..., None])  # as Marigold's of Diffusers
+    else:
+        Pillow.fromarray(np.array([codes] * 2, getattr(codes, "dtype", np.uint16))).save(path)
+    inverse = read_depth_map(path).inverse[0]
+    if note is None:
+        assert (np.diff(inverse[1:]) < 0).all()
+    else:
+        sign = 1 if "brighter" in note else -1
+        assert inverse == pytest.approx(sign * np.asarray(codes, np.float32), abs=0.5 * (codes[-1] == 255))
     photo.write_bytes(encoded(np.zeros((2, 5, 3), np.uint8)))
-    assert any("brighter is taken as nearer" in note for note in load_scene(photo).notes) == is_stretched
+    notes = " ".join(load_scene(photo).notes)
+    assert re.search(note, notes) if note else "taken" not in notes
+
+
+def test_the_depth_of_an_archive_of_arrays(tmp_path):
+    """As Depth Pro writes it."""
+    np.savez_compressed(tmp_path / "a.npz", depth=DEPTH, focal=1.0)
+    assert read_depth_map(tmp_path / "a.npz").inverse == pytest.approx(INVERSE, nan_ok=True)
+    np.savez(tmp_path / "b.npz", focal=1.0)
+    with pytest.raises(SceneError, match=r"^b\.npz: is no depth map .*; .* of \.npz files the one called depth$"):
+        read_depth_map(tmp_path / "b.npz")
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ import base64
 import binascii
 import io
 import re
-import warnings
-from dataclasses import dataclass
+import zipfile
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,14 +21,18 @@ from lippmann.codecs.orientation import of_picture, upright
 from lippmann.codecs.pfm import read_pfm
 from lippmann.codecs.pillow_formats import RULE, open_picture
 from lippmann.codecs.rgbd_names import White
-from lippmann.errors import MemoryLimitError, PictureError, SceneError
+from lippmann.errors import LippmannError, MemoryLimitError, PictureError, SceneError
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import read_bytes
+from lippmann.scene.parsing.numpy_array import read_numpy_array
 
 #: Names of channels of OpenEXR that hold depth, by their own name or that of their layer, before those of any value.
 _CHANNELS = (r"Z", r".*depth(\.[ZVYRX])?", r".*\.Z", r"[VYR]")
-#: Names that say that larger values are nearer: ``disp0GT.pfm``, ``gt_disp_lowres.pfm``, ``photo_disparity.png``.
-_DISPARITY = re.compile(r"disparity|(?<![a-z])disp\d*(gt)?(?![a-z])", re.IGNORECASE)
+#: Names that say that larger values are nearer: ``disp0GT.pfm``, ``gt_disp_lowres.pfm``, ``photo_disparity.png``, and
+#: ``photo-dpt_large_384.pfm``, ``photo-midas_v21_384.pfm`` as MiDaS writes inverse depth.
+_DISPARITY = re.compile(r"disparity|(?<![a-z])(disp\d*(gt)?|dpt|midas)(?![a-z])", re.IGNORECASE)
+#: Names that say that dark is near: as of colour beside depth, and as Marigold's programs write depth.
+_DARK_NEAR = re.compile(r"-far$|marigold|depth_16bit", re.IGNORECASE)
 #: Mean difference of the channels of a grey picture, in codes of 8 bits, which JPEG's greys stay below.
 _MOST_TINT = 8.0
 
@@ -78,11 +82,6 @@ def of_disparity(disparity: NDArray[np.float32]) -> DepthMap:
     return DepthMap(np.where(np.isfinite(disparity), disparity, np.nan).astype(np.float32))
 
 
-def says_disparity(path: Path) -> bool:
-    """Whether a depth map's name says that it holds disparities, not distances."""
-    return _DISPARITY.search(path.stem) is not None
-
-
 def without_stairs(levels: NDArray[np.generic]) -> NDArray[np.float32]:
     """Whole numbers ``(h, w)`` as the smooth surface that they may have been rounded from.
 
@@ -108,8 +107,8 @@ def read_depth_map(path: Path) -> DepthMap:
     """Read a depth map.
 
     Floats (``.pfm``, ``.npy``, OpenEXR, TIFF) are metres, pictures of 16 bits millimetres, but disparities where the
-    name says so (:func:`says_disparity`). A picture of 8 bits, or one whose 16 bits are stretched to their whole range,
-    is brighter where something is nearer, as programs that estimate depth write it.
+    name says so. A picture of 8 bits, or one whose 16 bits are stretched to their whole range, is brighter where
+    something is nearer, as programs that estimate depth write it, unless the name says that dark is near.
 
     Raises
     ------
@@ -119,47 +118,68 @@ def read_depth_map(path: Path) -> DepthMap:
         It takes more memory than is left.
     """
     data = read_bytes(path)
-    suffix = path.suffix.lower()
-    convert = of_disparity if says_disparity(path) else of_depth
     check_input(2 * len(data), "the depth map", where=path.name)
     try:
-        if suffix == ".npy":
-            return convert(_one_channel(_numpy_array(path), path.name))
-        if suffix == ".pfm":
-            return convert(read_pfm(path))
-        if suffix == ".exr":
-            return convert(_exr(path))
+        values = _values(path, data)
     except PictureError as error:
         raise SceneError(error.what, where=path.name, rule=error.rule, fix=error.fix) from None
     except (ValueError, EOFError, OSError) as error:
         raise SceneError(f"is no depth map ({error})", where=path.name) from None
-    values, is_wide = _gray(data, path.name)
-    if is_wide and convert is of_depth and _is_stretched(values.astype(np.float64)):
-        note = f"{path.name} spans all of its 16 bits, as no distances do: brighter is taken as nearer"
-        return DepthMap(values.astype(np.float32), f"{note}; invert a map in which dark is near")
-    if values.dtype.kind == "f" or is_wide:  # a scale is no matter
-        return convert(values.astype(np.float32))
-    return DepthMap(without_stairs(values))
+    is_float, is_wide = values.dtype.kind == "f", values.dtype.itemsize > 1
+    with np.errstate(over="ignore"):
+        levels = values.astype(np.float32) if is_wide else without_stairs(values)
+    if _DISPARITY.search(path.stem):
+        if not is_float and values.max() < (65535 if is_wide else 255):  # one that is not stretched has no 0
+            levels = np.where(values > 0, levels, np.float32(np.nan))
+        note = f"{path.name} is taken for disparity, as its name says: larger values are nearer"
+        return replace(of_disparity(levels), note=note)
+    is_stretched = is_wide and _is_stretched(values, 1.0 if is_float else 65535.0)
+    farther = "larger values are farther; say disparity in its name if they are nearer"
+    if is_wide and not is_stretched:
+        return replace(of_depth(levels), note=f"{path.name} is taken for distances: {farther}" if is_float else "")
+    if is_float or _DARK_NEAR.search(path.stem):
+        return DepthMap(-levels, f"{path.name} is taken for depth without a unit: {farther}")
+    note = f"{path.name} spans all of its 16 bits, as maps without a unit do: brighter is taken as nearer"
+    return DepthMap(levels, f"{note}; if dark is near, end its name with -far" if is_wide else "")
 
 
-def _is_stretched(values: NDArray[np.float64]) -> bool:
-    """Whether 16 bits reach from 0 to 65535 without a gap of a 256th at either end.
+def _values(path: Path, data: bytes) -> NDArray[np.generic]:
+    """Values ``(h, w)`` of a file, upright: floats, or whole numbers, one byte each if it holds grey levels."""
+    suffix = path.suffix.lower()
+    if suffix in (".npy", ".npz"):
+        return _numpy_array(data, path.name)
+    if suffix == ".pfm":
+        return read_pfm(path)
+    return _exr(path) if suffix == ".exr" else _gray(data, path.name)
+
+
+def _is_stretched(values: NDArray[np.generic], top: float) -> bool:
+    """Whether values reach from 0 to ``top`` without a gap of a 256th at either end.
 
     Programs that estimate depth stretch it so; in distances 0 and 65535 stand for what is unknown, far from all others.
     """
-    ends, level = (0, 65535), 256
-    within = values[(values > ends[0]) & (values < ends[1])]
-    is_whole = (values.min(), values.max()) == ends and within.size > 0
-    return bool(is_whole and within.min() < level and within.max() > ends[1] - level)
+    within = values[(values > 0) & (values < top)]
+    is_whole = (values.min(), values.max()) == (0, top) and within.size > 0
+    return bool(is_whole and within.min() < top / 256.0 and within.max() > top - top / 256.0)
 
 
-def _numpy_array(path: Path) -> NDArray[np.generic]:
+def _numpy_array(data: bytes, where: str) -> NDArray[np.generic]:
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of a header's odd Python
-            return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
+        if data.startswith(b"PK"):
+            with zipfile.ZipFile(io.BytesIO(data)) as archive, archive.open("depth.npy") as file:
+                values = read_numpy_array(file, "depth", where)
+        else:
+            values = read_numpy_array(io.BytesIO(data), "depth", where)
+        values = np.squeeze(values) if values.ndim > 2 else values
+    except LippmannError:
+        raise
     except Exception as error:  # a header is read as Python, whose own errors come through
-        raise SceneError(f"is no depth map ({error})", where=path.name, rule="an array of numbers") from error
+        rule = "an array of numbers, of .npz files the one called depth"
+        raise SceneError(f"is no depth map ({error})", where=where, rule=rule) from error
+    if values.ndim != 2 or not values.size:
+        raise SceneError(f"is an array {values.shape} of {values.dtype}", where=where, rule="depth is (h, w) numbers")
+    check_input(4 * values.size, "the depth map", where=where)
+    return values
 
 
 def _exr(path: Path) -> NDArray[np.float32]:
@@ -186,18 +206,8 @@ def _color_error(where: str) -> SceneError:
     return SceneError("is a picture in colours", where=where, rule="depth is grey", fix="save it without a colour map")
 
 
-def _one_channel(values: NDArray[np.generic], where: str) -> NDArray[np.float32]:
-    if values.ndim == 3 and values.shape[2] == 1:
-        values = values[..., 0]
-    if values.ndim != 2 or values.dtype.kind not in "fiu":
-        raise SceneError(f"is an array {values.shape} of {values.dtype}", where=where, rule="depth is (h, w) numbers")
-    check_input(4 * values.size, "the depth map", where=where)
-    with np.errstate(over="ignore"):
-        return np.asarray(values, np.float32)
-
-
-def _gray(data: bytes, where: str, turn: int | None = None) -> tuple[NDArray[np.generic], bool]:
-    """Values ``(h, w)`` of a grey picture, upright, and whether they have 16 bits.
+def _gray(data: bytes, where: str, turn: int | None = None) -> NDArray[np.generic]:
+    """Values ``(h, w)`` of a grey picture, upright: levels of one byte, longer whole numbers, or floats.
 
     ``turn`` is its EXIF orientation; None for that in the file.
     """
@@ -208,18 +218,18 @@ def _gray(data: bytes, where: str, turn: int | None = None) -> tuple[NDArray[np.
         with open_picture(io.BytesIO(data)) as picture:
             turn = of_picture(picture) if turn is None else turn
             if picture.mode == "F":
-                return upright(np.asarray(picture, np.float32), turn), False
+                return upright(np.asarray(picture, np.float32), turn)
             if picture.mode.startswith("I"):
-                return upright(np.asarray(picture).astype(np.int64), turn), True
+                return upright(np.asarray(picture).astype(np.int64), turn)
             if len(picture.getbands()) > 2 or picture.mode == "P":
                 _check_grey(np.asarray(picture.convert("RGB")), where)
-            return upright(without_ringing(np.asarray(picture.convert("L")), data), turn), False
+            return upright(without_ringing(np.asarray(picture.convert("L")), data), turn)
     except SceneError:
         raise
     except MemoryLimitError as error:
         raise MemoryLimitError(error.what, where=where, rule=error.rule, fix=error.fix) from None
     except UnidentifiedImageError:
-        raise SceneError("is no depth map", where=where, rule=f".pfm, .npy, .exr, {RULE}") from None
+        raise SceneError("is no depth map", where=where, rule=f".pfm, .npy, .npz, .exr, {RULE}") from None
     except Exception as error:  # Pillow's decoders pass on whatever their libraries throw at damaged data
         raise SceneError(f"cannot be decoded ({error})", where=where) from error
 
@@ -229,12 +239,12 @@ def _check_grey(codes: NDArray[np.uint8], where: str) -> None:
         raise _color_error(where)
 
 
-def _luminance(values: NDArray[np.generic], where: str) -> tuple[NDArray[np.generic], bool]:
-    """Grey of ``(h, w, 1 to 4)`` values, by the weights of Rec. 601, and whether they are whole numbers of 16 bits."""
+def _luminance(values: NDArray[np.generic], where: str) -> NDArray[np.generic]:
+    """Grey of ``(h, w, 1 to 4)`` values, of colours of 8 bits by the weights of Rec. 601."""
     if values.shape[2] >= 3 and values.dtype == np.uint8:
         _check_grey(np.asarray(values[..., :3], np.uint8), where)
-        return np.rint(values[..., :3] @ np.array([0.299, 0.587, 0.114])).astype(np.uint8), False
-    return values[..., 0], values.dtype.kind in "iu" and values.dtype.itemsize > 1
+        return np.rint(values[..., :3] @ np.array([0.299, 0.587, 0.114])).astype(np.uint8)
+    return values[..., 0]
 
 
 def of_nearness(codes: NDArray[np.generic], white: White, where: str) -> DepthMap:
@@ -269,7 +279,7 @@ def embedded_depth(data: bytes, where: str, turn: int = 1) -> DepthMap | None:
     """
     apple = _APPLE_DISPARITY.search(data) if data.startswith(_START_OF_IMAGE) else None
     if apple is not None and (start := data.rfind(_START_OF_IMAGE, 1, apple.start())) > 0:
-        return DepthMap(without_stairs(_gray(data[start:], where, turn)[0]))
+        return DepthMap(without_stairs(_gray(data[start:], where, turn)))
     entries: dict[bytes, bytes] = {}
     xmp = _xmp(data)
     for prefix in dict.fromkeys((b"GDepth", *_GDEPTH.findall(xmp))):
@@ -284,7 +294,8 @@ def embedded_depth(data: bytes, where: str, turn: int = 1) -> DepthMap | None:
         raise SceneError(f"has depth that is not readable ({error})", where=where, rule="GDepth in XMP") from None
     if not 0.0 < near < far < np.inf:
         raise SceneError(f"has depth from {near:g} to {far:g}", where=where, rule="near is above 0, far beyond it")
-    values, is_wide = _gray(encoded, where, turn)
+    values = _gray(encoded, where, turn)
+    is_wide = values.dtype.itemsize > 1
     share = values.astype(np.float32) / np.float32(65535.0) if is_wide else without_stairs(values) / np.float32(255.0)
     if entries.get(b"Format") == b"RangeLinear":
         return of_depth((near + share * (far - near)).astype(np.float32))

@@ -26,14 +26,13 @@ from lippmann.scene.readers.depth_map import (
     embedded_depth,
     of_nearness,
     read_depth_map,
-    says_disparity,
     without_ringing,
 )
 from lippmann.scene.values.description import Image, Instance, Material, Mesh, SceneDescription, Texture
 
 #: How the name of a depth map goes on after that of its photograph, and how it ends.
 _DEPTH = re.compile(
-    r"[-_. ]?(depth|depthmap|depth[-_ ]map|disparity)(\.(png|jpe?g|webp|tiff?|exr|pfm|npy))", re.IGNORECASE
+    r"[-_. ]?(depth|depthmap|depth[-_ ]map|disparity)(-far)?(\.(png|jpe?g|webp|tiff?|exr|pfm|npy|npz))", re.IGNORECASE
 )
 #: The end of a photograph's name that says that it is the one of both with the colours.
 _COLOR = re.compile(r"(?:^|[-_. ])(?:image|img|rgb|colou?r)$", re.IGNORECASE)
@@ -100,8 +99,6 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
                 fix += "; slices of a volume are read as .npy: numpy.save('a.npy', tifffile.imread('a.tif'))"
             raise SceneError("needs a depth map", where=path.name, rule=rule, fix=fix)
         notes = (*notes, f"depth from {depth_map.name}, which lies beside it")
-    if depth_map is not None and says_disparity(depth_map):
-        notes = (*notes, f"{depth_map.name} is taken for disparity, as its name says: larger values are nearer")
     chosen = read_depth_map(depth_map) if depth_map is not None else own
     assert chosen is not None
     notes = (*notes, *filter(None, [chosen.note]))

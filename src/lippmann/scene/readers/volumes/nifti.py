@@ -16,7 +16,7 @@ from lippmann.errors import SceneError, UsageError
 from lippmann.runtime.machine import check_input
 from lippmann.runtime.optional_import import optional
 from lippmann.scene.parsing.files import read_bytes
-from lippmann.scene.readers.volumes.parts import read_up_to
+from lippmann.scene.parsing.parts import read_up_to
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.volumes.description import WORLD_FROM_RAS, describe_volume
 

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import io
-import math
-import warnings
 import zipfile
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import LippmannError, SceneError, UsageError
-from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import read_bytes
-from lippmann.scene.readers.volumes.parts import read_up_to
+from lippmann.scene.parsing.numpy_array import read_numpy_array
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.volumes.description import describe_volume
 
 #: The array of an ``.npz`` file with the distances of voxels along its axes z, y and x.
 SPACING = "spacing"
-#: Most bytes of the text that tells of an array.
-_LONGEST_HEADER = 1 << 16
 _RULE = "an array (z, y, x) of real numbers"
 
 
@@ -53,7 +46,7 @@ def read_array(path: Path, *, series: str | None = None) -> SceneDescription:
             grid, spacing = _of_archive(path, series)
         else:
             with path.open("rb") as file:
-                grid = _array(file, where, where)
+                grid = read_numpy_array(file, where, where)
     except LippmannError:
         raise
     except Exception as error:  # noqa: BLE001  # it parses headers as Python, and raises errors of many kinds
@@ -72,7 +65,7 @@ def _of_archive(path: Path, series: str | None) -> tuple[NDArray[np.generic], ND
         spacing = np.ones(3)
         if SPACING in names:
             with archive.open(f"{SPACING}.npy") as file:
-                spacing = np.asarray(_array(file, SPACING, where), np.float64).ravel()
+                spacing = np.asarray(read_numpy_array(file, SPACING, where), np.float64).ravel()
             if len(spacing) != 3 or not np.isfinite(spacing).all() or spacing.min() <= 0.0:
                 raise SceneError("its spacing is no distance along z, y and x", where=where, rule="three numbers > 0")
         others = [name for name in names if name != SPACING]
@@ -83,31 +76,4 @@ def _of_archive(path: Path, series: str | None) -> tuple[NDArray[np.generic], ND
             raise SceneError(f"holds {listed}", where=where, rule="one array is shown", fix="choose it with series=...")
         chosen = series or others[0]
         with archive.open(f"{chosen}.npy") as file:
-            return _array(file, chosen, where), spacing
-
-
-def _array(file: IO[bytes], name: str, where: str) -> NDArray[np.generic]:
-    """The array of a file, its memory asked for before it is taken."""
-    begin = read_up_to(file, 10)
-    wide = begin[6:7] != b"\x01"  # the length of the header takes four bytes
-    begin += read_up_to(file, 2 if wide else 0)
-    length = int.from_bytes(begin[8:], "little")
-    if length > _LONGEST_HEADER:
-        raise SceneError(f"'{name}' has a header of {length} bytes", where=where, rule=f"at most {_LONGEST_HEADER}")
-    head = io.BytesIO(begin + read_up_to(file, length))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Python's on damaged headers, NumPy's on old ones
-        np.lib.format.read_magic(head)
-        parse = np.lib.format.read_array_header_2_0 if wide else np.lib.format.read_array_header_1_0
-        shape, is_fortran, dtype = parse(head)
-    if dtype.kind not in "iufb" or dtype.itemsize > 8:
-        raise SceneError(f"'{name}' is of {dtype}", where=where, rule=_RULE)
-    if any(side < 0 or side > 1 << 40 for side in shape):
-        raise SceneError(f"'{name}' is {shape}", where=where, rule=_RULE)
-    size = math.prod(shape)
-    check_input(size * (dtype.itemsize + 4), f"'{name}'", where=where)
-    data = read_up_to(file, size * dtype.itemsize)
-    if len(data) < size * dtype.itemsize:
-        raise SceneError(f"holds {len(data)} of {size * dtype.itemsize} bytes of '{name}'", where=where)
-    array = np.frombuffer(data, dtype)
-    return array.reshape(shape[::-1]).T if is_fortran else array.reshape(shape)
+            return read_numpy_array(file, chosen, where), spacing
