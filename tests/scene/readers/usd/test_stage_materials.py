@@ -103,11 +103,15 @@ def test_values_come_through_the_materials_interface(read):
     assert read(body).materials[0].base_color == (0.5, 0.25, 0.125)
 
 
-def test_a_colour_texture(read):
+@pytest.mark.parametrize(
+    "undeclared", ["nothing", "token outputs:surface\n", "float3 outputs:rgb\n", "float2 outputs:result\n"]
+)
+def test_a_colour_texture(read, undeclared):
     body = surface(
         "color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>", texture(more='token inputs:wrapS = "mirror"')
     )
-    scene = read(body, files={"t.png": png(PICTURE)})
+    scene = read(body.replace(undeclared, "\n"), files={"t.png": png(PICTURE)})
+    assert scene.notes == []
     found = scene.materials[0].base_color_texture
     assert found.srgb
     assert found.image.pixels.tolist() == np.array(PICTURE)[..., :3].tolist()

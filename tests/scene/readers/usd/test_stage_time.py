@@ -40,6 +40,7 @@ def test_time_samples(stage):
     rest = load_scene(path).description
     assert place(rest) == [0, 0, 0]
     assert rest.notes == ["time samples are not played without frames=...; the stage is shown at its beginning"]
+    assert load_scene(stage(triangle())).description.notes == []
 
 
 def test_a_motion_of_a_stage(stage):

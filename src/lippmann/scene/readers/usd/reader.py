@@ -47,7 +47,7 @@ def read_usd(
     check_file(path)
     named = NamedFiles(path.resolve().parent, NamedFiles.of(path, files).anywhere)
     tree, arrays = ask_stage(path, variants or {}, None, named)
-    if tree["duration"] > 0.0:
+    if tree["moves"]:
         tree["notes"].append("time samples are not played without frames=...; the stage is shown at its beginning")
     return describe(tree, arrays, path, Assets(path, named))
 

@@ -11,6 +11,7 @@ from pxr import Sdf, Usd, UsdGeom
 from lippmann.runtime.helper_process import limit_memory, serve
 from lippmann.scene.readers.usd.records import Arrays, Record, pack
 from lippmann.scene.readers.usd.stage_layers import StageError, check_layers, choose_variants, used_files
+from lippmann.scene.readers.usd.stage_shading import declare_outputs
 from lippmann.scene.readers.usd.stage_traversal import Traversal
 
 #: C++ messages of a lack of memory.
@@ -71,9 +72,16 @@ def _read(request: Record, arrays: Arrays) -> Record:
         "meters_per_unit": float(stage.GetMetadata(UsdGeom.Tokens.metersPerUnit)),
         "up": str(UsdGeom.GetStageUpAxis(stage)),
         "duration": (end - start) / rate if is_timed else 0.0,
+        "moves": is_timed and _moves(stage),
         "files": used_files(stage),
         "notes": list(traversal.notes),
     }
+
+
+def _moves(stage: Usd.Stage) -> bool:
+    """Whether any value changes with time: many programs write a range of time codes in stages that stand still."""
+    prims = (prim for root in (stage.GetPseudoRoot(), *stage.GetPrototypes()) for prim in Usd.PrimRange(root))
+    return any(each.ValueMightBeTimeVarying() for prim in prims for each in prim.GetAuthoredAttributes())
 
 
 def _open(request: Record) -> tuple[Usd.Stage, dict[str, None]]:
@@ -88,6 +96,7 @@ def _open(request: Record) -> tuple[Usd.Stage, dict[str, None]]:
         stage = Usd.Stage.Open(layer, Usd.Stage.LoadAll)
         stage.held_layers, stage.missing_layers = held, missing
         choose_variants(stage, request["variants"])
+        declare_outputs(stage)
         _opened[key] = stage
     stage = _opened[key]
     return stage, dict.fromkeys(stage.missing_layers)

@@ -109,6 +109,18 @@ class MaterialTable:
         return passed
 
 
+def declare_outputs(stage: Usd.Stage) -> None:
+    """Declare the outputs that connections name and nodes lack, as files written by hand do; USD passes over these."""
+    with Usd.EditContext(stage, stage.GetSessionLayer()):
+        for prim in [prim for prim in stage.TraverseAll() if prim.IsA(UsdShade.Shader) or prim.IsA(UsdShade.NodeGraph)]:
+            for attribute in prim.GetAuthoredAttributes():
+                for source in attribute.GetConnections():
+                    node = UsdShade.Shader(stage.GetPrimAtPath(source.GetPrimPath()))
+                    name, kind = UsdShade.Utils.GetBaseNameAndType(source.name)
+                    if node and kind == UsdShade.AttributeType.Output and not stage.GetAttributeAtPath(source):
+                        node.CreateOutput(name, attribute.GetTypeName())
+
+
 def asset_record(attribute: Usd.Attribute, value: Sdf.AssetPath, time: Usd.TimeCode) -> Record:
     """A file that an attribute names: as it stands there, as USD finds it, and the folder of the layer that says so."""
     stack = attribute.GetPropertyStack(time)
