@@ -9,6 +9,7 @@ import re
 import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +83,7 @@ def of_disparity(disparity: NDArray[np.float32]) -> DepthMap:
     return DepthMap(np.where(np.isfinite(disparity), disparity, np.nan).astype(np.float32))
 
 
-def without_stairs(levels: NDArray[np.generic]) -> NDArray[np.float32]:
+def without_stairs(levels: NDArray[Any]) -> NDArray[np.float32]:
     """Whole numbers ``(h, w)`` as the smooth surface that they may have been rounded from.
 
     No value moves by more than the half that rounding took, so that edges and details stay; the 256 levels of a picture
@@ -96,7 +97,7 @@ def without_stairs(levels: NDArray[np.generic]) -> NDArray[np.float32]:
     return smooth
 
 
-def without_ringing(levels: NDArray[np.generic], data: bytes) -> NDArray[np.generic]:
+def without_ringing(levels: NDArray[Any], data: bytes) -> NDArray[Any]:
     """Levels ``(h, w, ...)`` of the picture file ``data``, without JPEG's ripples, which would be edges."""
     if not data.startswith(_START_OF_IMAGE):
         return levels
@@ -143,7 +144,7 @@ def read_depth_map(path: Path) -> DepthMap:
     return DepthMap(levels, f"{note}; if dark is near, end its name with -far" if is_wide else "")
 
 
-def _values(path: Path, data: bytes) -> NDArray[np.generic]:
+def _values(path: Path, data: bytes) -> NDArray[Any]:
     """Values ``(h, w)`` of a file, upright: floats, or whole numbers, one byte each if it holds grey levels."""
     suffix = path.suffix.lower()
     if suffix in (".npy", ".npz"):
@@ -153,7 +154,7 @@ def _values(path: Path, data: bytes) -> NDArray[np.generic]:
     return _exr(path) if suffix == ".exr" else _gray(data, path.name)
 
 
-def _is_stretched(values: NDArray[np.generic], top: float) -> bool:
+def _is_stretched(values: NDArray[Any], top: float) -> bool:
     """Whether values reach from 0 to ``top`` without a gap of a 256th at either end.
 
     Programs that estimate depth stretch it so; in distances 0 and 65535 stand for what is unknown, far from all others.
@@ -163,7 +164,7 @@ def _is_stretched(values: NDArray[np.generic], top: float) -> bool:
     return bool(is_whole and within.min() < top / 256.0 and within.max() > top - top / 256.0)
 
 
-def _numpy_array(data: bytes, where: str) -> NDArray[np.generic]:
+def _numpy_array(data: bytes, where: str) -> NDArray[Any]:
     try:
         if data.startswith(b"PK"):
             with zipfile.ZipFile(io.BytesIO(data)) as archive, archive.open("depth.npy") as file:
@@ -206,7 +207,7 @@ def _color_error(where: str) -> SceneError:
     return SceneError("is a picture in colours", where=where, rule="depth is grey", fix="save it without a colour map")
 
 
-def _gray(data: bytes, where: str, turn: int | None = None) -> NDArray[np.generic]:
+def _gray(data: bytes, where: str, turn: int | None = None) -> NDArray[Any]:
     """Values ``(h, w)`` of a grey picture, upright: levels of one byte, longer whole numbers, or floats.
 
     ``turn`` is its EXIF orientation; None for that in the file.
@@ -239,15 +240,15 @@ def _check_grey(codes: NDArray[np.uint8], where: str) -> None:
         raise _color_error(where)
 
 
-def _luminance(values: NDArray[np.generic], where: str) -> NDArray[np.generic]:
+def _luminance(values: NDArray[Any], where: str) -> NDArray[Any]:
     """Grey of ``(h, w, 1 to 4)`` values, of colours of 8 bits by the weights of Rec. 601."""
     if values.shape[2] >= 3 and values.dtype == np.uint8:
         _check_grey(np.asarray(values[..., :3], np.uint8), where)
-        return np.rint(values[..., :3] @ np.array([0.299, 0.587, 0.114])).astype(np.uint8)
+        return np.asarray(np.rint(values[..., :3] @ np.array([0.299, 0.587, 0.114])), np.uint8)
     return values[..., 0]
 
 
-def of_nearness(codes: NDArray[np.generic], white: White, where: str) -> DepthMap:
+def of_nearness(codes: NDArray[Any], white: White, where: str) -> DepthMap:
     """Depth map of a grey picture ``(h, w, 3)`` that is linear in inverse depth, of 8 bits or floats.
 
     Raises
