@@ -10,6 +10,7 @@ import math
 import os
 import re
 import signal
+import sys
 import tempfile
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -70,6 +71,19 @@ def pytest_collection():
     result = yield
     gc.enable()
     gc.freeze()
+    return result
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item, nextitem):
+    """Free the scenes of a file's tests after its last one.
+
+    Kernels take in the surfaces and emitters of all scenes that are alive: of the tests before, too, and which these
+    were would decide what is compiled.
+    """
+    result = yield
+    if "mitsuba" in sys.modules and (nextitem is None or nextitem.path != item.path):
+        gc.collect()
     return result
 
 

@@ -7,7 +7,10 @@ arrays that the kernel reads.
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
+from types import MethodType
+from typing import Any
 
 import drjit as dr
 import numpy as np
@@ -38,7 +41,8 @@ class Frozen:
     Parameters
     ----------
     kernel:
-        A function of Dr.Jit arrays of one width (or of width 1), whose results have that width.
+        A function of Dr.Jit arrays of one width (or of width 1), whose results have that width; a method does not keep
+        its object alive.
     reads:
         An object through whose attributes all other device arrays are reached that the kernel reads.
     changes:
@@ -48,12 +52,23 @@ class Frozen:
     def __init__(
         self, kernel: Callable[..., Array | tuple[Array, ...]], reads: object, *, changes: bool = False
     ) -> None:
-        known = None if changes else _opaque_arrays(reads)
-        self._recorded = dr.freeze(kernel, state_fn=lambda *_, **__: known or _opaque_arrays(reads))
+        self._kernel: Callable[[], Any] = (
+            weakref.WeakMethod(kernel) if isinstance(kernel, MethodType) else lambda: kernel
+        )
+        self._reads, self._known = reads, None if changes else _opaque_arrays(reads)
+        # A frozen function is a reference cycle: a scene that it held would live on until some collection, and all
+        # kernels that are compiled meanwhile would take in its surfaces and emitters.
+        of: Callable[[], Any] = weakref.ref(self)
+        self._recorded = dr.freeze(
+            lambda *arguments: of()._kernel()(*arguments), state_fn=lambda *_, **__: of()._state()
+        )
 
     def __call__(self, *arguments: Array) -> Array:
         with no_collection():
             return self._recorded(*arguments)
+
+    def _state(self) -> list[object]:
+        return self._known or _opaque_arrays(self._reads)
 
 
 def _opaque_arrays(reads: object) -> list[object]:

@@ -45,16 +45,11 @@ def teapot():
     return lippmann.load_scene("teapot")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def renderers(teapot):
-    made = {}
-
-    def renderer(name):
-        if name not in made:
-            made[name] = LiveRenderer(teapot, DISPLAYS[name])
-        return made[name]
-
-    return renderer
+    """Renderers of a test alone: the kernels of another one would take in their surfaces too."""
+    yield lambda name: LiveRenderer(teapot, DISPLAYS[name])
+    gc.collect()  # what `refine` keeps
 
 
 def refine(renderer, view):
@@ -106,14 +101,15 @@ def test_a_frame_through_the_real_lens_is_the_optical_replay_of_a_render(teapot,
     view = LiveView(eye, size, RealEyeMap, request=request)
     image = render(teapot, "print", spp=1, seed=5, tone_map="none")
     expected = quantize(image.replay(eye, size=size, optics=True), 8, "srgb")
-    assert psnr(renderers("print").frame(view).pixels, expected) > 32
+    renderer = renderers("print")
+    assert psnr(renderer.frame(view).pixels, expected) > 32
     for _ in range(20):
-        rest = refine(renderers("print"), view)
+        rest = refine(renderer, view)
         if rest is not None and rest.is_denoised:
             break
     # The light of whole paths, without noise, of the same place.
     assert rest.is_denoised
-    assert np.isfinite(renderers("print").pick(view, 0.5, 0.5))
+    assert np.isfinite(renderer.pick(view, 0.5, 0.5))
 
 
 @pytest.mark.slow
@@ -139,13 +135,29 @@ def test_a_rest_that_is_left_half_way_frees_its_pictures(renderers):
         gc.enable()
 
 
+def test_a_scene_is_freed_with_its_renderer(renderers):
+    """At once, too: kernels of the next scene would take in its surfaces and emitters."""
+    gc.collect()
+    gc.disable()
+    try:
+        renderer = renderers("square")
+        renderer.frame(LiveView(EYES[0], SIZE, request=RenderRequest(placement=PLACED)))
+        built = weakref.ref(renderer._kernels.built)
+        del renderer
+        assert built() is None
+    finally:
+        gc.enable()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["slanted", pytest.param("square", marks=pytest.mark.long)])
 def test_native_pixels_at_rest_are_those_of_a_render_with_as_many_samples(teapot, renderers, name):
     window = PixelWindow(20, 10, 30, 25)
     request = RenderRequest(placement=PLACED, integrator="path", depth=3, tone_map="pbr-neutral")
     view = LiveView(None, window=window, request=request)
-    frames = [refine(renderers(name), view) for _ in range(3)]
+    steps = renderers(name).refine_steps(view)
+    frames = [next(steps) for _ in range(3)]
+    del steps
     assert [frame.is_denoised for frame in frames] == [False] * 3
     assert frames[0].samples == 2 < frames[1].samples < frames[2].samples
     image = render(
@@ -280,8 +292,8 @@ def test_of_some_rows_one_is_traced_and_stands_for_all(renderers, name, top, hei
     panel, step = DISPLAYS[name].panel, 5
     window = None if height == panel.height else PixelWindow(3, top, 40, height)
     view = LiveView(None, window=window, request=RenderRequest(placement=PLACED))
-    whole = renderers(name).frame(view).pixels
-    coarse = renderers(name).frame(replace(view, row_step=step)).pixels
+    renderer = renderers(name)
+    whole, coarse = (renderer.frame(each).pixels for each in (view, replace(view, row_step=step)))
     rows = np.minimum(np.arange(height) // step * step + step // 2, height - 1)
     np.testing.assert_array_equal(coarse, whole[rows])
 
@@ -298,14 +310,15 @@ def test_a_newer_view_drops_the_samples_of_the_last(renderers):
 def test_heights_are_the_depth_that_a_render_shows(teapot, renderers):
     request = RenderRequest(placement=PLACED, pixel_filter="point")
     view = LiveView(EYES[0], SIZE, request=request)
-    found = renderers("square").heights(view)
+    renderer = renderers("square")
+    found = renderer.heights(view)
     image = render(teapot, "square", integrator="depth", pixel_filter="point", spp=1)
     expected = image.replay(EYES[0], size=SIZE)[..., 0]
     seen = np.isfinite(found)
     assert 0.1 < seen.mean() < 0.9
     assert np.abs(found - expected)[seen].max() < 1e-2
     row, column = np.argwhere(seen)[len(np.argwhere(seen)) // 2]
-    picked = renderers("square").pick(view, (column + 0.5) / SIZE[0], (row + 0.5) / SIZE[1])
+    picked = renderer.pick(view, (column + 0.5) / SIZE[0], (row + 0.5) / SIZE[1])
     assert picked == pytest.approx(found[row, column])
 
 
@@ -314,10 +327,11 @@ def test_what_cannot_be_shown_is_said(renderers):
         LiveView((0.0, 0.0, -1.0), SIZE)
     with pytest.raises(UsageError, match="at least 1x1"):
         LiveView(EYES[0], (0, 5))
+    renderer = renderers("square")
     with pytest.raises(UsageError, match="path and direct"):
-        renderers("square").frame(LiveView(EYES[0], SIZE, request=RenderRequest(integrator="normal")))
+        renderer.frame(LiveView(EYES[0], SIZE, request=RenderRequest(integrator="normal")))
     with pytest.raises(UsageError, match="0 to 1"):
-        renderers("square").pick(LiveView(EYES[0], SIZE), 2.0, 0.0)
+        renderer.pick(LiveView(EYES[0], SIZE), 2.0, 0.0)
 
 
 def test_splats_and_volumes_are_refused_and_the_scene_before_stays(renderers):

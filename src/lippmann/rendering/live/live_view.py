@@ -112,9 +112,9 @@ class PlacedView:
 
     def light_up(self, exposure: float) -> None:
         """Set the scene's light and exposure to those of this view, if another view was traced in between."""
-        if self.kernels.lit_for is self:
+        if self.kernels.lit_for is self.placed:
             return
         self.kernels.light(self.view.light, rotation_of(self.placement.world_from_display))
         whole = replace(self.placement, exposure=0.0)  # that of the camera is in it
         self.kernels.expose(self.display, replace(self.request, exposure=exposure), whole, measure=False)
-        self.kernels.lit_for = self
+        self.kernels.lit_for = self.placed

@@ -241,7 +241,7 @@ class LiveRenderer:
             else:
                 pixels = self._visible(self._map(view.eye_map, display, view.size, subpixels=subpixels), view.eye)
         placed_view = PlacedView(kernels, placement.traced(display), view, resolved, placement, placed, pixels)
-        kernels.lit_for = placed_view
+        kernels.lit_for = placed
         return placed_view
 
 

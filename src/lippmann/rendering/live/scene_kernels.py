@@ -54,7 +54,7 @@ class SceneKernels:
         self._features: dict[_Key, FeatureTracer] = {}
         self._exposure: float | None = None
         self._bounds_in = bounds_by_hull(session.scene)
-        #: The view whose light and exposure the scene has now.
+        #: The display as placed for the view whose light and exposure the scene has now.
         self.lit_for: object = None
 
     @property
