@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from .conftest import HEAD
 from .test_stage_materials import PICTURE, png, surface
 
 STANDARD, OPEN_PBR = "ND_standard_surface_surfaceshader", "ND_open_pbr_surface_surfaceshader"
@@ -246,14 +247,19 @@ def test_highlights_and_sheen(read):
         float inputs:sheen = 0.5
         color3f inputs:sheen_color = (1, 0.5, 0)
         float inputs:specular_anisotropy = 0.5
-        float inputs:thin_film_thickness = 0"""
+        float inputs:thin_film_thickness = 300
+        float inputs:thin_film_IOR = 1.4"""
     scene = read(material_x(STANDARD, inputs))
     material = scene.materials[0]
     assert (material.specular, material.specular_color) == (0.25, (1.0, 0.5, 0.0))
     assert (material.sheen_color, material.sheen_roughness) == ((0.5, 0.25, 0.0), pytest.approx(0.3))
+    film = (material.iridescence, material.iridescence_thickness_maximum, material.iridescence_ior)
+    assert film == (1.0, 300.0, pytest.approx(1.4))
     assert scene.notes == ["material /mat: not honoured: specular_anisotropy"]
     plain = read(material_x(STANDARD, "")).materials[0]
-    assert (plain.specular, plain.sheen_color) == (1.0, (0.0, 0.0, 0.0))
+    assert (plain.specular, plain.sheen_color, plain.iridescence) == (1.0, (0.0, 0.0, 0.0), 0.0)
+    film = read(material_x(OPEN_PBR, "float inputs:thin_film_weight = 0.5")).materials[0]
+    assert (film.iridescence, film.iridescence_thickness_maximum) == (0.5, 500.0)
 
 
 def test_a_picture_of_highlights(read):
@@ -275,6 +281,20 @@ def test_what_is_let_through_has_a_colour_of_its_own(read, kind, share):
     assert read(material_x(kind, through)).materials[0].base_color == (1.0, 1.0, 1.0)
     tinted = f"{through}\ncolor3f inputs:transmission_color = (1, 0.5, 0)"
     assert read(material_x(kind, tinted)).materials[0].base_color == (1.0, 0.5, 0.0)
+    head = HEAD.replace("metersPerUnit = 1", "metersPerUnit = 0.5")
+    within = read(material_x(kind, f"{tinted}\nfloat inputs:transmission_depth = 5"), head=head).materials[0]
+    assert (within.base_color, within.attenuation_color) == ((1.0, 1.0, 1.0), (1.0, 0.5, 0.0))
+    assert within.attenuation_distance == 2.5
+
+
+@pytest.mark.parametrize(
+    ("space", "color"),
+    [("acescg", (0.720, 0.162, 0.078)), ("lin_p3d65", (0.567, 0.187, 0.084))],
+)
+def test_colours_of_other_primaries(read, space, color):
+    """Values of pxr's ``Gf.ColorSpace.Convert``."""
+    given = f'color3f inputs:base_color = (0.5, 0.2, 0.1) (colorSpace = "{space}")'
+    assert read(material_x(STANDARD, given)).materials[0].base_color == pytest.approx(color, abs=0.002)
 
 
 def test_images_of_gltf(read):

@@ -53,11 +53,12 @@ class Surface:
 class SurfaceReader:
     """Makes materials of the inputs of ``UsdPreviewSurface``.
 
-    ``notes`` says what is not honoured.
+    ``notes`` says what is not honoured; ``unit`` is that of the stage in metres.
     """
 
     assets: Assets
     notes: dict[str, None]
+    unit: float
     _uv_names: list[str] = field(default_factory=list)
 
     def read(self, record: Record) -> Surface:
@@ -92,6 +93,7 @@ class SurfaceReader:
         transmission = min(max(self._number(inputs, "transmission", material.transmission), 0.0), 1.0)
         is_solid = transmission > material.transmission and not self._number(inputs, "thinWalled", 0.0)
         material = replace(material, transmission=transmission, thickness=float(is_solid))
+        material = self._with_film_and_depth(material, inputs)
         material = replace(material, normal_texture=self._normal_map(inputs))
         by_color, by_opacity = self._reads(inputs, "diffuseColor"), self._reads(inputs, "opacity")
         for unread in inputs.keys() - {"diffuseColor", "opacity"}:
@@ -192,6 +194,24 @@ class SurfaceReader:
             sheen_roughness=rough,
             sheen_roughness_texture=_in_alpha(rough_texture),
         )
+
+    def _with_film_and_depth(self, material: Material, inputs: Record) -> Material:
+        """A thin film, and the distance within at which light has the colour of what is let through."""
+        thickness = self._number(inputs, "filmThickness", 0.0) * self._number(inputs, "filmUnit", 1.0)
+        if thickness > 0.0:
+            film, texture = self._scalar(inputs, "film", 1.0)
+            material = replace(
+                material,
+                iridescence=film,
+                iridescence_texture=_in_channel(texture, 0),
+                iridescence_ior=max(self._number(inputs, "filmIor", 1.5), 1.0),
+                iridescence_thickness_maximum=thickness,
+            )
+        depth = self._number(inputs, "depth", 0.0) * self.unit
+        if depth > 0.0 and material.thickness:
+            color = _fraction(self._color(inputs, "depthColor", (1.0, 1.0, 1.0))[0])
+            material = replace(material, attenuation_color=color, attenuation_distance=depth)
+        return material
 
     def _number(self, inputs: Record, name: str, default: float) -> float:
         return _scalar_of(inputs.get(name), default)

@@ -6,8 +6,10 @@ import os
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdShade
 
+from lippmann.color.primaries import rec709_from_rgb
 from lippmann.color.transfer import decode_srgb
 from lippmann.scene.readers.usd.records import Record
 from lippmann.scene.readers.usd.stage_surfaces import (
@@ -15,6 +17,7 @@ from lippmann.scene.readers.usd.stage_surfaces import (
     is_coded,
     is_read,
     materialx_node,
+    primaries_of,
     surface_of,
     unread_inputs,
 )
@@ -81,11 +84,13 @@ class MaterialTable:
         attribute = attributes[0]
         name, kind = UsdShade.Utils.GetBaseNameAndType(attribute.GetName())
         if kind != UsdShade.AttributeType.Output:
-            value = attribute.Get(self._time)
+            value, space = attribute.Get(self._time), str(attribute.GetColorSpace())
             if isinstance(value, Sdf.AssetPath):
+                if primaries_of(space) is not None:
+                    self._notes[f"pictures in the colour space '{space}' are taken as those of Rec. 709"] = None
                 return {"asset": asset_record(attribute, value, self._time)}
-            if is_coded(str(attribute.GetColorSpace())) and str(attribute.GetTypeName()).startswith("color"):
-                value = type(value)(*decode_srgb(np.array(value)[:3]).tolist(), *list(value)[3:])
+            if str(attribute.GetTypeName()).startswith("color"):
+                value = type(value)(*_rec709(np.array(value)[:3], space), *list(value)[3:])
             return None if value is None else {"value": _plain(value)}
         node = UsdShade.Shader(attribute.GetPrim())
         node_kind = str(node.GetShaderId()) if node else ""
@@ -127,6 +132,13 @@ def asset_record(attribute: Usd.Attribute, value: Sdf.AssetPath, time: Usd.TimeC
     layer = stack[0].layer.realPath if stack else ""
     folder = os.path.dirname(layer.split("[")[0]) if layer else ""
     return {"name": value.path, "found": value.resolvedPath, "folder": folder}
+
+
+def _rec709(color: NDArray[np.float32], space: str) -> list[float]:
+    """A colour of a colour space as linear Rec. 709; beyond its primaries it is cut at 0."""
+    linear = decode_srgb(color) if is_coded(space) else color
+    primaries = primaries_of(space)
+    return (linear if primaries is None else np.maximum(rec709_from_rgb(primaries) @ linear, 0.0)).tolist()
 
 
 def _plain(value: Any) -> Any:

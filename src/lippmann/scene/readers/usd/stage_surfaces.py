@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -30,7 +30,8 @@ class _Model:
     """Inputs by those of ``UsdPreviewSurface``: name and default; and what multiplies them, with its default.
 
     ``subsurface`` is the share of light that is scattered below the surface, and has ``subsurface_color``;
-    ``transmission_color`` tints what is let through in place of the base. ``unread`` are shares of what is left out.
+    ``transmission_color`` tints what is let through in place of the base, within where there is a ``depth``. ``unread``
+    are shares of what is left out, and ``numbers`` inputs that are left out unless they are numbers.
     """
 
     inputs: dict[str, tuple[str, Any]]
@@ -39,6 +40,7 @@ class _Model:
     subsurface: str = ""
     transmission_color: str = ""
     unread: tuple[str, ...] = ()
+    numbers: tuple[str, ...] = ()
 
 
 _WHITE, _LIGHT_GREY = [1.0, 1.0, 1.0], [0.8, 0.8, 0.8]
@@ -60,12 +62,16 @@ _MODELS = {
             "highlightColor": ("specular_color", _WHITE),
             "sheenColor": ("sheen_color", _WHITE),
             "sheenRoughness": ("sheen_roughness", 0.3),
+            "filmThickness": ("thin_film_thickness", 0.0),
+            "filmIor": ("thin_film_IOR", 1.5),
+            "depth": ("transmission_depth", 0.0),
         },
         {"diffuseColor": ("base", 1.0), "emissiveColor": ("emission", 0.0), "sheenColor": ("sheen", 0.0)},
         "coat_color",
         "subsurface",
         "transmission_color",
-        ("specular_anisotropy", "thin_film_thickness", "transmission_depth"),
+        ("specular_anisotropy", "transmission_scatter"),
+        ("thin_film_thickness", "transmission_depth"),
     ),
     "ND_open_pbr_surface_surfaceshader": _Model(
         {
@@ -84,6 +90,11 @@ _MODELS = {
             "highlightColor": ("specular_color", _WHITE),
             "sheenColor": ("fuzz_color", _WHITE),
             "sheenRoughness": ("fuzz_roughness", 0.5),
+            "film": ("thin_film_weight", 0.0),
+            "filmThickness": ("thin_film_thickness", 0.5),
+            "filmUnit": ("", 1000.0),  # micrometres
+            "filmIor": ("thin_film_ior", 1.4),
+            "depth": ("transmission_depth", 0.0),
         },
         {
             "diffuseColor": ("base_weight", 1.0),
@@ -93,7 +104,8 @@ _MODELS = {
         "coat_color",
         "subsurface_weight",
         "transmission_color",
-        ("specular_roughness_anisotropy", "thin_film_weight", "transmission_depth"),
+        ("specular_roughness_anisotropy", "transmission_scatter"),
+        ("thin_film_thickness", "transmission_depth"),
     ),
     "ND_gltf_pbr_surfaceshader": _Model(
         {
@@ -111,9 +123,15 @@ _MODELS = {
             "highlightColor": ("specular_color", _WHITE),
             "sheenColor": ("sheen_color", [0.0, 0.0, 0.0]),
             "sheenRoughness": ("sheen_roughness", 0.0),
+            "film": ("iridescence", 0.0),
+            "filmThickness": ("iridescence_thickness", 100.0),
+            "filmIor": ("iridescence_ior", 1.3),
+            "depth": ("attenuation_distance", 0.0),
+            "depthColor": ("attenuation_color", _WHITE),
         },
         {"emissiveColor": ("emissive_strength", 1.0)},
-        unread=("anisotropy_strength", "iridescence", "dispersion", "attenuation_distance"),
+        unread=("anisotropy_strength", "dispersion"),
+        numbers=("iridescence_thickness", "attenuation_distance"),
     ),
     # Its emissive_intensity counts for a camera's exposure: the colour alone is taken.
     "OmniPBR": _Model(
@@ -214,8 +232,9 @@ def _kind_of(surface: UsdShade.Shader) -> str:
 
 def unread_inputs(kind: str, given: Record) -> list[str]:
     """Inputs that a surface has, and that make it look otherwise than it is shown."""
-    names = _MODELS[kind].unread if kind in _MODELS else ()
-    return [name for name in names if name in given and given[name].get("value") != 0.0]
+    model = _MODELS.get(kind, _Model({}))
+    unread = [name for name in model.unread if name in given and np.any(given[name].get("value", 1.0))]
+    return unread + [name for name in model.numbers if name in given and "value" not in given[name]]
 
 
 def as_preview(kind: str, given: Record) -> Record:
@@ -252,6 +271,8 @@ def as_preview(kind: str, given: Record) -> Record:
         inputs["diffuseColor"] = _mix(inputs["diffuseColor"], given.get("subsurface_color", {"value": _WHITE}), share)
     if through := _number(inputs, "transmission", 0.0) if model.transmission_color else 0.0:
         tint = given.get(model.transmission_color, {"value": _WHITE})
+        if _number(inputs, "depth", 0.0) > 0.0 and not _number(inputs, "thinWalled", 0.0):
+            inputs["depthColor"], tint = tint, {"value": _WHITE}
         inputs["diffuseColor"] = _mix(inputs["diffuseColor"], tint, through)
     coat, tint = _number(inputs, "clearcoat", 0.0), given.get(model.coat_color)
     if coat > 0.0 and tint is not None:
@@ -338,6 +359,19 @@ def _number(given: Record, name: str, default: float) -> float:
 
 
 _CODED = re.compile(r"(?!.*lin).*(?:srgb|g\d\d|gamma|rec709_display)", re.IGNORECASE)
+
+
+#: Chromaticities of red, green, blue and white of colour spaces, by what their names hold.
+_PRIMARIES = {
+    "ap1|acescg": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
+    "p3": (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
+    "2020": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
+}
+
+
+def primaries_of(space: str) -> Sequence[float] | None:
+    """The chromaticities of a colour space of MaterialX or USD; None for those of Rec. 709 and unknown ones."""
+    return next((each for words, each in _PRIMARIES.items() if re.search(words, space, re.IGNORECASE)), None)
 
 
 def is_coded(space: str) -> bool:
