@@ -144,6 +144,8 @@ def test_four_views_of_leia_begin_at_the_top_left(tmp_path):
     assert [quilt.view_values(number)[0, 0, 0] for number in range(4)] == [0, 1, 2, 3]
     asked = read_quilt(tmp_path / "photo_2x2.png", QuiltLayout(2, 2, 2.0))
     assert [asked.view_values(number)[0, 0, 0] for number in range(4)] == [2, 3, 0, 1]
+    pair = read_quilt(tmp_path / "photo_2x2.png", QuiltLayout(1, 2, None))  # one above the other, the left one on top
+    assert [pair.view_values(number)[0, 0, 0] for number in range(2)] == [0, 2]
 
 
 def test_webp_quilts_are_read(tmp_path):

@@ -46,6 +46,8 @@ _PHOTOGRAPHS = (".jpg", ".jpeg", ".webp", ".avif", ".bmp", ".ppm", ".gif", ".tga
 READ = (*FORMATS, *_PHOTOGRAPHS)
 #: End of the names of four views in the shape of the whole picture, the leftmost at the top left: Leia's.
 _FROM_TOP = "_2x2"
+#: A layout that no quilt has: stereo pairs one above the other, the left eye's on top.
+_PAIR_FROM_TOP = (1, 2)
 
 
 def is_quilt(path: Path) -> bool:
@@ -76,7 +78,7 @@ def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
         The file.
     layout:
         Columns, rows and aspect ratio. None: as the file's name says, such as ``_qs8x6a0.75``, or else its metadata.
-        Leia's four views, ``_2x2``, begin at the top left.
+        Leia's four views, ``_2x2``, begin at the top left, and 1 x 2 views that only ``layout`` tells of at the top.
 
     Raises
     ------
@@ -90,8 +92,9 @@ def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
     _check_ending(path)
     with open_view(path) as file:
         metadata = metadata_of_text(file.text, str(path))
-        from_top = layout is None and metadata is None and path.stem.endswith(_FROM_TOP)
-        if from_top:
+        is_unnamed = metadata is None and not names_layout(path)
+        from_top = is_unnamed and (path.stem.endswith(_FROM_TOP) if layout is None else layout[:2] == _PAIR_FROM_TOP)
+        if from_top and layout is None:
             layout = QuiltLayout(2, 2, file.size[0] / file.size[1])
         elif layout is None:
             # A name that says nothing is refused only where the metadata says nothing either.

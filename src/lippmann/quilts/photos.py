@@ -146,7 +146,11 @@ def read_photos(
     if len(sources) < 2:
         what = "one photograph is given" if sources else "no photographs are given"
         rule = f"at least 2 are interlaced, of {', '.join(ENDINGS)}"
-        fix = "weave two that stand side by side in it: lippmann weave --layout 2x1" if sources else ""
+        fix = (
+            "weave two that stand in it: lippmann weave --layout 2x1, or 1x2 with the left one on top"
+            if sources
+            else ""
+        )
         raise UsageError(what, rule=rule, fix=fix or "weave views of other formats")
     if fit is not None and fit not in get_args(Fit):
         raise UsageError.unknown("fit", fit, get_args(Fit), parameter="fit")
