@@ -37,7 +37,7 @@ DOCUMENT = """<?xml version="1.0"?>
     <input name="surfaceshader" type="surfaceshader" nodename="s"/>
   </surfacematerial>
   <UsdPreviewSurface name="p" type="surfaceshader">
-    <input name="diffuseColor" type="color3" value="0.2, 0.4, 0.6"/>
+    <input name="diffuseColor" type="color3" value="0.5, 0.75, 1" colorspace="srgb_texture"/>
     <input name="roughness" type="float" value="0.25"/>
   </UsdPreviewSurface>
   <surfacematerial name="plain" type="material">
@@ -73,11 +73,11 @@ def test_images_of_a_graph(read):
 
 @pytest.mark.parametrize(
     ("more", "color"),
-    [("", (0.2, 0.4, 0.6)), ('over "plain" {\ncolor3f inputs:diffuseColor = (1, 0, 0)\n}', (1.0, 0.0, 0.0))],
+    [("", (0.21404, 0.52252, 1.0)), ('over "plain" {\ncolor3f inputs:diffuseColor = (1, 0, 0)\n}', (1.0, 0.0, 0.0))],
 )
 def test_plain_values_and_those_that_a_stage_sets(read, more, color):
     material = read(looks("plain", more), files=FILES).materials[0]
-    assert material.base_color == pytest.approx(color)
+    assert material.base_color == pytest.approx(color, abs=1e-5)
     assert material.roughness == 0.25
 
 
@@ -87,7 +87,7 @@ def test_layers_that_stages_share_name_the_document_each_time(read, tmp_path):
     layered = HEAD.replace("(\n", "(\n    subLayers = [@look/part.usda@]\n", 1)
     for _ in range(2):
         scene = read("", head=layered, files=files)
-        assert scene.materials[0].base_color == pytest.approx((0.2, 0.4, 0.6))
+        assert scene.materials[0].base_color == pytest.approx((0.21404, 0.52252, 1.0), abs=1e-5)
         layered += "\n"  # another stage of the same layers
     assert (tmp_path / "look/part.usda").read_text() == part
 

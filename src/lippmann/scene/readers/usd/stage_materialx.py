@@ -120,6 +120,7 @@ class _Document:
                     own.GetAttr().SetConnections(given.GetAttr().GetConnections())
                 elif (value := given.Get()) is not None:
                     own.Set(value)
+                    own.GetAttr().SetColorSpace(given.GetAttr().GetColorSpace())
                 given.ConnectToSource(own)
             material.CreateSurfaceOutput("mtlx").ConnectToSource(shader.ConnectableAPI(), "out")
 
