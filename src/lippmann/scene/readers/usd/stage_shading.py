@@ -138,7 +138,7 @@ def _rec709(color: NDArray[np.float32], space: str) -> list[float]:
     """A colour of a colour space as linear Rec. 709; beyond its primaries it is cut at 0."""
     linear = decode_srgb(color) if is_coded(space) else color
     primaries = primaries_of(space)
-    return (linear if primaries is None else np.maximum(rec709_from_rgb(primaries) @ linear, 0.0)).tolist()
+    return [*map(float, linear if primaries is None else np.maximum(rec709_from_rgb(primaries) @ linear, 0.0))]
 
 
 def _plain(value: Any) -> Any:
