@@ -116,6 +116,18 @@ def test_a_texture_shows_its_colour_alone(read, tmp_path):
     assert scene.notes[0] == "colours of vertices are not shown where a texture has the colour"
 
 
+def test_polypaint_of_zbrush(read):
+    """``#MRGB``: eight digits a vertex, mask first, in as many lines as it takes."""
+    triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    painted = read(f"{triangle}#MRGB ffff000000ff8000\n#MRGB ff0000ff\n").meshes[0]
+    assert painted.colors[:, 0].tolist() == [1, 1, 0]
+    assert painted.colors[1, 1] == pytest.approx(decode_srgb(np.array(128 / 255)), abs=1e-6)
+    for cut in ("#MRGB ffff0000\n", "#MRGB ffff00\n", "#MRGB mask\n"):
+        scene = read(triangle + cut)
+        assert scene.meshes[0].colors is None
+        assert "colours of #MRGB are not shown" in scene.notes[0]
+
+
 def test_vertices_without_colours_beside_coloured_ones_are_white(read):
     """The material's own grey shows there; weights are no colours."""
     text = "v 0 0 0\nv 1 0 0 1\nv 0 1 0\nf 1 2 3\nv 0 0 1 1 0 0\nv 1 0 1 0 1 0\nv 0 1 1 0 0 1\nf 4 5 6\n"

@@ -75,6 +75,7 @@ class _Statements:
     point_material_runs: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
     line_material_runs: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
     smoothing_runs: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
+    painted: list[str] = field(default_factory=list)
     ignored: dict[str, int] = field(default_factory=dict)
 
 
@@ -212,6 +213,8 @@ def _split_statements(text: str, where: str) -> _Statements:
             statements.smoothing_runs.append((len(statements.faces.bodies), _smoothing_group(body)))
         elif key == "mtllib":
             statements.libraries.add(body.strip(), number)
+        elif key == "#MRGB":
+            statements.painted.append(body)
         elif key[0] != "#" and key not in _SILENT:
             what = _UNSUPPORTED.get(key, f"statements '{key[:40]}'")
             statements.ignored[what] = statements.ignored.get(what, 0) + 1
@@ -283,6 +286,8 @@ def _assemble(statements: _Statements, where: str) -> tuple[_Geometry, list[str]
     notes = drop_absent(corners, counts)
     check_vertices(corners, counts[0], numbers, where)
     positions = near_origin(positions[:, :3], notes)
+    if statements.painted:
+        colors = _painted_colors("".join(statements.painted), len(positions), notes)
     triangles, owners = triangulate(positions, corners[:, 0] - 1, sizes)
     cut = corners[triangles] - 1
     geometry = _Geometry(
@@ -297,6 +302,18 @@ def _assemble(statements: _Statements, where: str) -> tuple[_Geometry, list[str]
     )
     _complete_normals(geometry, _per_face(statements.smoothing_runs, len(sizes))[owners])
     return geometry, notes
+
+
+def _painted_colors(text: str, count: int, notes: list[str]) -> Points | None:
+    """Codes ``(count, 3)`` of ZBrush's comments, eight hexadecimal digits a vertex: mask, red, green, blue."""
+    try:
+        codes = np.frombuffer(bytes.fromhex(text), np.uint8).reshape(-1, 4)
+    except ValueError:
+        codes = np.empty((0, 4), np.uint8)
+    if len(codes) != count:
+        notes.append(f"colours of #MRGB are not shown: {len(codes)} of 8 digits for {count} vertices")
+        return None
+    return codes[:, 1:] / 255.0
 
 
 def _draw_points_and_lines(statements: _Statements, geometry: _Geometry, where: str) -> tuple[list[Mesh], list[str]]:
