@@ -405,7 +405,7 @@ def test_without_any_depth_there_is_no_scene(tmp_path):
         load_scene(tmp_path / "pair.png")
     slices = Pillow.new("L", (4, 4))
     slices.save(tmp_path / "cells.tif", save_all=True, append_images=[slices])
-    with pytest.raises(SceneError, match=r"^cells\.tif: needs a depth map; .*; slices of a volume are read as \.npy"):
+    with pytest.raises(SceneError, match=r"^cells\.tif: needs a depth map; .*; slices of a volume are read as \.npz"):
         load_scene(tmp_path / "cells.tif")
     slices.save(tmp_path / "pair.jpg", "MPO", save_all=True, append_images=[slices])
     with pytest.raises(SceneError, match=r"^pair\.jpg: needs a depth map; .* beside it$"):

@@ -96,7 +96,8 @@ def read_depth_photo(path: Path, *, depth_map: Path | None = None) -> SceneDescr
             if data.endswith(_SAMSUNG):
                 fix += "; Samsung's own is taken out by: exiftool -b -SingleShotDepthMapTiff a.jpg > a_depth.tif"
             if path.suffix.lower() in _TIFF and any(note.endswith("the first is shown") for note in notes):
-                fix += "; slices of a volume are read as .npy: numpy.save('a.npy', tifffile.imread('a.tif'))"
+                fix += "; slices of a volume are read as .npz, with the mm between voxels along z, y and x: "
+                fix += "numpy.savez('a.npz', tifffile.imread('a.tif'), spacing=(2, 1, 1))"
             raise SceneError("needs a depth map", where=path.name, rule=rule, fix=fix)
         notes = (*notes, f"depth from {depth_map.name}, which lies beside it")
     chosen = read_depth_map(depth_map) if depth_map is not None else own

@@ -58,6 +58,7 @@ _BLENDER = "open it in Blender, then File > Export > glTF 2.0 (.glb)"
 _FREECAD = "open it in FreeCAD, then File > Export > glTF (.glb)"
 _CLOUD_COMPARE = "save it as .ply, in CloudCompare for instance"
 _NIBABEL = "save it as .nii.gz, in Python by: nibabel.save(nibabel.load('a{0}'), 'a.nii.gz')"
+_HDF5 = "save a volume as .npy: numpy.save('a.npy', h5py.File('a.h5')['NAME']), views of a light field as pictures"
 _MAYA = "export it from Maya as FBX, and that from Blender as glTF 2.0 (.glb)"
 _ASSIMP = "convert it by Assimp: assimp export in{0} out.glb"
 _AUTODESK = "export it there as FBX, and that from Blender as glTF 2.0 (.glb)"
@@ -95,7 +96,7 @@ _ELSEWHERE = {
     **dict.fromkeys((".case", ".cgns", ".e", ".exo", ".foam", ".msh", ".xdmf"), _PARAVIEW),
     **dict.fromkeys((".lfp", ".lfr"), _LYTRO),
     ".mat": "a light field becomes a picture by 'lippmann import'",
-    ".h5": "save the views of a light field as pictures, and join them by 'lippmann weave'",
+    **dict.fromkeys((".h5", ".hdf5"), _HDF5),
     ".exr": "a sky is given by environment=..., depth by depth_map=...",
     ".vox": "in MagicaVoxel: Export > ply",
     **{f".{kind}": _TILES.format(kind) for kind in ("b3dm", "i3dm", "cmpt")},
@@ -104,7 +105,7 @@ _ELSEWHERE = {
     ".vtkhdf": "save it as .vtu, in PyVista by: pyvista.read('a.vtkhdf').cast_to_unstructured_grid().save('a.vtu')",
     ".raw": "name the .mhd or .nhdr file beside it, or save it as .npy: numpy.fromfile(...).reshape(z, y, x)",
     **dict.fromkeys((".mgz", ".mgh"), "convert it by FreeSurfer: mri_convert in.mgz out.nii.gz"),
-    **{kind: _NIBABEL.format(kind) for kind in (".mnc", ".par", ".rec")},
+    **{kind: _NIBABEL.format(kind) for kind in (".mnc", ".par", ".rec", ".img")},
     ".mtl": "it holds the materials of an .obj file: name that",
     ".hdr": "a sky is given by environment=...; save a volume as .nii, which holds header and voxels in one file",
     ".amf": "save it as .stl in the slicer",
