@@ -147,13 +147,17 @@ def Material "{0}" {{
     assert found == {(1, 0, 0): 1, (0, 0, 1): 2}
 
 
-def test_cages_are_refined_by_default(read):
-    body = QUADS.format("").replace('uniform token subdivisionScheme = "none"', "")
-    (mesh,) = read(body).meshes
-    assert len(mesh.faces) == 2 * 16 * 2
+@pytest.mark.parametrize(("quads", "levels"), [(2, 4), (129, 3), (513, 2)])
+def test_cages_are_refined_by_default(read, quads, levels):
+    """Small ones more than large ones."""
+    points = [(x, y, 0) for x in range(quads + 1) for y in range(2)]
+    indices = [2 * x + corner for x in range(quads) for corner in (0, 2, 3, 1)]
+    counts = f"int[] faceVertexCounts = {[4] * quads}\nint[] faceVertexIndices = {indices}"
+    (mesh,) = read(f'def Mesh "m" {{\npoint3f[] points = {points}\n{counts}\n}}').meshes
+    assert len(mesh.faces) == quads * 4**levels * 2
     assert mesh.normals == pytest.approx(np.tile([0, 0, 1], (len(mesh.positions), 1)))
     # Points that one face alone uses stay where they are.
-    assert mesh.positions.max(axis=0).tolist() == [2, 1, 0]
+    assert mesh.positions.max(axis=0).tolist() == [quads, 1, 0]
 
 
 def test_units_and_the_up_axis(read):

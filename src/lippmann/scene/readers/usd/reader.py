@@ -75,7 +75,7 @@ def describe(tree: Record, arrays: Sequence[NDArray[np.generic]], path: Path, as
     notes: dict[str, None] = dict.fromkeys(tree["notes"])
     scene_from_stage = _scene_from_stage(tree, path)
     surfaces = [SurfaceReader(assets, notes, tree["meters_per_unit"]).read(record) for record in tree["materials"]]
-    reader = MeshReader(arrays, surfaces, path.name)
+    reader = MeshReader(arrays, surfaces, path.name, tree["meshes"])
     content = _Content(surfaces)
     splats = SplatReader(arrays, path.name, notes)
 
