@@ -236,11 +236,12 @@ def test_outputs_are_named_after_the_input(lippmann, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "shots").mkdir()
     for number in range(2):
-        Image.new("RGB", (64, 48), (90 * number, 20, 40)).save(tmp_path / "shots" / f"{number}.png")
+        Image.new("RGB", (256, 192), (90 * number, 20, 40)).save(tmp_path / "shots" / f"{number}.png")
     Image.new("RGB", (512, 256)).save(tmp_path / "a_qs2x1a1.png")
     for command, made in (
         (("interlace", "shots", *SHEET, "--size", "30x20mm"), "shots-native.tif"),
         (("quilt", "unpack", "a_qs2x1a1.png"), "a_qs2x1a1-views"),
+        (("quilt", "pack", "shots"), "shots_qs1x2a1.33333.png"),
     ):
         outcome = lippmann(*command)
         assert outcome.code == 0, outcome.err

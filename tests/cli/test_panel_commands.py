@@ -163,7 +163,9 @@ def test_bad_input_is_one_line_and_code_2(lippmann, views, calibration, tmp_path
     assert "no such file" in refused("quilt", "unpack", tmp_path / NAME, "-o", tmp_path / "out")
     assert "--display" in refused("weave", views, "-o", native)
     assert "unknown display" in refused("weave", views, "-d", "lkg", "-o", native)
-    assert "square lenses" in refused("weave", views, "-d", "mla-square", "-o", native, "--quiet")
+    for command in ("weave", "interlace"):
+        message = refused(command, views, "-d", "mla-square", "-o", native)
+        assert ("square lenses" in message, "cut off" in message) == (True, False)
     assert "unknown choice of views 'cubic'" in refused(
         "weave", views, "-d", calibration, "-o", native, "--views=cubic", "-q"
     )

@@ -22,6 +22,7 @@ from lippmann.errors import DisplayError
         ("20X30cm", (200, 300)),
         ("200 x 300 mm", (200, 300)),
         ("8in x 10", (203.2, 254)),
+        ("A4", (210, 297)),
     ],
 )
 def test_sizes(text, expected):

@@ -137,6 +137,8 @@ MILLIMETRES = {
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _UNIT = r"[^\d\s.+-]\S*"
 _QUANTITY = re.compile(rf"({_NUMBER})\s*({_UNIT})?")
+#: ISO 216: sides in mm from that of A0 on, so A4 is 210 x 297.
+_PAPER = (1189.0, 841.0, 594.0, 420.0, 297.0, 210.0, 148.0, 105.0)
 _SIZE = re.compile(rf"({_NUMBER})\s*([^\W\d]+?)?\s*[xX]\s*({_NUMBER})\s*([^\W\d]+)?")
 
 
@@ -192,18 +194,20 @@ def millimetres(
 
 
 def size(text: str, key: str) -> tuple[float, float]:
-    """Width and height in millimetres of a text such as ``200x300mm``, ``8x10in`` or ``8 in x 25 cm``.
+    """Width and height in millimetres of a text such as ``200x300mm``, ``8x10in``, ``8 in x 25 cm`` or ``A4``.
 
-    A unit at the end counts for both.
+    A unit at the end counts for both. Papers stand upright.
 
     Raises
     ------
     DisplayError
         If the text is no size, or a unit is missing or unknown.
     """
+    if paper := re.fullmatch("[aA]([0-6])", text.strip()):
+        return _PAPER[int(paper[1]) + 1], _PAPER[int(paper[1])]
     match = _SIZE.fullmatch(text.strip())
     if match is None:
-        rule = "a size is width x height with a unit, such as 200x300mm or 8x10in"
+        rule = "a size is width x height with a unit, such as 200x300mm or 8x10in, or A0 to A6"
         raise DisplayError(f"{text!r} is not a size", where=key, rule=rule)
     unit_of_height = match[4] or match[2]
     if not unit_of_height:

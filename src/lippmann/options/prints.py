@@ -19,7 +19,7 @@ class PrintOptions(Options):
     )
     ppi: str | None = _print(help="Resolution in pixels per inch.", first=True)
     size: str | None = _print(
-        help="Size of the print with a unit, such as 200x300mm or 8x10in.", first=True, metavar="WIDTHxHEIGHT"
+        help="Size of the print with a unit, such as 200x300mm or 8x10in, or A4.", first=True, metavar="WIDTHxHEIGHT"
     )
     viewing_distance: str | None = _print(help="Viewing distance, such as 600mm, or infinite. Default: 500mm.")
     thickness: str | None = _print(help="Thickness of the sheet, such as 0.66mm or 26mil.")

@@ -6,6 +6,7 @@ The size of a picture is checked before memory is allocated for it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -156,6 +157,21 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
         progress(Progress("read", number + 1, layout.views))
     assert quilt is not None  # there are views
     return replace(quilt, notes=taken + notes.lines())
+
+
+def ending_of_views(folder: Path) -> str:
+    """The ending ``_qsCxRaA`` of the quilt of a folder's views that is nearest to a square; errors as of
+    :func:`read_views`.
+    """
+    paths, _ = _list_numbered(folder)
+    with open_view(paths[0]) as file:
+        aspect = file.size[0] / file.size[1]
+    count = len(paths)
+    # Columns a row more than a square quilt has are as far from it as so many times fewer.
+    columns = min(
+        (each for each in range(1, count + 1) if count % each == 0), key=lambda c: abs(math.log(c * c * aspect / count))
+    )
+    return QuiltLayout(columns, count // columns, float(f"{aspect:.6g}")).ending
 
 
 def _check_held(view_size: tuple[int, int], views: int, folder: Path) -> None:

@@ -338,14 +338,19 @@ def check_weave(quilt: Quilt, display: Display, choice: str) -> None:
     """Raise the errors of :func:`weave`."""
     if choice not in get_args(ViewChoice):
         raise UsageError.unknown("choice of views", choice, get_args(ViewChoice), parameter="views")
-    display.check_native()
+    check_weavable(display)
     _check_fit(quilt, display)
 
 
-def _check_fit(quilt: Quilt, display: Display) -> None:
+def check_weavable(display: Display) -> None:
+    """Refuse a display that takes no native pixels, or whose lenses do not show the views of a quilt."""
+    display.check_native()
     if display.lens_array.layout != "lenticular":
         rule = "a quilt needs cylindrical lenses"
         raise PictureError(f"the display {display.name} has {display.lens_array.layout} lenses", rule=rule)
+
+
+def _check_fit(quilt: Quilt, display: Display) -> None:
     trim = trim_of(display)
     shape = trim.width / trim.height
     aspect = quilt.layout.aspect

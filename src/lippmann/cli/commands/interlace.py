@@ -86,12 +86,13 @@ def interlace(
     from lippmann.quilts.interlace import check_interlaced_path, view_size, write_interlaced
     from lippmann.quilts.photos import natural_order, read_photos
     from lippmann.quilts.view_names import line_of_grid
+    from lippmann.quilts.weave import check_weavable
 
     console, output = Console(quiet, as_json), output_of(output, photos[0], "-native.tif")
     check_interlaced_path(output)
     across = lenses == "across"
     target, asked_finish = sheet_of(_display(display, printed, turned=across), replace(finishing, icc=icc))
-    target.check_native()  # before the photographs are read
+    check_weavable(target)  # before the photographs are read
     finish = asked_finish or NO_FINISH
     paths, of_grid = line_of_grid(natural_order(_pictures(photos)), down=across)
     if reverse:
@@ -135,7 +136,8 @@ def interlace(
         "pixels_per_lens": target.pixels_per_lens[0],
     }
     count = read.quilt.layout.views
-    line = f"{output}: {count} photographs, {paths[0].name} to {paths[-1].name}, on {pixels[0]}x{pixels[1]} pixels"
+    names = paths[0].name if len(paths) == 1 else f"{paths[0].name} to {paths[-1].name}"
+    line = f"{output}: {count} photographs, {names}, on {pixels[0]}x{pixels[1]} pixels"
     console.result(result, f"{line}, {target.pixels_per_lens[0]:.4g} a lens")
 
 

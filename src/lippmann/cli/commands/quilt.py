@@ -169,19 +169,29 @@ def pack(
         ),
     ],
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="The quilt to write: NAME_qsCOLUMNSxROWSaASPECT.png, .exr or .tif.")
-    ],
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="The quilt to write: NAME_qsCOLUMNSxROWSaASPECT.png, .exr or .tif. By default named after the input, "
+            "as square as its views allow.",
+            show_default=False,
+        ),
+    ] = None,
     bits: options.Bits = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Put a folder of views into a quilt, the leftmost at the bottom left."""
     from lippmann.image.write import check_output
-    from lippmann.quilts.files import read_views, write_quilt
+    from lippmann.quilts.files import ending_of_views, read_views, write_quilt
     from lippmann.quilts.photos import quilt_of_pair
     from lippmann.quilts.quilt import layout_of_name, names_half_pair
 
     console = Console(quiet, as_json)
+    if output is None:
+        folder.stat()
+        output = output_of(None, folder, ("_2x1" if folder.is_file() else ending_of_views(folder)) + ".png")
     layout, half = layout_of_name(output, to_write=True), names_half_pair(output)
     check_output(output, bits)
     with console.progress() as progress:
@@ -276,13 +286,13 @@ def weave(
     from lippmann.image.streamed import LARGE
     from lippmann.image.write import can_be_banded, check_output
     from lippmann.quilts.fit_views import fit_views
+    from lippmann.quilts.weave import check_weavable, weave_to_file
     from lippmann.quilts.weave import weave as weave_views
-    from lippmann.quilts.weave import weave_to_file
 
     console, output = Console(quiet, as_json), output_of(output, source, "-native.png")
     name, stored = check_output(output, bits)
     target, asked_finish = sheet_of(load_display(display), finishing)
-    target.check_native()  # before the views are read
+    check_weavable(target)  # before the views are read
     finish = asked_finish or NO_FINISH
     finish.check_stored(stored, output)
     panel, trim = finish.display(target).panel, trim_of(target)
