@@ -27,6 +27,7 @@ from handmade_display import Sheet, lens_plane_points, samples_of
 from mitsuba_cameras import camera_rays, direct_pictures, in_display, intersect
 
 from lippmann.options.placement import PlacementOptions
+from lippmann.viewing.replay import replay_points
 
 SCENES = ("teapot", "fancy teapot", "clear coat")
 
@@ -88,7 +89,7 @@ def compare(pictures, built, eye, size=(31, 37)):
     """The replay to an eye against the direct pictures, in dB, with ``error``, the largest one in mm."""
     sheet = pictures.sheet
     kinds = ("position", "normal", "emission")
-    seen = {kind: getattr(pictures, kind).replay(eye, size=size).reshape(-1, 3) for kind in kinds}
+    seen = {kind: replay_points(getattr(pictures, kind), eye, size).reshape(-1, 3) for kind in kinds}
     figures = []
     for channel, offset in enumerate(RGB_STRIPE if pictures.subpixels else NO_OFFSET):
         samples = samples_of(sheet, lens_plane_points(sheet, *size), eye, offset)
@@ -254,7 +255,7 @@ def test_the_scenes_own_camera_is_the_eye_at_the_viewing_point(pictures, glowing
     hit, position, normal, _ = intersect(built, origin, direction)
     position, normal = in_display(made.matrix, position, normal)
     eye = (0.0, 0.0, sheet.distance)
-    shown = {kind: getattr(made, kind).replay(eye, size=(31, 37)).reshape(-1, 3) for kind in ("position", "normal")}
+    shown = {kind: replay_points(getattr(made, kind), eye, (31, 37)).reshape(-1, 3) for kind in ("position", "normal")}
     both = clear & hit & (shown["position"] != 0).any(axis=1)
     assert both.sum() > 0.99 * (clear & hit).sum() > 200
     assert psnr(shown["position"][both], position[both], made.depth) >= LEAST_PSNR

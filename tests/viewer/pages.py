@@ -13,7 +13,7 @@ from lippmann.display import Display, LensArray, Panel
 from lippmann.display.distortion import Distortion
 from lippmann.image import IntegralImage, Provenance
 from lippmann.viewer.export import export_page
-from lippmann.viewing.replay import replay
+from lippmann.viewing.replay import replay_points
 
 VIEWER = "window.lippmann.viewer"
 
@@ -84,8 +84,8 @@ def shown(tab: Any) -> np.ndarray:
 
 
 def seen(image: IntegralImage, eye: tuple[float, float, float], size: tuple[int, int]) -> np.ndarray:
-    """What ``lippmann replay`` shows to an eye, as codes."""
-    return quantize(replay(image, eye, size=size), 8, image.provenance.transfer)
+    """What an eye sees at the middle of each pixel, as codes."""
+    return quantize(replay_points(image, eye, size), 8, image.provenance.transfer)
 
 
 def psnr(a: np.ndarray, b: np.ndarray) -> float:

@@ -11,7 +11,7 @@ from lens_samples import eye_of_view, replay_at_lens_centers
 from lippmann.display import NUMPY, Display, LensArray, Panel, list_displays, load_display
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage, Provenance
-from lippmann.viewing.replay import FAR, default_eye, default_size, replay, sweep
+from lippmann.viewing.replay import FAR, default_eye, default_size, replay, replay_points, sweep
 
 #: Three lenses of four 1 mm pixels each, 10 mm in front of the panel; centres at x = -4, 0, 4. Column c is centred at
 #: x = c - 5.5.
@@ -205,10 +205,20 @@ def test_linear_interpolates_within_the_micro_image_only():
 def test_one_colour_stays_that_colour(display, eye, filter, subpixels):
     panel = display.panel
     image = IntegralImage(np.broadcast_to(np.float32([0.2, 0.4, 0.6]), (panel.height, panel.width, 3)), display)
-    picture = replay(image, eye, filter=filter, subpixels=subpixels, size=(23, 17))
+    picture = replay_points(image, eye, (23, 17), filter=filter, subpixels=subpixels)
     for channel, value in enumerate((0.2, 0.4, 0.6)):
         seen = picture[..., channel]
         np.testing.assert_allclose(seen[seen != 0], value, rtol=1e-6)
+
+
+def test_a_picture_smaller_than_the_panel_is_the_mean_of_four_points_in_each_pixel():
+    """Single points show colour fringes of slanted sheets that no eye resolves."""
+    image, eye = numbered(DISPLAYS[-1]), (3.0, 2.0, 400.0)
+    points = replay_points(image, eye, (22, 10))
+    np.testing.assert_allclose(
+        replay(image, eye, size=(11, 5)), points.reshape(5, 2, 11, 2, 3).mean(axis=(1, 3)), rtol=1e-6
+    )
+    np.testing.assert_array_equal(replay(image, eye, size=(30, 12)), replay_points(image, eye, (30, 12)))
 
 
 def test_samples_at_lens_centers_agree_with_the_picture():

@@ -7,7 +7,7 @@ import pytest
 
 from lippmann.display import NUMPY, Display, LensArray, Panel
 from lippmann.image import IntegralImage
-from lippmann.viewing.replay import lens_plane_points, replay
+from lippmann.viewing.replay import lens_plane_points, replay, replay_points
 
 NEAR = (((-0.31, 0.26), (0.27, 0.21), (0.05, -0.25)), ((-0.29, -0.22), (0.33, -0.2), (-0.04, 0.24)))
 FAR_OUT = (((-0.9, 0.26), (0.27, 0.7), (0.05, -0.25)), ((-0.29, -0.22), (0.8, -0.2), (-0.04, 0.94)))
@@ -22,7 +22,7 @@ def sheet(cells):
 def test_the_nearest_subpixel_is_seen(cells):
     display = sheet(cells)
     values = np.random.default_rng(1).uniform(size=(24, 40, 3)).astype(np.float32)
-    seen = replay(IntegralImage(values, display), (10, 5, 280), size=(33, 21), subpixels=True)
+    seen = replay_points(IntegralImage(values, display), (10, 5, 280), (33, 21), subpixels=True)
     column, row = np.meshgrid(np.arange(40), np.arange(24))
     for rows, x, y in lens_plane_points(display, 33, 21):
         panel_x, panel_y = display.visible_panel_point(10, 5, 280, x, y, NUMPY)

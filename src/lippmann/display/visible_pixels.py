@@ -170,6 +170,22 @@ class EyeMap:
         return blocks
 
 
+def points_of_pixel(display: Display, size: tuple[int, int]) -> int:
+    """Points across a pixel of a picture of ``size`` (width, height) whose mean it is: 2 if it is smaller than the
+    panel, else 1. Single points alias: they show bits of lenses and colour fringes that no eye resolves.
+    """
+    return 2 if size[0] < display.panel.width or size[1] < display.panel.height else 1
+
+
+def mean_of_points(picture: Floats, across: int) -> Floats:
+    """The picture ``(height, width, 3)`` of one with ``across`` x ``across`` points in place of each pixel."""
+    if across == 1:
+        return picture
+    height, width = (side // across for side in picture.shape[:2])
+    means: Floats = picture.reshape(height, across, width, across, 3).mean(axis=(1, 3), dtype=np.float32)
+    return means
+
+
 def window_pixels(display: Display, window: PixelWindow | None, *, subpixels: bool, row_step: int = 1) -> PixelSet:
     """All (sub-)pixels of a window of the panel, or of the whole panel; the middle one of every ``row_step`` rows."""
     panel = display.panel

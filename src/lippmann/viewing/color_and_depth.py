@@ -22,7 +22,7 @@ from lippmann.errors import OutputError, UsageError
 from lippmann.image.integral_image import IntegralImage
 from lippmann.image.stored_values import FloatArray
 from lippmann.runtime.atomic_write import check_writable, replacing
-from lippmann.viewing.replay import Eye, default_eye, default_size, replay
+from lippmann.viewing.replay import Eye, default_eye, default_size, replay, replay_points
 from lippmann.viewing.stereo import half_width
 
 #: Endings of the files that hold colour beside depth, and depth alone.
@@ -41,10 +41,11 @@ def visible_distance(image: IntegralImage, eye: Eye | None = None, size: tuple[i
     if depth is None:
         raise UsageError("has no depth", rule="that is one of its layers", fix="render it with layers=True")
     eye = default_eye(image.display) if eye is None else eye
+    size = default_size(image.display) if size is None else size
     is_hit = np.isfinite(depth)
     # A line of sight that misses the panel is black: no hit there.
     parts = np.stack([np.where(is_hit, depth, 0.0), is_hit, is_hit], axis=-1)
-    height, hit, _ = np.moveaxis(replay(image.with_pixels(parts, maps={}), eye, size=size, subpixels=False), -1, 0)
+    height, hit, _ = np.moveaxis(replay_points(image.with_pixels(parts, maps={}), eye, size, subpixels=False), -1, 0)
     return np.where(hit > 0.0, np.float32(eye[2]) - height, np.inf).astype(np.float32)
 
 

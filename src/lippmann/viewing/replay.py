@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import NUMPY, Display
+from lippmann.display.visible_pixels import mean_of_points, points_of_pixel
 from lippmann.errors import UsageError
 from lippmann.image.integral_image import Picture
 from lippmann.image.stored_values import FloatArray
@@ -62,7 +63,8 @@ def replay(
         Position ``(x, y, z)`` in the display frame in mm, z > 0. None: central, at the viewing distance, or within the
         field of view if that distance is infinite.
     size:
-        Width and height of the result in pixels, 1 to 65535. None: the panel's, at most 2048 wide.
+        Width and height of the result in pixels, 1 to 65535. None: the panel's, at most 2048 wide. Each pixel of a
+        result smaller than the panel is the mean of 2 x 2 points.
     filter:
         ``nearest`` takes the pixel at the panel point seen; ``linear`` interpolates between the surrounding pixels of
         the same lens.
@@ -83,12 +85,27 @@ def replay(
     width, height = check_size(default_size(image.display) if size is None else size)
     if filter not in get_args(Filter):
         raise UsageError.unknown("filter", filter, get_args(Filter))
-    subpixels = image.provenance.subpixels if subpixels is None else subpixels
+    across = points_of_pixel(image.display, (width, height))
     picture = np.empty((height, width, 3), dtype=np.float32)
-    for rows, x, y in lens_plane_points(image.display, width, height):
-        panel_x, panel_y = image.display.visible_panel_point(*eye, x, y, NUMPY)
-        picture[rows] = _panel_colors(image, panel_x, panel_y, filter, subpixels)
+    for rows, points in _replay_rows(image, eye, (width * across, height * across), filter, subpixels):
+        picture[rows.start // across : rows.stop // across] = mean_of_points(points, across)
     return picture
+
+
+def replay_points(
+    image: Picture, eye: Eye, size: tuple[int, int], *, filter: Filter = "nearest", subpixels: bool | None = None
+) -> FloatArray:
+    """As :func:`replay`, but each pixel is seen at its middle alone, for values whose mean says nothing."""
+    return np.concatenate([points for _, points in _replay_rows(image, eye, size, filter, subpixels)])
+
+
+def _replay_rows(
+    image: Picture, eye: Eye, size: tuple[int, int], filter_: Filter, subpixels: bool | None
+) -> Iterator[tuple[slice, FloatArray]]:
+    subpixels = image.provenance.subpixels if subpixels is None else subpixels
+    for rows, x, y in lens_plane_points(image.display, *size):
+        panel_x, panel_y = image.display.visible_panel_point(*eye, x, y, NUMPY)
+        yield rows, _panel_colors(image, panel_x, panel_y, filter_, subpixels)
 
 
 def sweep(
@@ -191,8 +208,11 @@ def in_middle(picture: FloatArray, size: tuple[int, int]) -> FloatArray:
 
 
 def lens_plane_points(display: Display, width: int, height: int) -> Iterator[tuple[slice, Real, Real]]:
-    """Rows, x and y in mm of the lens-plane points at the pixels of a ``width`` x ``height`` picture, in blocks."""
-    step = max(1, _BLOCK // width)
+    """Rows, x and y in mm of the lens-plane points at the pixels of a ``width`` x ``height`` picture, in blocks.
+
+    A block begins at an even row.
+    """
+    step = 2 * max(1, _BLOCK // (2 * width))
     panel = display.panel
     u = (np.arange(width) + 0.5) * (panel.width / width)
     v = (np.arange(height) + 0.5) * (panel.height / height)

@@ -26,6 +26,7 @@ from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import Splats
 from lippmann.scene.values.volume import TransferFunction, Volume
 from lippmann.studio_app.real_lens import RealEyeMap
+from lippmann.viewing.replay import replay_points
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -89,7 +90,7 @@ def test_a_frame_is_the_replay_of_a_render(teapot, renderers, name, eye):
     request = RenderRequest(placement=PLACED, seed=5, tone_map=tone_map)
     frame = renderers(name).frame(LiveView(eye, SIZE, request=request))
     image = render(teapot, name, spp=1, seed=5, tone_map=tone_map)
-    replayed = quantize(image.replay(eye, size=SIZE), 8, "srgb")
+    replayed = quantize(replay_points(image, eye, SIZE), 8, "srgb")
     assert replayed.std() > 20
     assert psnr(frame.pixels, replayed) > 60
 
@@ -171,7 +172,7 @@ def test_rest_comes_near_a_long_render(teapot, renderers):
     renderer, eye = renderers("lenticular"), EYES[0]
     view = LiveView(eye, SIZE, request=RenderRequest(placement=PLACED, tone_map="pbr-neutral"))
     image = render(teapot, "lenticular", integrator="path", spp=512, caustics="paths", tone_map="pbr-neutral")
-    reference = quantize(image.replay(eye, size=SIZE), 8, "srgb")
+    reference = quantize(replay_points(image, eye, SIZE), 8, "srgb")
     found = {}
     while max(found, default=0) < 64:
         frame = refine(renderer, view)
@@ -252,7 +253,7 @@ def test_light_is_that_of_a_render(renderers):
     renderer.frame(LiveView(EYES[0], SIZE, request=request, light=light))
     again = renderer.frame(LiveView(EYES[0], SIZE, request=request)).pixels
     image = render(replace(scene, light=light), "square", spp=1, tone_map="pbr-neutral", exposure=0.5)
-    assert psnr(lit, quantize(image.replay(EYES[0], size=SIZE), 8, "srgb")) > 60
+    assert psnr(lit, quantize(replay_points(image, EYES[0], SIZE), 8, "srgb")) > 60
     assert psnr(plain, lit) < 35  # most of the picture is background
     assert psnr(plain, again) > 60
 
@@ -313,7 +314,7 @@ def test_heights_are_the_depth_that_a_render_shows(teapot, renderers):
     renderer = renderers("square")
     found = renderer.heights(view)
     image = render(teapot, "square", integrator="depth", pixel_filter="point", spp=1)
-    expected = image.replay(EYES[0], size=SIZE)[..., 0]
+    expected = replay_points(image, EYES[0], SIZE)[..., 0]
     seen = np.isfinite(found)
     assert 0.1 < seen.mean() < 0.9
     assert np.abs(found - expected)[seen].max() < 1e-2

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from lippmann.display import Display
-from lippmann.display.visible_pixels import EyeMap, Floats, Vector
+from lippmann.display.visible_pixels import EyeMap, Floats, Vector, mean_of_points, points_of_pixel
 from lippmann.image.preview import Preview
 from lippmann.options.choices import POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
@@ -54,7 +54,8 @@ def render_eye_preview(
     """
     resolved = resolve(replace(request, method="full"), scene, display)
     width, height = display.panel.size_inside(*size)
-    visible = EyeMap(display, (width, height), subpixels=bool(resolved.subpixels)).pixels_for_eye(eye)
+    across = points_of_pixel(display, (width, height))
+    visible = EyeMap(display, (width * across, height * across), subpixels=bool(resolved.subpixels)).pixels_for_eye(eye)
     samples = _choose_samples(request, resolved, len(visible.column) // visible.channels)
     denoises = _denoises(request, resolved, scene)
     # The eye's view is denoised, not the traced pixels.
@@ -94,7 +95,7 @@ def render_eye_preview(
         clean = session.watch.stage("denoise", lambda: clean_light(noisy, None, take_noise_out, samples))
         picture = visible.arrange_denoised(clean)
         options = {"denoise": "oidn", "denoise_effort": effort}
-    frame.pixels = picture
+    frame.pixels = picture = mean_of_points(picture, across)
     provenance = make_provenance(
         session,
         frame,
