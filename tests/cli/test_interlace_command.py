@@ -246,3 +246,4 @@ def test_outputs_are_named_after_the_input(lippmann, tmp_path, monkeypatch):
         outcome = lippmann(*command)
         assert outcome.code == 0, outcome.err
         assert (tmp_path / made).exists()
+    assert set(np.unique(np.asarray(Image.open("shots-native.tif"))[..., 0])) == {0, 90}  # a pair is not mixed

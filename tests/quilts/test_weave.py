@@ -150,11 +150,12 @@ def test_what_holds_for_all_rows_or_channels_is_found_once(offsets, slant, dista
 
 
 def test_the_picture_says_what_it_is(tmp_path):
-    image = weave(solid([0.2, 0.7], 2, 1), SHEETS[0], choice="nearest", scene="pair")
+    image = weave(solid([0.2, 0.7], 2, 1), SHEETS[0], scene="pair")
     assert image.display == SHEETS[0]
     made = image.provenance
     assert (made.method, made.scene, made.subpixels) == ("weave", "pair", True)
     assert made.options == {"views": 2, "view_choice": "nearest", "direction": "even in the tangent"}
+    assert set(np.unique(image.pixels)) == set(np.float32([0.2, 0.7]))  # no eye sees a pair double
 
 
 def test_blocks_of_rows_change_nothing(monkeypatch):

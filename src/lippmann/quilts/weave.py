@@ -51,7 +51,7 @@ def weave(
     quilt: Quilt,
     display: Display,
     *,
-    choice: ViewChoice = "linear",
+    choice: ViewChoice | None = None,
     correct: Correction = "none",
     headroom: float = 0.0,
     scene: str = "",
@@ -67,7 +67,7 @@ def weave(
         A lenticular display, slanted or not.
     choice:
         ``nearest`` takes the view nearest to a sub-pixel's direction; ``linear`` interpolates between the two nearest
-        views. Within a view, colours are interpolated between pixels in either case.
+        views. Within a view, colours are interpolated between pixels in either case. None: :func:`usual_choice`.
     correct:
         ``lens``: the pixels whose light through the display's real lenses comes nearest to the views.
     headroom:
@@ -93,6 +93,7 @@ def weave(
     >>> weave(Quilt(np.zeros((20, 120, 3), np.float32), QuiltLayout(3, 1, 2.0)), small).pixels.shape
     (8, 16, 3)
     """
+    choice = choice or usual_choice(quilt)
     check_weave(quilt, display, choice)
     weaving = Weaving(quilt, display, choice, correct, headroom)
     options, notes = weaving.describe_correction()
@@ -112,7 +113,7 @@ def weave_to_file(
     display: Display,
     path: Path,
     *,
-    choice: ViewChoice = "linear",
+    choice: ViewChoice | None = None,
     correct: Correction = "none",
     headroom: float = 0.0,
     scene: str = "",
@@ -142,6 +143,7 @@ def weave_to_file(
     OutputError
         If the format is not TIFF or Zarr or has no such bits, or the file cannot be written.
     """
+    choice = choice or usual_choice(quilt)
     check_weave(quilt, display, choice)
     weaving = Weaving(quilt, display, choice, correct, headroom)
     options, notes = weaving.describe_correction()
@@ -332,6 +334,11 @@ def view_fraction(display: Display, x: Real, y: Real) -> Real:
     place = display.pinhole_place(lattice.across(x, y) - axis) / (lattice.pitch * scale * display.edge_factor)
     fraction: Real = np.clip(0.5 - place, 0.0, 1.0)
     return fraction
+
+
+def usual_choice(quilt: Quilt) -> ViewChoice:
+    """How views are chosen unless said: of a stereo pair the nearest, since both eyes would see a mixture double."""
+    return "nearest" if quilt.layout.views == 2 else "linear"
 
 
 def check_weave(quilt: Quilt, display: Display, choice: str) -> None:

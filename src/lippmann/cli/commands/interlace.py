@@ -51,7 +51,7 @@ def interlace(
         typer.Option(
             "--views",
             help="nearest: one photograph per pixel; linear: a mixture of two. "
-            "Default: linear for lenses along, nearest for lenses across.",
+            "Default: linear, nearest for two photographs and for lenses across.",
         ),
     ] = None,
     reverse: Annotated[bool, typer.Option("--reverse", help="Take the photographs in reverse order.")] = False,
@@ -86,7 +86,7 @@ def interlace(
     from lippmann.quilts.interlace import check_interlaced_path, view_size, write_interlaced
     from lippmann.quilts.photos import natural_order, read_photos
     from lippmann.quilts.view_names import line_of_grid
-    from lippmann.quilts.weave import check_weavable
+    from lippmann.quilts.weave import check_weavable, usual_choice
 
     console, output = Console(quiet, as_json), output_of(output, photos[0], "-native.tif")
     check_interlaced_path(output)
@@ -110,7 +110,7 @@ def interlace(
             progress=progress,
         )
         console.remark(*of_grid, *read.notes, *fit_note(read.cropped[::-1] if across else read.cropped, fit))
-        choice = views or ("nearest" if across else "linear")
+        choice = views or ("nearest" if across else usual_choice(read.quilt))
         pixels, notes = write_interlaced(
             read,
             target,

@@ -266,8 +266,12 @@ def weave(
     display: options.DisplayName,
     output: options.OptionalOutput = None,
     choice: Annotated[
-        str, typer.Option("--views", help="nearest: one view per sub-pixel; linear: a mixture of two.")
-    ] = "linear",
+        str | None,
+        typer.Option(
+            "--views",
+            help="nearest: one view per sub-pixel; linear: a mixture of two. Default: linear, of a pair nearest.",
+        ),
+    ] = None,
     fit: FitOption = None,
     correct: options.Correct = "none",
     headroom: options.Headroom = 0.0,
@@ -286,7 +290,7 @@ def weave(
     from lippmann.image.streamed import LARGE
     from lippmann.image.write import can_be_banded, check_output
     from lippmann.quilts.fit_views import fit_views
-    from lippmann.quilts.weave import check_weavable, weave_to_file
+    from lippmann.quilts.weave import check_weavable, usual_choice, weave_to_file
     from lippmann.quilts.weave import weave as weave_views
 
     console, output = Console(quiet, as_json), output_of(output, source, "-native.png")
@@ -303,6 +307,7 @@ def weave(
         if fit is not None or source.is_dir():  # a quilt of another shape is refused, unless a fit is asked for
             views, cropped = fit_views(views, trim.width / trim.height, fit or "cover")
             console.remark(*fit_note(cropped, fit))
+        choice = choice or usual_choice(views)
         how: dict[str, Any] = {"choice": choice, "correct": correct, "headroom": headroom, "scene": source.stem}
         asked = {**how, "progress": progress}
         if width * height > LARGE and can_be_banded(name):
