@@ -29,14 +29,15 @@ from lippmann.device.types import Array, Bool, Color3f, FloatOrColor, UInt32
 
 
 def upload(values: NDArray[Any]) -> Array:
-    """A flat table on the device in memory of its own: Float, Int32 or UInt32 by the type of ``values``.
+    """A flat table on the device in memory of its own: Float, Int32, UInt32 or UInt8 by the type of ``values``.
 
     On the CPU Dr.Jit would read a NumPy array where it lies. It is not aligned there as packets of loads need it, so
-    every look-up of a row would become one slow gather a column. And the last packet reads on beyond its end, which
+    every look-up of a row would become one slow gather a column, or not, by chance: kernels would be compiled for both.
+    And the last packet reads on beyond its end, which
     crashes where that is the end of a page. So the values are copied to memory that Dr.Jit allocates.
     """
     kinds = {"f": (mi.Float, np.float32), "i": (mi.Int32, np.int32), "u": (mi.UInt32, np.uint32)}
-    device_type, dtype = kinds[values.dtype.kind]
+    device_type, dtype = (mi.UInt8, np.uint8) if values.dtype == np.uint8 else kinds[values.dtype.kind]
     on_cpu = dr.backend_v(device_type) == dr.JitBackend.LLVM
     table = dr.empty(device_type, values.size) if on_cpu else device_type(values.astype(dtype).ravel())
     dr.sync_thread()  # kernels may still use the memory that is written; and what was read is freed

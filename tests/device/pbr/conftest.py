@@ -51,8 +51,10 @@ class Looker:
         """Surface interactions of rays along the z axis through ``(x, y)``."""
         import mitsuba as mi
 
+        from lippmann.device.kernel_ops import upload
+
         x, y = np.broadcast_arrays(np.asarray(x, np.float32), np.asarray(y, np.float32))
-        origin = mi.Point3f(mi.Float(x.ravel()), mi.Float(y.ravel()), z)
+        origin = mi.Point3f(upload(x), upload(y), z)
         ray = mi.Ray3f(origin, mi.Vector3f(0, 0, toward))
         return built.mitsuba.ray_intersect(ray, mi.RayFlags.All, True)
 

@@ -87,7 +87,9 @@ def directions(count, seed, *, below=False):
 def vectors(array):
     import mitsuba as mi
 
-    return mi.Vector3f(*(mi.Float(column.astype(np.float32)) for column in array.T))
+    from lippmann.device.kernel_ops import upload
+
+    return mi.Vector3f(*(upload(column) for column in array.T))
 
 
 def bsdf_of(build, parts, material, *, exact=False):
@@ -116,8 +118,10 @@ def draw(bsdf, wi, count, seed=0, *, asked=0):
     import drjit as dr
     import mitsuba as mi
 
+    from lippmann.device.kernel_ops import upload
+
     rng = np.random.default_rng(seed)
-    u = [mi.Float(rng.random(count, dtype=np.float32)) for _ in range(3)]
+    u = [upload(rng.random(count, dtype=np.float32)) for _ in range(3)]
     si = dr.zeros(mi.SurfaceInteraction3f, count)
     si.wi = dr.opaque(mi.Vector3f, [float(x) for x in wi])  # no literal: directions share a kernel
     context = mi.BSDFContext()
@@ -268,11 +272,13 @@ def test_one_call_gives_what_evaluation_and_sampling_give(build, parts, name):
     import drjit as dr
     import mitsuba as mi
 
+    from lippmann.device.kernel_ops import upload
+
     bsdf, context = bsdf_of(build, parts, CASES[name]), mi.BSDFContext()
     ways = directions(64, 1)
     si = dr.zeros(mi.SurfaceInteraction3f, len(ways))
     si.wi = vectors(directions(64, 2))
-    u = mi.Float(np.linspace(0.01, 0.99, len(ways), dtype=np.float32))
+    u = upload(np.linspace(0.01, 0.99, len(ways)))
     points = mi.Point2f(u, dr.sqrt(u))
     value, pdf, bs, factor = bsdf.eval_pdf_sample(context, si, vectors(ways), u, points)
     alone, factor_alone = bsdf.sample(context, si, u, points)

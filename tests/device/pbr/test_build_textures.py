@@ -101,6 +101,20 @@ def test_coded_colours_are_decoded_before_they_are_filtered(build, look, parts, 
     np.testing.assert_allclose(look.emitted(built, x, y), expected, atol=2e-5)
 
 
+def test_kernels_do_not_depend_on_where_numpys_arrays_lie(build, parts, texels):
+    """Dr.Jit would read them in place, by loads for their alignment, which is a matter of chance."""
+    import mitsuba as mi
+
+    from lippmann.device.pbr.textures import _upload
+
+    for stored in (texels, (texels / 255).astype(np.float32)):
+        read = [np.asarray(_upload(stored, False, "nearest", "repeat").tensor().array) for _ in range(8)]
+        assert not any(array.ctypes.data % 64 for array in read)
+    scenes = [build(parts.describe([parts.square()], [glowing(Texture(Image("t", texels), True))])) for _ in range(8)]
+    meshes = [mi.traverse(built.mitsuba.shapes()[0]) for built in scenes]
+    assert not any(np.asarray(mesh["vertex_texcoords"]).ctypes.data % 64 for mesh in meshes)
+
+
 def test_channels_of_the_metallic_roughness_texture(build, look, parts, texels):
     texture = Texture(Image("t", texels), srgb=False, filter="nearest")
     material = Material(metallic=0.5, roughness=0.8, metallic_roughness_texture=texture)

@@ -23,13 +23,15 @@ def kept(build, parts):
         import drjit as dr
         import mitsuba as mi
 
+        from lippmann.device.kernel_ops import upload
+
         bsdf = build(parts.describe([parts.square()], [material], **options)).mitsuba.shapes()[0].bsdf()
         rng = np.random.default_rng(1)
-        u = [mi.Float(rng.random(count * len(cosines), dtype=np.float32)) for _ in range(3)]
+        u = [upload(rng.random(count * len(cosines), dtype=np.float32)) for _ in range(3)]
         si = dr.zeros(mi.SurfaceInteraction3f, count * len(cosines))
         cosine = np.repeat(np.float32(cosines), count)
         sine = np.sqrt(1 - cosine**2)
-        si.wi = mi.Vector3f(mi.Float(0.6 * sine), mi.Float(0.8 * sine), mi.Float(cosine))
+        si.wi = mi.Vector3f(*(upload(part) for part in (0.6 * sine, 0.8 * sine, cosine)))
         sample, weight = bsdf.sample(mi.BSDFContext(), si, u[0], mi.Point2f(u[1], u[2]))
         # Radiance grows on entering a denser body; the light itself does not.
         through = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Transmission)

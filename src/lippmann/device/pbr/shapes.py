@@ -237,10 +237,10 @@ def _mesh_shape(pieces: Sequence[Piece]) -> Shape:
 
 
 def _device(parts: Sequence[FloatArray]) -> Float:
-    import mitsuba as mi
+    from lippmann.device.kernel_ops import upload
 
     whole = parts[0] if len(parts) == 1 else np.concatenate(parts)
-    return mi.Float(whole.astype(np.float32, copy=False).ravel())
+    return upload(whole.astype(np.float32, copy=False))
 
 
 def _attributes(pieces: Sequence[Piece], finish: Finish) -> Mapping[str, FloatArray]:

@@ -434,6 +434,8 @@ def _upload(texels: NDArray[np.generic], coded: bool, filtering: str, wrap: str)
     import drjit as dr
     import mitsuba as mi
 
+    from lippmann.device.kernel_ops import upload
+
     if coded and texels.dtype != np.uint8:
         texels, coded = decode_srgb(texels).astype(np.float32), False
     height, width, channels = texels.shape
@@ -445,8 +447,8 @@ def _upload(texels: NDArray[np.generic], coded: bool, filtering: str, wrap: str)
         "wrap_mode": {"repeat": dr.WrapMode.Repeat, "mirror": dr.WrapMode.Mirror}.get(wrap, dr.WrapMode.Clamp),
     }
     if packed.dtype == np.uint8:
-        return mi.Texture2f8u(mi.TensorXu8(packed), srgb=coded, **modes)
-    return mi.Texture2f(mi.TensorXf(packed), **modes)
+        return mi.Texture2f8u(mi.TensorXu8(upload(packed), packed.shape), srgb=coded, **modes)
+    return mi.Texture2f(mi.TensorXf(upload(packed), packed.shape), **modes)
 
 
 def _is_coded(texture: Texture, channels: tuple[int, ...]) -> bool:
