@@ -80,18 +80,18 @@ def _by_paths(stage: Stage) -> None:
 
 def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:
     """As the program makes it: halves with photons of their own; pooled by the effort that the samples deserve."""
-    from lippmann.rendering.denoise.dual_buffer import Denoised
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.denoise.dual_buffer import DenoisedPicture
+    from lippmann.rendering.film.sample_batches import BatchedRender
 
     denoise = "oidn" if method == "pooled" else "none"
     request = replace(stage.session.request, method=method, denoise=denoise, spp=samples, seed=3)
     light_up(stage, replace(request, caustics="auto" if way == "photons" else "paths"))
-    batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30, for_denoiser=method == "pooled")
+    batches = BatchedRender(stage.integrator, stage.source, seed=3, memory=4 << 30, for_denoiser=method == "pooled")
     batches.add(samples)
     if method == "full":
         return batches.picture()
     denoiser = guided_denoiser(stage, "oidn")
-    return Denoised(batches, denoiser, "srgb", CORES, denoiser.coverage).picture()
+    return DenoisedPicture(batches, denoiser, "srgb", CORES, denoiser.coverage).picture()
 
 
 if __name__ == "__main__":

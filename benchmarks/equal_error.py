@@ -145,11 +145,11 @@ def _measure(stage: Stage, references: Path | None, reference_samples: int) -> d
 
 def pooled_batches(stage: Stage, samples: int) -> Any:
     """The samples of a pooled picture, as the program traces them."""
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.film.sample_batches import BatchedRender
 
     request = replace(stage.session.request, method="pooled", denoise="oidn", spp=samples, seed=3)
     light_up(stage, request)
-    batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30, for_denoiser=True)
+    batches = BatchedRender(stage.integrator, stage.source, seed=3, memory=4 << 30, for_denoiser=True)
     batches.add(samples)
     return batches
 
@@ -164,7 +164,7 @@ def _denoised(
     batches: Any,
 ) -> None:
     """One picture's noise taken out; and pooled light, as the program makes it: by halves, shared, beside samples."""
-    from lippmann.rendering.denoise.dual_buffer import Denoised
+    from lippmann.rendering.denoise.dual_buffer import DenoisedPicture
 
     samples, effort = how
 
@@ -178,7 +178,7 @@ def _denoised(
     sharing = guided(True)
 
     def pooled() -> Picture:
-        return Denoised(batches, sharing, "srgb", CORES, sharing.coverage).picture()
+        return DenoisedPicture(batches, sharing, "srgb", CORES, sharing.coverage).picture()
 
     for way, call in (
         ("full + oidn", lambda: plain(picture, samples)),
@@ -263,12 +263,11 @@ def light_up(stage: Any, request: Any, memory: int = 4 << 30) -> None:
     ``stage`` has the session, the integrator and the source of a :class:`Stage`.
     """
     from lippmann.rendering.preparation.prepare import prepare_light
+    from lippmann.rendering.transport.integrator import read_choices
 
     # All pictures of a stage are exposed alike.
-    request = replace(request, exposure=stage.session.choices.get("exposure", 0.0))
+    request = replace(request, exposure=read_choices(stage.integrator).get("exposure", 0.0))
     light = prepare_light(stage.integrator, request, stage.source, memory)
-    stage.session.choices.clear()
-    stage.session.choices.update(light.choices)
     stage.integrator = stage.integrator.lit_by(light)
 
 

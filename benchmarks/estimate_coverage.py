@@ -150,10 +150,11 @@ class Case:
 
     def beside_the_truth(self, traced: Any) -> dict[str, Any]:
         """What a picture says of itself, and what is true."""
-        from lippmann.rendering.provenance import state_error
+        from lippmann.rendering.provenance import describe_estimate
+        from lippmann.rendering.transport.integrator import read_choices
 
         psnr, worst = self.truth(traced.frame.pixels)
-        told: Any = state_error(traced.estimate, self.session.choices)
+        told: Any = describe_estimate(traced.estimate, read_choices(self.integrator))
         return {
             "samples": traced.samples,
             "psnr": psnr,

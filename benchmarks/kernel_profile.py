@@ -90,7 +90,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
 
     from lippmann.rendering.film import wavefront
     from lippmann.rendering.film.memory_model import cut_wavefronts
-    from lippmann.rendering.film.wavefront import samples_of_tile
+    from lippmann.rendering.film.wavefront import lay_out_wavefront
     from lippmann.rendering.transport import path, path_techniques
 
     source, paths = stage.source, stage.integrator
@@ -120,7 +120,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
         def call(seed: int) -> Any:
             path_techniques.TUNING = replace(tuning, photons_of_cell=most)
             with mock.patch.object(wavefront, "in_strips", return_value=0) if in_rows else nullcontext():
-                pixels, stream = samples_of_tile(source, plan, tile, run, seed, True)
+                pixels, stream = lay_out_wavefront(source, plan, tile, run, seed, True)
             with (
                 mock.patch.object(path_techniques.PhotonGathering, "arrive", path_techniques.Technique.arrive)
                 if is_dark
@@ -148,7 +148,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
         return way, steps
 
     def walks(seed: int) -> Any:
-        pixels, stream = samples_of_tile(source, plan, tile, run, seed, True)
+        pixels, stream = lay_out_wavefront(source, plan, tile, run, seed, True)
         way, steps = walk(pixels.ray(stream), stream)
         dr.eval(way, steps)
         return np.array(steps) - 1

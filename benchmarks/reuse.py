@@ -114,7 +114,7 @@ def _processor_time() -> Iterator[None]:
 
     with patch.object(Clock, "now", time.process_time), ExitStack() as patches:
         for module in (wavefront, pixel_tracer):
-            patches.enter_context(patch.object(module, "compile_seconds", lambda: 0.0))
+            patches.enter_context(patch.object(module, "measure_compilation", lambda: 0.0))
         yield
 
 

@@ -22,7 +22,7 @@ from lippmann.options.correction import check_correction
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.picture import render_picture
 from lippmann.rendering.request.plan import resolve
-from lippmann.rendering.request.preconditions import why_no_estimate
+from lippmann.rendering.request.preconditions import explain_missing_estimate
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.scene import Scene
@@ -84,7 +84,7 @@ def render_corrected(
     pixels = correction.rows(np.mean(halves, axis=0), share=step.share)
     options, note = step.describe(float(np.mean((pixels <= 0.0) | (pixels >= 1.0))))
     # A sample of each finer pixel is several of a pixel: why those have no estimate is not why this one has none.
-    of_finer = why_no_estimate(replace(asked, spp=finer.provenance.spp))
+    of_finer = explain_missing_estimate(replace(asked, spp=finer.provenance.spp))
     why = "no estimate of the error: pixels are solved for, so that the error of samples is not theirs"
     provenance = replace(
         finer.provenance,

@@ -14,7 +14,7 @@ from lippmann.display import Display, LensArray, Panel
 from lippmann.display.lens_profile import LensProfile
 from lippmann.display.view_cone import panel_window, view_window
 from lippmann.options.placement import PlacementOptions
-from lippmann.rendering.session import even_background
+from lippmann.rendering.session import find_uniform_background
 from lippmann.scene.placement import place
 from lippmann.scene.studio_light import BACKDROP
 
@@ -170,10 +170,10 @@ def test_only_an_even_background_is_known_without_rays(ball):
     from lippmann.rendering.request.render_request import RenderRequest
 
     built = build(ball)
-    assert even_background(built, RenderRequest(integrator="path")) == BACKDROP
-    assert even_background(built, RenderRequest(integrator="normal")) is None
+    assert find_uniform_background(built, RenderRequest(integrator="path")) == BACKDROP
+    assert find_uniform_background(built, RenderRequest(integrator="normal")) is None
     lit = lippmann.load_scene(trimesh.creation.box(), environment=None, background=(0.1, 0.2, 0.3))
-    assert even_background(build(lit), RenderRequest(integrator="direct")) == (0.1, 0.2, 0.3)
+    assert find_uniform_background(build(lit), RenderRequest(integrator="direct")) == (0.1, 0.2, 0.3)
 
 
 def test_rays_from_all_across_lenses_meet_a_box_inside_its_window_alone():

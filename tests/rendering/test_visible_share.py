@@ -4,24 +4,24 @@ import numpy as np
 import pytest
 
 from lippmann.rendering.film.wavefront import RayTotals
-from lippmann.rendering.provenance import visible_share, warn_of_emptiness
+from lippmann.rendering.provenance import measure_visible_share, warn_of_emptiness
 
 GREY = (0.2, 0.2, 0.2)
 
 
 def test_pixels_unlike_the_background_count():
     pixels = np.full((100, 50, 3), 0.2, np.float32)
-    assert visible_share(pixels, GREY, RayTotals(5000, 9000, 9000)) == 0
+    assert measure_visible_share(pixels, GREY, RayTotals(5000, 9000, 9000)) == 0
     pixels[10, :25, 1] = 0.5
-    assert visible_share(pixels, GREY, RayTotals()) == 0.005
+    assert measure_visible_share(pixels, GREY, RayTotals()) == 0.005
     pixels[:, :, 0] += 1e-4  # what a denoiser leaves
-    assert visible_share(pixels, GREY, RayTotals()) == 0.005
+    assert measure_visible_share(pixels, GREY, RayTotals()) == 0.005
 
 
 def test_rays_bound_the_share_where_the_background_varies():
     pixels = np.random.default_rng(1).random((10, 10, 3)).astype(np.float32)
-    assert visible_share(pixels, None, RayTotals(1000, 3, 2)) == pytest.approx(0.005)
-    assert visible_share(None, GREY, RayTotals(1000, 4000, 3000)) == 1
+    assert measure_visible_share(pixels, None, RayTotals(1000, 3, 2)) == pytest.approx(0.005)
+    assert measure_visible_share(None, GREY, RayTotals(1000, 4000, 3000)) == 1
 
 
 def test_the_warning_names_the_way_out():

@@ -152,7 +152,7 @@ def test_nothing_is_compiled_for_later_frames(engine, moving_ball, room, kind, m
         kernels[-1] |= {kernel["hash"] for kernel in dr.kernel_history() if "hash" in kernel}
         return 0.0
 
-    monkeypatch.setattr(sample_batches, "compile_seconds", look)
+    monkeypatch.setattr(sample_batches, "measure_compilation", look)
     images = render_sequence(motion, frames=[0, 1, 2], spp=2, device="cpu", **options)
     for _ in range(3):
         kernels.append(set())
@@ -170,7 +170,7 @@ def test_windows_of_any_size_share_kernels(engine, display, form, monkeypatch):
     from lippmann.rendering.film import sample_batches, wavefront
 
     for module in (sample_batches, wavefront):
-        monkeypatch.setattr(module, "compile_seconds", lambda started: 0.0)
+        monkeypatch.setattr(module, "measure_compilation", lambda started: 0.0)
     motion = open_turntable(api.load_scene("teapot"), 48)
     options = {"integrator": "path", "spp": 2, "device": "cpu"}
     if form == "display":

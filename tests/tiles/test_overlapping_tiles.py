@@ -102,7 +102,7 @@ def test_tiles_have_the_samples_of_the_whole_picture(settings):
 @pytest.mark.usefixtures("engine")
 def test_a_window_has_the_pixels_of_the_whole():
     from lippmann.display.panel import PixelWindow
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.film.sample_batches import BatchedRender
     from lippmann.rendering.transport.ray_source import WindowRays
     from lippmann.tiles.tile_render import prepare
 
@@ -110,7 +110,7 @@ def test_a_window_has_the_pixels_of_the_whole():
     window = PixelWindow(40, 25, 48, 33)
     pictures = []
     for source in (prepared.source, WindowRays(prepared.source, window)):
-        batches = FullInBatches(prepared.integrator, source, memory=1 << 28)
+        batches = BatchedRender(prepared.integrator, source, memory=1 << 28)
         batches.add(2)
         pictures.append(batches.picture())
     assert np.array_equal(pictures[0][25:58, 40:88], pictures[1])
@@ -197,8 +197,10 @@ def test_the_sums_of_tiles_give_the_estimate_of_the_whole():
     from lippmann.tiles.tile_render import LENSES, OF_SAMPLES, SUMS, lens_sums
 
     random = np.random.default_rng(0)
-    values, noisy, outliers, apart = (random.exponential(0.01, (128, 128)).astype(np.float32) for _ in range(4))
-    errors = PixelErrors(values - 0.005, None, PixelErrors(noisy, outliers * 0.1), apart * 0.1)
+    values, noisy, outliers, halves_variance = (
+        random.exponential(0.01, (128, 128)).astype(np.float32) for _ in range(4)
+    )
+    errors = PixelErrors(values - 0.005, None, PixelErrors(noisy, outliers * 0.1), halves_variance * 0.1)
     made, lenses = job(DENOISED), DISPLAY.lens_grid
     sums = {before: ErrorSums.none(lenses.columns) for before in ("", OF_SAMPLES)}
     for window in made.grid:

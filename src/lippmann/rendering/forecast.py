@@ -19,11 +19,12 @@ from lippmann.optics.proof import Proof, prove
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.memory_model import cut_wavefronts
-from lippmann.rendering.picture import find_window, lens_notes
+from lippmann.rendering.picture import describe_lens_gap, find_window
 from lippmann.rendering.request.plan import resolve
-from lippmann.rendering.request.preconditions import why_no_estimate
+from lippmann.rendering.request.preconditions import explain_missing_estimate
 from lippmann.rendering.request.render_request import RenderRequest, format_value
 from lippmann.rendering.session import Session, open_session
+from lippmann.rendering.transport.integrator import read_choices
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.runtime.machine import amount_in_words
 from lippmann.scene.placement import Placement, comfort_in_words
@@ -213,21 +214,21 @@ def forecast(
             "limit": session.memory,
         },
         seconds=seconds,
-        plan=_plan(session, source, window),
+        plan=_list_choices(session, integrator, source, window),
         probe={"samples": probed.samples, "seconds": probed.seconds},
         device=session.engine.gpu_name or f"cpu, {session.engine.threads} threads",
         proof=None if display.lens is None else prove(display),
-        notes=(*session.notes, *placement.warnings, *lens_notes(display)),
+        notes=(*session.notes, *placement.warnings, *describe_lens_gap(display)),
     )
 
 
-def _plan(
-    session: Session, source: DisplayRays | WindowRays, window: PixelWindow | None
+def _list_choices(
+    session: Session, integrator: Integrator, source: DisplayRays | WindowRays, window: PixelWindow | None
 ) -> dict[str, dict[str, object]]:
     """The plan with what the pilot, the scene's box and the memory came to."""
     request = session.request
     assert request.plan is not None
-    plan = request.plan.with_pilot(session.choices).to_dict()
+    plan = request.plan.with_pilot(read_choices(integrator)).to_dict()
     if window is None:
         traced: dict[str, object] = {"value": "all pixels", "reason": "the picture's every pixel is traced"}
     else:
@@ -269,10 +270,10 @@ class _Probe:
     def trace(self, integrator: Integrator, session: Session) -> _ProbeResult:
         """Sample the pixels again and again, each time with twice as many samples, until the time is up."""
         from lippmann.rendering.film.batched_picture import STREAMS
-        from lippmann.rendering.film.sample_batches import FullInBatches
+        from lippmann.rendering.film.sample_batches import BatchedRender
 
         request, progress = session.request, session.watch.progress
-        batches = FullInBatches(
+        batches = BatchedRender(
             integrator,
             self._pixels,
             seed=request.seed,
@@ -332,7 +333,7 @@ def _working_bytes(source: DisplayRays | WindowRays, session: Session) -> int:
     pixels = source.width * source.height * (3 if request.keeps_colors(source.display) else 1)
     lanes = cut_wavefronts(source.width, source.height, request.samples, channels=source.channels, memory=limit).lanes
     wave = lanes * memory_model.BYTES_PER_LANE
-    if why_no_estimate(request) is not None:
+    if explain_missing_estimate(request) is not None:
         kept = 0
     elif request.denoises:
         kept = pixels * memory_model.batches(memory_model.MOST_BATCHES)

@@ -15,22 +15,22 @@ from lippmann.display import Display
 from lippmann.display.panel import PixelWindow
 from lippmann.options.choices import Method
 from lippmann.progress import ProgressCallback
-from lippmann.rendering.adaptive.stopping import Goal, Outcome, make_goal, reach
+from lippmann.rendering.adaptive.stopping import Goal, Outcome, make_goal, sample_until
 from lippmann.rendering.adaptive.tuning import TUNING
-from lippmann.rendering.denoise.dual_buffer import Denoised, clean_light, exchange_coverage, remove_excess
+from lippmann.rendering.denoise.dual_buffer import DenoisedPicture, correct_coverage, denoise_light, remove_excess
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts, PixelErrors
 from lippmann.rendering.film.memory_model import cut_wavefronts
-from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
+from lippmann.rendering.film.sample_batches import BatchedRender, trace_in_batches
 from lippmann.rendering.film.wavefront import Frame, trace_frame
 from lippmann.rendering.provenance import is_among_mirrors
 from lippmann.rendering.reprojection.point_image import STATUS_LAYER, TRACED
-from lippmann.rendering.request.preconditions import why_no_estimate
+from lippmann.rendering.request.preconditions import explain_missing_estimate
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.request.tuning import TUNING as REQUEST
 from lippmann.rendering.session import Session
-from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator
+from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator, read_choices
 from lippmann.rendering.transport.ray_source import DisplayRays, OnePicture, QuiltRays, SubpixelRays, WindowRays
 
 Floats = NDArray[np.float32]
@@ -130,9 +130,9 @@ def trace(job: Job) -> Traced:
 
 def trace_samples(job: Job) -> Traced:
     """Full rendering: a given number of samples or as many as a goal needs; denoised if requested."""
-    why = why_no_estimate(job.request)
+    why = explain_missing_estimate(job.request)
     if why is not None:
-        return trace_unjudged(job, why)
+        return trace_without_estimate(job, why)
     if job.is_part:
         return _denoise_part(job)
     request = job.request
@@ -140,7 +140,7 @@ def trace_samples(job: Job) -> Traced:
     return _trace_fixed(job) if is_fixed else _trace_in_rounds(job)
 
 
-def trace_unjudged(job: Job, *notes: str) -> Traced:
+def trace_without_estimate(job: Job, *notes: str) -> Traced:
     """A fixed number of samples without an error estimate; denoised if requested."""
     return denoise_whole(job, trace_one_stream(job, *notes))
 
@@ -204,7 +204,7 @@ def _trace_in_rounds(job: Job) -> Traced:
     goal = _start_goal(job)
     assessment = 0.0 if denoiser is None or goal.max_time is None else denoiser.probe(REQUEST.fewest)
     first = REQUEST.usual if denoiser is None else REQUEST.fewest
-    outcome = reach(
+    outcome = sample_until(
         goal,
         batches,
         picture,
@@ -217,7 +217,7 @@ def _trace_in_rounds(job: Job) -> Traced:
     if outcome.estimate is None and goal.seconds_left(time.perf_counter() - (goal.began or 0.0)) < assessment:
         # The time is up after one sample, and denoising takes longer than what is left.
         picture, denoiser = batches, None
-    notes = _end_notes(goal, outcome)
+    notes = _describe_end(goal, outcome)
     return _assemble(job, batches, picture, denoiser, errors=outcome.errors, estimate=outcome.estimate, notes=notes)
 
 
@@ -232,8 +232,8 @@ def _start_goal(job: Job) -> Goal:
 
 def _assemble(
     job: Job,
-    batches: FullInBatches,
-    picture: FullInBatches | Denoised,
+    batches: BatchedRender,
+    picture: BatchedRender | DenoisedPicture,
     denoiser: GuidedDenoiser | None,
     *,
     errors: PixelErrors | None,
@@ -245,12 +245,12 @@ def _assemble(
     if errors is not None:
         frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
     traced = Traced(frame, batches.samples, estimate, notes, errors=errors)
-    return traced if denoiser is None else _add_denoiser(traced, denoiser)
+    return traced if denoiser is None else _record_denoiser(traced, denoiser)
 
 
-def _make_batches(job: Job, memory: int | None = None, window: PixelWindow | None = None) -> FullInBatches:
+def _make_batches(job: Job, memory: int | None = None, window: PixelWindow | None = None) -> BatchedRender:
     """The picture in batches, or a window of it within ``memory`` bytes."""
-    return FullInBatches(
+    return BatchedRender(
         job.integrator,
         job.sample_source,
         seed=job.request.seed,
@@ -270,8 +270,8 @@ def _denoise_part(job: Job) -> Traced:
     return _assemble(job, batches, picture, job.denoiser, errors=picture.squared_error(), estimate=None)
 
 
-def _make_denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Denoised:
-    return Denoised(batches, denoiser, job.request.coding, job.session.engine.threads, denoiser.coverage)
+def _make_denoised(job: Job, batches: BatchedRender, denoiser: GuidedDenoiser) -> DenoisedPicture:
+    return DenoisedPicture(batches, denoiser, job.request.coding, job.session.engine.threads, denoiser.coverage)
 
 
 def _make_estimator(job: Job) -> PictureEstimator:
@@ -287,7 +287,7 @@ def _make_estimator(job: Job) -> PictureEstimator:
     else:
         assert isinstance(source, DisplayRays)
         parts = source.display
-    return PictureEstimator(parts, is_among_mirrors(job.session.choices))
+    return PictureEstimator(parts, is_among_mirrors(read_choices(job.integrator)))
 
 
 def _reproject(job: Job) -> Traced:
@@ -322,19 +322,19 @@ def denoise_whole(job: Job, traced: Traced) -> Traced:
     frame, source, denoiser = traced.frame, job.sample_source, job.denoiser
     noisy = frame.pixels
     if frame.coverage is not None and (further := denoiser.coverage()) is not None:
-        noisy = exchange_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)
+        noisy = correct_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)
     # The network runs once, not for each of two halves: its high effort is worth its time from half as many samples on.
-    clean = remove_excess(clean_light(noisy, frame.specular, denoiser, 2 * traced.samples), frame.excess)
+    clean = remove_excess(denoise_light(noisy, frame.specular, denoiser, 2 * traced.samples), frame.excess)
     frame.pixels = source.own_colors(clean) if isinstance(source, SubpixelRays) else clean
-    return _add_denoiser(traced, denoiser)
+    return _record_denoiser(traced, denoiser)
 
 
-def _add_denoiser(traced: Traced, denoiser: GuidedDenoiser) -> Traced:
+def _record_denoiser(traced: Traced, denoiser: GuidedDenoiser) -> Traced:
     options: dict[str, object] = {"denoise": "oidn", "denoise_effort": denoiser.used}
     return replace(traced, options=options, seconds={"denoise": denoiser.seconds})
 
 
-def _end_notes(goal: Goal, outcome: Outcome) -> tuple[str, ...]:
+def _describe_end(goal: Goal, outcome: Outcome) -> tuple[str, ...]:
     if outcome.estimate is None:
         return ("no estimate of the error: there was time for one sample per pixel only",)
     if outcome.end == "quality" or not goal.has_quality or not goal.is_promise:

@@ -16,7 +16,8 @@ from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.provenance import make_provenance
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.session import Build, Session, even_background, open_session
+from lippmann.rendering.session import Build, Session, find_uniform_background, open_session
+from lippmann.rendering.transport.integrator import read_choices
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.placement import Placement
 from lippmann.scene.scene import Scene
@@ -75,7 +76,7 @@ def render_picture(
     traced = trace(Job(session, integrator, part, display_from_world))
     frame = traced.frame
     if window is not None:
-        _widen(frame, window, display, even_background(session.built, request))
+        _pad_to_picture(frame, window, display, find_uniform_background(session.built, request))
     session.watch.seconds.update(traced.seconds)
     if request.layers:
         frame.maps |= session.watch.stage(
@@ -94,15 +95,16 @@ def render_picture(
             **traced.options,
             **describe_placement(request, placement),
         },
+        choices=read_choices(integrator),
         estimate=traced.estimate,
-        notes=(*placement.warnings, *lens_notes(display), *traced.notes),
+        notes=(*placement.warnings, *describe_lens_gap(display), *traced.notes),
     )
     # Files hold whole numbers of 32 bits.
     maps = {name: v.astype(np.uint32) if v.dtype.kind in "iu" else v for name, v in frame.maps.items()}
     return IntegralImage(request.tone_mapped(frame.pixels), display, placement.world_from_display, provenance, maps)
 
 
-def lens_notes(display: Display) -> tuple[str, ...]:
+def describe_lens_gap(display: Display) -> tuple[str, ...]:
     """A line on the gap behind the real lenses of a display; none where it has only a pitch."""
     if display.lens is None:
         return ()
@@ -120,9 +122,12 @@ def choose_exposure(scene: Scene, display: Display, request: RenderRequest, buil
     """
     session = open_session(scene, resolve(request, scene, display), build=build)
     placement = session.place(display)
-    session.integrator(session.rays(display, placement), placement.display_from_world, placement.exposure)
+    source = session.rays(display, placement)
+    integrator = session.integrator(source, placement.display_from_world, placement.exposure)
     # A fixed exposure comes on top of the camera's own.
-    return cast("float", session.choices.get("exposure", 0.0)) - session.count_exposure(placement.exposure)
+    return cast("float", read_choices(integrator).get("exposure", 0.0)) - session.choose_own_exposure(
+        placement.exposure
+    )
 
 
 def find_window(session: Session, display: Display, placement: Placement) -> PixelWindow | None:
@@ -136,12 +141,12 @@ def find_window(session: Session, display: Display, placement: Placement) -> Pix
     built, request = session.built, session.request
     if request.method in REUSING or request.denoise == "none" or not isinstance(built, BuiltScene):
         return None
-    if even_background(built, request) is None:
+    if find_uniform_background(built, request) is None:
         return None
     return panel_window(scene_corners(built, placement.display_from_world), display)
 
 
-def _widen(frame: Frame, window: PixelWindow, display: Display, background: Color | None) -> None:
+def _pad_to_picture(frame: Frame, window: PixelWindow, display: Display, background: Color | None) -> None:
     """Pad the traced window to the whole picture with background; maps are 0 there."""
     size = display.panel.height, display.panel.width
     pixels = np.empty((*size, 3), dtype=np.float32)

@@ -10,6 +10,7 @@ from lippmann.rendering.provenance import make_provenance
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session
+from lippmann.rendering.transport.integrator import read_choices
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.camera_placement import remove_scale
 from lippmann.scene.scene import Scene
@@ -32,7 +33,7 @@ def render_preview(
     session = open_session(scene, request, size, progress=progress)
     pose = scene.camera(camera)
 
-    from lippmann.rendering.methods import Job, trace_unjudged
+    from lippmann.rendering.methods import Job, trace_without_estimate
     from lippmann.rendering.transport.ray_source import CameraRays, OnePicture
     from lippmann.rendering.transport.whitted_camera import WhittedCameraRays
 
@@ -45,8 +46,9 @@ def render_preview(
     session.face_viewer(remove_scale(pose))
     frame_from_world = np.linalg.inv(np.asarray(pose.world_from_camera, dtype=np.float64))
     integrator = session.integrator(source, frame_from_world, pose.exposure)
-    traced = trace_unjudged(Job(session, integrator, source, frame_from_world))
+    traced = trace_without_estimate(Job(session, integrator, source, frame_from_world))
     session.watch.seconds.update(traced.seconds)
     options = {"pixel_filter": request.pixel_filter, "camera": pose.name, **traced.options}
-    provenance = make_provenance(session, traced.frame, samples=traced.samples, options=options)
+    choices = read_choices(integrator)
+    provenance = make_provenance(session, traced.frame, samples=traced.samples, options=options, choices=choices)
     return Preview(request.tone_mapped(traced.frame.pixels), provenance)

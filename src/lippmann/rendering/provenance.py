@@ -16,7 +16,7 @@ from lippmann.options.quality import QualityOptions
 from lippmann.options.texts import settings_of
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.request.tuning import TUNING
-from lippmann.rendering.session import Session, Stopwatch, even_background
+from lippmann.rendering.session import Session, Stopwatch, find_uniform_background
 from lippmann.scene.values.description import Color
 
 if TYPE_CHECKING:
@@ -33,19 +33,21 @@ def make_provenance(
     *,
     samples: int,
     options: Mapping[str, object],
+    choices: Mapping[str, object],
     estimate: Estimate | None = None,
     notes: tuple[str, ...] = (),
     has_pixels: bool = True,
 ) -> Provenance:
     """How a picture of ``frame`` was made, for its file.
 
-    ``has_pixels`` says that the frame holds the picture, not its size alone.
+    ``choices`` are those of the integrator's prepared light. ``has_pixels`` says that the frame holds the picture, not
+    its size alone.
     """
     request = session.request
     height, width = frame.pixels.shape[:2]
     rays, work = frame.rays, height * width * samples * request.channels
     assert request.plan is not None  # of a resolved request
-    plan = request.plan.with_pilot(session.choices).lines()
+    plan = request.plan.with_pilot(choices).lines()
     return Provenance(
         method=request.method,
         integrator=request.integrator,
@@ -61,12 +63,12 @@ def make_provenance(
         pixel_shares=frame.shares,
         rays={"primary": rays.primary, "shadow": rays.shadow, "secondary": rays.secondary},
         seconds=_stage_seconds(session.watch, frame),
-        estimate=state_error(estimate, session.choices),
-        options={**options, **session.choices, "plan": plan, "settings": _settings(session)},
+        estimate=describe_estimate(estimate, choices),
+        options={**options, **choices, "plan": plan, "settings": _settings(session)},
         notes=(
             *session.notes,
             *notes,
-            *light_notes(request, estimate, samples, session.choices),
+            *describe_light(request, estimate, samples, choices),
             *_frame_notes(frame),
             *_warn_of_emptiness(session, frame, has_pixels),
         ),
@@ -83,14 +85,14 @@ def _settings(session: Session) -> list[str]:
 def _warn_of_emptiness(session: Session, frame: Frame, has_pixels: bool) -> tuple[str, ...]:
     if session.request.integrator not in LIGHT:
         return ()
-    background = even_background(session.built, session.request)
+    background = find_uniform_background(session.built, session.request)
     scene = getattr(session.built, "mitsuba", None)
     if background is None and scene is not None and scene.environment() is None:
         background = (0.0, 0.0, 0.0)
     by_rays = background is None or not has_pixels
     if by_rays and (session.scene.keeps_its_colors or (background is not None and max(background) == 0.0)):
         return ()  # neither colours nor rays would tell what glows from the background: paths end at both
-    return warn_of_emptiness(visible_share(frame.pixels if has_pixels else None, background, frame.rays))
+    return warn_of_emptiness(measure_visible_share(frame.pixels if has_pixels else None, background, frame.rays))
 
 
 def _stage_seconds(watch: Stopwatch, frame: Frame) -> dict[str, float]:
@@ -113,7 +115,7 @@ def _frame_notes(frame: Frame) -> tuple[str, ...]:
     return (f"{frame.rays.discarded} samples were not finite and count as black",)
 
 
-def state_error(estimate: Estimate | None, choices: Mapping[str, object]) -> dict[str, object] | None:
+def describe_estimate(estimate: Estimate | None, choices: Mapping[str, object]) -> dict[str, object] | None:
     """The estimate as metadata; None where the samples miss light that their differences cannot reveal.
 
     Parameters
@@ -133,7 +135,7 @@ def is_among_mirrors(choices: Mapping[str, object]) -> bool:
     return choices.get("caustics", "paths") != "paths"
 
 
-def light_notes(
+def describe_light(
     request: RenderRequest, estimate: Estimate | None, samples: int, choices: Mapping[str, object]
 ) -> tuple[str, ...]:
     """Sentences on the light of a picture that was made by ``request``; ``samples`` are those of each pixel."""
@@ -164,7 +166,7 @@ def _misses_caustics(choices: Mapping[str, object]) -> bool:
     return choices.get("caustics") == "paths"
 
 
-def visible_share(pixels: NDArray[np.float32] | None, background: Color | None, rays: RayTotals) -> float:
+def measure_visible_share(pixels: NDArray[np.float32] | None, background: Color | None, rays: RayTotals) -> float:
     """Share of a picture's pixels that may show something of the scene, at most 1.
 
     Parameters

@@ -17,7 +17,8 @@ from lippmann.rendering.picture import describe_placement
 from lippmann.rendering.provenance import make_provenance
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.session import Build, even_background, open_session
+from lippmann.rendering.session import Build, find_uniform_background, open_session
+from lippmann.rendering.transport.integrator import read_choices
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Color
@@ -79,7 +80,7 @@ def render_quilt(
 
     display_from_world = placement.display_from_world
     (columns, rows), view_size = grid, (size[0] // grid[0], size[1] // grid[1])
-    background, window = even_background(session.built, request), None
+    background, window = find_uniform_background(session.built, request), None
     if background is not None and isinstance(session.built, BuiltScene):
         window = view_window(scene_corners(session.built, display_from_world), display, view_size)
     source = QuiltRays(display, placement.world_from_display, columns, rows, view_size, window)
@@ -98,6 +99,7 @@ def render_quilt(
             "window": list(astuple(source.window)),
             **describe_placement(request, placement),
         },
+        choices=read_choices(integrator),
         estimate=traced.estimate,
         notes=(*placement.warnings, *traced.notes),
     )

@@ -22,7 +22,7 @@ from lippmann.options.integrators import INTEGRATORS
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.film.memory_model import cut_wavefronts
-from lippmann.rendering.request.plan import follow
+from lippmann.rendering.request.plan import apply_plan
 from lippmann.rendering.request.render_request import Choice, RenderRequest
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
@@ -88,8 +88,6 @@ class Session:
         Bytes that the picture may use.
     watch:
         Times the stages and reports them.
-    choices:
-        What was measured before the first ray of the picture, for its file.
     """
 
     scene: Scene
@@ -98,7 +96,6 @@ class Session:
     built: BuiltScene | BuiltClassic
     memory: int
     watch: Stopwatch
-    choices: dict[str, object] = field(default_factory=dict)
     #: Visible depths by the views of cameras: a film asks for the same ones at every frame.
     depths: dict[bytes, VisibleDepth | None] = field(default_factory=dict)
 
@@ -192,16 +189,15 @@ class Session:
         own_exposure:
             Stops of the camera from which the picture is taken.
         """
-        return self.watch.stage(
-            "build",
-            lambda: self._in_front(
-                self._prepare_light(make_integrator(self.built, self.request, frame_from_world), source, own_exposure),
-                frame_from_world,
-            ),
-        )
 
-    def _in_front(self, integrator: Integrator, frame_from_world: Matrix) -> Integrator:
-        """An integrator with the splats or the volume that stand in front of what it shows."""
+        def make() -> Integrator:
+            unlit = make_integrator(self.built, self.request, frame_from_world)
+            return self._put_in_front(self._prepare_light(unlit, source, own_exposure), frame_from_world)
+
+        return self.watch.stage("build", make)
+
+    def _put_in_front(self, integrator: Integrator, frame_from_world: Matrix) -> Integrator:
+        """``integrator`` with the scene's splats or volume, if any, composited in front of its radiance."""
         from lippmann.device.pbr import BuiltScene
         from lippmann.rendering.transport.in_front import GridVolumeIntegrator, SplatIntegrator
 
@@ -214,7 +210,7 @@ class Session:
             return SplatIntegrator(integrator, built, built.splats, self.engine.threads)
         return integrator
 
-    def count_exposure(self, own_exposure: float) -> float:
+    def choose_own_exposure(self, own_exposure: float) -> float:
         """``own_exposure`` where the light is that of the scene's file; 0 for the built-in studio."""
         scene = self.scene
         is_lit = scene.has_physical_lights or (scene.environment is not None and not scene.in_studio)
@@ -233,17 +229,13 @@ class Session:
             self.request,
             source,
             memory_limit(self.request),
-            even_background(self.built, self.request),
-            own_exposure=self.count_exposure(own_exposure),
+            find_uniform_background(self.built, self.request),
+            own_exposure=self.choose_own_exposure(own_exposure),
             stands_alone=not self.scene.lies_off_surfaces,
             weighs_emitters=isinstance(self.built, BuiltScene) and not self.built.borrowed,
         )
         keep = self.request.keep_light
-        light = prepare() if keep is None else keep(prepare, self.scene, self.built, own_exposure)
-        # Drops the choices of an earlier picture.
-        self.choices.clear()
-        self.choices.update(light.choices)
-        return integrator.lit_by(light)
+        return integrator.lit_by(prepare() if keep is None else keep(prepare, self.scene, self.built, own_exposure))
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -303,7 +295,7 @@ def _without_pooling(request: RenderRequest, built: BuiltScene | BuiltClassic) -
         return request
     if request.method == "pooled" and request.plan is not None and request.reason:
         plan = replace(request.plan, method=Choice("full", "participating media, whose light lies on no surface"))
-        return follow(plan, request)
+        return apply_plan(plan, request)
     if request.method == "pooled" or request.method in REUSING:
         raise UsageError(
             f"{request.method} shares the light of surfaces",
@@ -314,7 +306,7 @@ def _without_pooling(request: RenderRequest, built: BuiltScene | BuiltClassic) -
     return request
 
 
-def even_background(built: BuiltScene | BuiltClassic, request: RenderRequest) -> Color | None:
+def find_uniform_background(built: BuiltScene | BuiltClassic, request: RenderRequest) -> Color | None:
     """The colour of all rays that hit nothing; None if they differ, as before an environment."""
     if request.integrator not in POOLED_LIGHT or getattr(built, "has_media", False):
         return None  # a medium may surround the scene

@@ -217,7 +217,7 @@ def _best_side(display: Display, request: RenderRequest) -> int:
     smallest = SIDES[-1]
     required = bytes_of_tile(smallest, display, request)
     if memory is not None and memory < required:
-        raise memory_model.too_small(memory, "a tile, beside the scene", required)
+        raise memory_model.make_memory_error(memory, "a tile, beside the scene", required)
     return smallest
 
 

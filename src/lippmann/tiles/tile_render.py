@@ -14,13 +14,13 @@ from lippmann.display.panel import PixelWindow
 from lippmann.image.encoding import stored_values
 from lippmann.journal.tile_file import TileResult
 from lippmann.progress import ProgressCallback, silent
-from lippmann.rendering.denoise.guided_denoiser import effort_of
+from lippmann.rendering.denoise.guided_denoiser import choose_effort
 from lippmann.rendering.estimate.psnr import ERROR_LAYER, ErrorSums, PixelErrors
 from lippmann.rendering.film.memory_model import cut_wavefronts
-from lippmann.rendering.film.sample_batches import FullInBatches
+from lippmann.rendering.film.sample_batches import BatchedRender
 from lippmann.rendering.film.wavefront import RayTotals, trace_frame
 from lippmann.rendering.methods import SAMPLES_LAYER, Job, trace
-from lippmann.rendering.request.preconditions import why_no_estimate
+from lippmann.rendering.request.preconditions import explain_missing_estimate
 from lippmann.rendering.session import Session, Stopwatch, open_session
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
@@ -59,7 +59,7 @@ class Prepared:
         cut: dict[str, object] = {"tile_side": job.side, "tile_margin": job.surroundings.margin}
         if not job.request.denoises:
             return cut
-        effort = effort_of(job.request.denoise, job.request.samples)
+        effort = choose_effort(job.request.denoise, job.request.samples)
         return {**cut, "denoise": "oidn", "denoise_effort": effort}
 
 
@@ -95,7 +95,7 @@ def prepare(job: TileJob, progress: ProgressCallback = silent) -> Prepared:
     integrator = session.integrator(source, placement.display_from_world, placement.exposure)
     # Tiles are traced in silence, whoever counts them.
     quiet = replace(session, watch=Stopwatch())
-    return Prepared(job, quiet, placement, why_no_estimate(request), integrator, source)
+    return Prepared(job, quiet, placement, explain_missing_estimate(request), integrator, source)
 
 
 @exclusive()
@@ -124,7 +124,7 @@ def trace_tile(prepared: Prepared, index: int) -> TracedTile:
             corner=(window.top, window.left),
         )
         return TracedTile(index, frame.pixels, None, frame.rays)
-    batches = FullInBatches(
+    batches = BatchedRender(
         prepared.integrator,
         prepared.source,
         seed=request.seed,

@@ -40,6 +40,7 @@ from lippmann.rendering.film import memory_model
 from lippmann.rendering.provenance import is_among_mirrors, make_provenance
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import memory_limit
+from lippmann.rendering.transport.integrator import read_choices
 from lippmann.runtime import engine as engines
 from lippmann.scene.scene import Scene
 from lippmann.tiles.job import SIDES, TileJob, make_job
@@ -249,7 +250,7 @@ def _sum_up(prepared: Prepared, store: TileStore) -> Provenance:
     if prepared.no_estimate is not None:
         notes |= {prepared.no_estimate: None}
     else:
-        mirrors = is_among_mirrors(prepared.session.choices)
+        mirrors = is_among_mirrors(read_choices(prepared.integrator))
         estimate = estimate_sums(sums[""], sums.get(OF_SAMPLES), size, job.request.samples, mirrors)
     # Only the size of these pixels is asked for; they take no memory.
     frame = Frame(np.broadcast_to(np.float32(0), (job.grid.height, job.grid.width, 3)), rays)
@@ -257,6 +258,7 @@ def _sum_up(prepared: Prepared, store: TileStore) -> Provenance:
         prepared.session,
         frame,
         samples=job.request.samples,
+        choices=read_choices(prepared.integrator),
         estimate=estimate,
         options={
             **({"auto": job.request.reason} if job.request.reason else {}),
@@ -394,7 +396,7 @@ def _check_fits(job: TileJob, name: FormatName) -> None:
     if required > memory:
         what = f"{job.grid.width}x{job.grid.height} pixels as {name.upper()}, which is written whole"
         fix = "give the output the ending .tif or .zarr, or raise the limit"
-        raise memory_model.too_small(memory, what, required, fix)
+        raise memory_model.make_memory_error(memory, what, required, fix)
 
 
 def _side_of(output: Path) -> int | None:

@@ -14,7 +14,7 @@ from lippmann.display import Display
 from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.progress import Progress
-from lippmann.rendering.adaptive.stopping import Goal, make_goal, reach
+from lippmann.rendering.adaptive.stopping import Goal, make_goal, sample_until
 from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.psnr import Estimate, PixelErrors
@@ -54,7 +54,7 @@ class Noise:
 def run(goal, renderer, reports=None, *, first=16, slope=1.0, **options):
     listen = reports.append if reports is not None else lambda _: None
     options |= {"first": first, "slope": slope, "progress": listen, "clock": renderer.clock}
-    return reach(goal, renderer, renderer, PictureEstimator(SHOWN), **options)
+    return sample_until(goal, renderer, renderer, PictureEstimator(SHOWN), **options)
 
 
 @pytest.mark.parametrize("slope", [0.8, 1.0, 1.5])
@@ -186,18 +186,18 @@ def test_reports_climb_to_the_end_and_say_where_the_picture_stands():
 
 def test_missing_is_by_the_likely_value_and_by_the_low_end():
     wide = Estimate(45, 44, 46, 41.0, 38.0, 43.0, (0, 0))
-    assert Goal(quality_worst=40).missing(wide) == pytest.approx(1.0)
+    assert Goal(quality_worst=40).measure_shortfall(wide) == pytest.approx(1.0)
     narrow = Estimate(45, 44.9, 45.1, 41.0, 40.8, 41.2, (0, 0))
-    assert Goal(quality_worst=42).missing(narrow) == pytest.approx(1.0)
-    assert Goal(quality=44).missing(wide) <= 0
+    assert Goal(quality_worst=42).measure_shortfall(narrow) == pytest.approx(1.0)
+    assert Goal(quality=44).measure_shortfall(wide) <= 0
 
 
 def test_a_quality_of_the_whole_asks_for_micro_images_too():
     estimate = Estimate(38.0, 37.0, 39.0, 26.0, 25.0, 27.0, (0, 0))
-    assert Goal(quality=35).missing(estimate) == pytest.approx(-3)
+    assert Goal(quality=35).measure_shortfall(estimate) == pytest.approx(-3)
     # The worst micro-image may have 12 dB less than the whole.
-    assert Goal(quality=39).missing(estimate) == pytest.approx(1)
-    assert Goal(quality=38).missing(replace(estimate, worst=25.5)) == pytest.approx(0.5)
+    assert Goal(quality=39).measure_shortfall(estimate) == pytest.approx(1)
+    assert Goal(quality=38).measure_shortfall(replace(estimate, worst=25.5)) == pytest.approx(0.5)
 
 
 def test_a_default_picture_is_to_be_clean_by_the_likely_value():
@@ -208,10 +208,10 @@ def test_a_default_picture_is_to_be_clean_by_the_likely_value():
     assert goal == Goal(TUNING.clean, spp=with_reserve.spp_reserve, is_promise=False)
     worst = TUNING.clean - TUNING.most_below
     wide = Estimate(TUNING.clean, 20.0, 50.0, worst, 5.0, 40.0, (0, 0))
-    assert goal.missing(wide) == 0
+    assert goal.measure_shortfall(wide) == 0
     # However good the picture is as a whole.
-    assert goal.missing(replace(wide, psnr=50.0, worst=worst - 2)) == pytest.approx(2)
+    assert goal.measure_shortfall(replace(wide, psnr=50.0, worst=worst - 2)) == pytest.approx(2)
 
 
 def test_without_a_quality_nothing_is_missing():
-    assert Goal(spp=8).missing(Estimate(5.0, 4.0, 6.0, 1.0, 0.0, 2.0, (0, 0))) == -math.inf
+    assert Goal(spp=8).measure_shortfall(Estimate(5.0, 4.0, 6.0, 1.0, 0.0, 2.0, (0, 0))) == -math.inf

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import lippmann
 from lippmann.color.transfer import encode_srgb
-from lippmann.rendering.denoise.dual_buffer import exchange_coverage
+from lippmann.rendering.denoise.dual_buffer import correct_coverage
 from lippmann.rendering.film.wavefront import Coverage
 
 HEIGHT, WIDTH = 12, 20
@@ -45,7 +45,7 @@ def test_no_bias_and_less_noise(samples):
         paths, further = sampled(random, share, samples), sampled(random, share, 8)
         noisy = picture(random, paths)
         before.append(noisy - truth)
-        after.append(exchange_coverage(noisy, paths, further) - truth)
+        after.append(correct_coverage(noisy, paths, further) - truth)
     before, after = np.array(before), np.array(after)
     deviation = np.maximum(after.std(axis=0), 1e-4) / np.sqrt(len(after))
     assert np.abs(after.mean(axis=0) / deviation).max() < 4.8  # of 720 values
@@ -60,9 +60,9 @@ def test_pixels_without_both_sides_around_stay():
     pixels = np.full((5, 5, 3), 0.5, np.float32)
     paths = Coverage(np.ones((5, 5, 1), np.float32), 2)
     further = Coverage(np.full((5, 5, 1), 0.5, np.float32), 8)
-    assert np.array_equal(exchange_coverage(pixels, paths, further), pixels)
+    assert np.array_equal(correct_coverage(pixels, paths, further), pixels)
     half = Coverage(np.full((5, 5, 1), 0.4, np.float32), 5)
-    np.testing.assert_allclose(exchange_coverage(pixels, half, further), pixels, rtol=1e-6)
+    np.testing.assert_allclose(correct_coverage(pixels, half, further), pixels, rtol=1e-6)
 
 
 def test_highlights_around_count_as_white():
@@ -72,7 +72,7 @@ def test_highlights_around_count_as_white():
     share[:, 0] = 0
     share[1, 1] = 0.5
     pixels[0, 2] = 100
-    lit = exchange_coverage(pixels, Coverage(share, 2), Coverage(np.ones((3, 3, 1), np.float32), 8))
+    lit = correct_coverage(pixels, Coverage(share, 2), Coverage(np.ones((3, 3, 1), np.float32), 8))
     assert 0.2 < lit[1, 1].max() < 1
     assert (lit >= 0).all()
 
@@ -84,7 +84,7 @@ def test_a_surface_that_is_beyond_white_all_around_covers_by_that():
     pixels[:, :3], share[:, :3] = 0.1, 0
     further = share.copy()
     further[1, 2] = 0.1
-    found = exchange_coverage(pixels, Coverage(share, 2), Coverage(further, 10**6))
+    found = correct_coverage(pixels, Coverage(share, 2), Coverage(further, 10**6))
     assert found[1, 2] == pytest.approx(np.full(3, 0.1 + 0.1 * 4.9), rel=1e-3)
     found[1, 2] = 0.1
     assert np.array_equal(found, pixels)
@@ -99,7 +99,7 @@ def test_each_sub_pixel_by_its_own_rays():
     pixels[1, 1] = 0.4
     further = share.copy()
     further[1, 1] = [0.0, 0.5, 1.0]
-    found = exchange_coverage(pixels, Coverage(share, 2), Coverage(further, 6))
+    found = correct_coverage(pixels, Coverage(share, 2), Coverage(further, 6))
     assert found[1, 1] == pytest.approx([0.1, 0.4, 0.7], abs=1e-5)
     found[1, 1] = pixels[1, 1]
     assert np.array_equal(found, pixels)
@@ -138,7 +138,7 @@ def test_as_it_is_specified(seed, channels, samples):
     paths, further = (Coverage(share.astype(np.float32), n) for share, n in zip(shares, (samples, 8), strict=True))
     pixels = random.exponential(0.5, (6, 7, 3)).astype(np.float32)
     kept = pixels.copy()
-    found = exchange_coverage(pixels, paths, further)
+    found = correct_coverage(pixels, paths, further)
     np.testing.assert_allclose(found, by_coverage_pixel_by_pixel(pixels, paths, further), rtol=0, atol=1e-5)
     assert np.array_equal(pixels, kept)
 
@@ -166,7 +166,7 @@ def test_leaves_before_the_sky(method, samples, monkeypatch):
     references = [tree("full", 64, seed=seed, denoise="none") for seed in (8, 9)]
     found = tree(method, samples, denoise="oidn-fast")
     for user in ("rendering.methods", "rendering.denoise.dual_buffer"):
-        monkeypatch.setattr(f"lippmann.{user}.exchange_coverage", lambda pixels, *_, **__: pixels)
+        monkeypatch.setattr(f"lippmann.{user}.correct_coverage", lambda pixels, *_, **__: pixels)
     without = tree(method, samples, denoise="oidn-fast")
     assert error(found, references) < 0.65 * error(without, references)
     assert found.provenance.rays == without.provenance.rays

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lippmann.color.transfer import encode, encode_srgb
-from lippmann.rendering.denoise.dual_buffer import Denoised
+from lippmann.rendering.denoise.dual_buffer import DenoisedPicture
 from lippmann.rendering.denoise.tuning import TUNING
 from lippmann.rendering.estimate.psnr import PixelErrors
 
@@ -74,7 +74,7 @@ def true_error(picture, truth):
 
 
 def told_and_true(renderer, denoise):
-    denoised = Denoised(renderer, denoise, "srgb")
+    denoised = DenoisedPicture(renderer, denoise, "srgb")
     told = denoised.squared_error()
     return float(told.values.mean()), true_error(denoised.picture(), renderer.truth)
 
@@ -101,7 +101,7 @@ def test_samples_that_take_the_place_of_worse_pixels_do_not_flatter(denoise):
 def test_noise_that_both_halves_share_would_not_be_seen_but_theirs_is_their_own():
     """The judge of a half is the other one: a denoiser that does nothing is told its whole noise."""
     renderer = Noise()
-    told = Denoised(renderer, lambda picture, *_: picture, "srgb").squared_error()
+    told = DenoisedPicture(renderer, lambda picture, *_: picture, "srgb").squared_error()
     noise = true_error(np.mean(renderer.average_halves(), axis=0), renderer.truth)
     assert float(told.values.mean()) == pytest.approx(noise, rel=0.2)
 
@@ -113,7 +113,7 @@ def test_what_the_curve_takes_off_rare_light_is_told(coding, monkeypatch):
     renderer = Noise()
     halves = tuple(renderer.truth * random.gamma(1, 1, (*SHAPE[:2], 1)).astype(np.float32) for _ in range(2))
     monkeypatch.setattr(renderer, "average_halves", lambda: halves)
-    denoised = Denoised(renderer, lambda picture, *_: picture, coding)
+    denoised = DenoisedPicture(renderer, lambda picture, *_: picture, coding)
     codes = (encode(picture.astype(float), coding) for picture in (denoised.picture(), renderer.truth))
     true = np.square(np.subtract(*codes)).mean()
     assert denoised.squared_error().values.mean() == pytest.approx(true, rel=0.15)
@@ -121,13 +121,13 @@ def test_what_the_curve_takes_off_rare_light_is_told(coding, monkeypatch):
 
 def test_what_the_halves_differ_by_is_known():
     renderer = Noise()
-    told = Denoised(renderer, lambda picture, *_: picture, "srgb").squared_error()
+    told = DenoisedPicture(renderer, lambda picture, *_: picture, "srgb").squared_error()
     # Halves that are their samples have nothing wrong in common.
-    assert float(told.apart.mean()) == pytest.approx(float(told.values.mean()), rel=0.2)
-    assert told.apart.min() >= 0
+    assert float(told.halves_variance.mean()) == pytest.approx(float(told.values.mean()), rel=0.2)
+    assert told.halves_variance.min() >= 0
     # With a blur they agree better than its samples do, but not wholly.
-    blurred = Denoised(renderer, blur, "srgb").squared_error()
-    assert 0.01 < float(blurred.apart.mean()) / float(told.apart.mean()) < 0.3
+    blurred = DenoisedPicture(renderer, blur, "srgb").squared_error()
+    assert 0.01 < float(blurred.halves_variance.mean()) / float(told.halves_variance.mean()) < 0.3
 
 
 def test_seen_light_goes_past_the_denoiser(as_denoised):
@@ -144,11 +144,11 @@ def test_seen_light_goes_past_the_denoiser(as_denoised):
         return blur(picture)
 
     renderer.of_seen = tuple(highlights)
-    picture = Denoised(renderer, denoise, "srgb").picture()
+    picture = DenoisedPicture(renderer, denoise, "srgb").picture()
     assert max(given) < 2
     assert picture[100, 100] == pytest.approx(renderer.truth[100, 100] + 5.2, rel=0.05)
     renderer.samples = 1
-    alone = Denoised(renderer, denoise, "srgb").picture()
+    alone = DenoisedPicture(renderer, denoise, "srgb").picture()
     assert alone[100, 100] == pytest.approx(renderer.truth[100, 100] + 5.0, rel=0.05)
 
 
@@ -161,11 +161,11 @@ def test_what_rests_on_single_chains_is_left_out_and_still_counts_as_an_error():
     hits[0][100, 100] = 3.0
     renderer.average_halves()[0][100, 100] += 3.0
     renderer.of_seen = tuple(hits)
-    before = Denoised(renderer, blur, "srgb")
+    before = DenoisedPicture(renderer, blur, "srgb")
     whole = before.picture()
     renderer.of_excess = np.zeros_like(hits[0])
     renderer.of_excess[100, 100] = 1.25
-    after = Denoised(renderer, blur, "srgb")
+    after = DenoisedPicture(renderer, blur, "srgb")
     np.testing.assert_allclose(after.squared_error().values, before.squared_error().values, rtol=1e-6)
     less = whole - after.picture()
     assert less[100, 100] == pytest.approx(1.25, rel=1e-5)
@@ -173,10 +173,10 @@ def test_what_rests_on_single_chains_is_left_out_and_still_counts_as_an_error():
     less[100, 100] = 0
     assert np.abs(less).max() < 1e-6
     renderer.samples = 1
-    alone = Denoised(renderer, blur, "srgb").picture()
+    alone = DenoisedPicture(renderer, blur, "srgb").picture()
     assert alone[100, 100] == pytest.approx(renderer.truth[100, 100] + 1.75, rel=0.1)
     renderer.of_excess[100, 100] = 9.0
-    assert Denoised(renderer, blur, "srgb").picture().min() == 0
+    assert DenoisedPicture(renderer, blur, "srgb").picture().min() == 0
 
 
 def test_an_emitter_in_a_narrow_lobe_does_not_light_the_pixels_beside_it():
@@ -195,7 +195,7 @@ def test_an_emitter_in_a_narrow_lobe_does_not_light_the_pixels_beside_it():
         return picture
 
     renderer.of_seen = tuple(emitters)
-    picture = Denoised(renderer, denoise, "srgb").picture()
+    picture = DenoisedPicture(renderer, denoise, "srgb").picture()
     for displayed, half in zip(given, rest, strict=True):
         assert displayed[100, 100] == pytest.approx(8.0)
         assert displayed[50, 50] == pytest.approx(8.0)
@@ -209,9 +209,9 @@ def test_an_emitter_in_a_narrow_lobe_does_not_light_the_pixels_beside_it():
 def test_one_path_that_happens_upon_an_emitter_does_not_light_the_pixels_beside_it(samples):
     renderer = Noise()
     renderer.samples = samples
-    without = Denoised(renderer, blur, "srgb").picture()
+    without = DenoisedPicture(renderer, blur, "srgb").picture()
     renderer.average_halves()[0][50, 50] += 3000.0
-    beside = Denoised(renderer, blur, "srgb").picture() - without
+    beside = DenoisedPicture(renderer, blur, "srgb").picture() - without
     assert 0 < beside[50, 51].max() < 1
 
 
@@ -223,7 +223,7 @@ def test_what_is_still_far_beyond_white_without_its_noise_is_as_bright_as_the_sa
     for value, half in zip((290.0, 310.0), renderer.average_halves(), strict=True):
         half[40:60, 40:60] = value
     displayed = renderer.average_samples() if samples == 1 else np.mean(renderer.average_halves(), axis=0)
-    picture = Denoised(renderer, blur, "srgb").picture()
+    picture = DenoisedPicture(renderer, blur, "srgb").picture()
     np.testing.assert_allclose(picture[45:55, 45:55], displayed[45:55, 45:55], rtol=1e-6)
 
 
@@ -232,10 +232,10 @@ def test_a_pixel_that_both_halves_hit_hard_does_not_hide_what_is_wrong_elsewhere
     """A caustic's rare light: the product of two hits is larger than any error of a code. Of few samples it counts."""
     renderer = Noise()
     renderer.samples = samples
-    clear = float(Denoised(renderer, lambda p, *_: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
+    clear = float(DenoisedPicture(renderer, lambda p, *_: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
     for half in renderer.average_halves():
         half[100, 100] += 15
-    told = float(Denoised(renderer, lambda p, *_: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
+    told = float(DenoisedPicture(renderer, lambda p, *_: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
     assert (told > 2 * clear) == hidden
 
 
@@ -243,7 +243,7 @@ def test_a_pixel_that_both_halves_hit_hard_does_not_hide_what_is_wrong_elsewhere
 def test_of_few_samples_any_hit_may_be_an_outlier(samples, all_may_be):
     renderer = Noise()
     renderer.samples = samples
-    told = Denoised(renderer, blur, "srgb").squared_error().samples
+    told = DenoisedPicture(renderer, blur, "srgb").squared_error().samples
     assert (told.outliers is not None) == all_may_be
     if all_may_be:
         assert np.array_equal(told.outliers, np.float32(TUNING.untold_outliers) * told.values)
@@ -257,7 +257,7 @@ def test_more_samples_are_cleaned_anew():
         calls.append((samples, turned))
         return picture
 
-    denoised = Denoised(renderer, denoise, "srgb")
+    denoised = DenoisedPicture(renderer, denoise, "srgb")
     denoised.picture(), denoised.squared_error()
     # Halves that the network sees another way: of itself it gets other things wrong.
     assert calls == [(2, False), (2, True)]
@@ -272,7 +272,7 @@ def test_more_samples_are_cleaned_anew():
 def test_a_single_sample_has_no_halves():
     renderer = Noise()
     renderer.samples = 1
-    assert np.array_equal(Denoised(renderer, lambda p, *_: p * 2, "srgb").picture(), 2 * renderer.picture())
+    assert np.array_equal(DenoisedPicture(renderer, lambda p, *_: p * 2, "srgb").picture(), 2 * renderer.picture())
 
 
 @pytest.mark.long
@@ -298,19 +298,19 @@ def test_light_spread_beyond_white_is_not_lost_where_codes_are_cut_off(transfer,
     random = np.random.default_rng(4)
     renderer = Noise()
     renderer._halves = [truth + random.normal(0, 0.02, SHAPE).astype(np.float32) for _ in range(2)]
-    told = Denoised(renderer, lambda p, *_: np.full_like(p, 1.2), transfer).squared_error()
+    told = DenoisedPicture(renderer, lambda p, *_: np.full_like(p, 1.2), transfer).squared_error()
     code = encode_srgb(np.float64(0.35)) if transfer == "srgb" else 0.35
     assert float(told.values.mean()) == pytest.approx((1 - code) ** 2, rel=0.05)
     # White beyond white is as white.
     renderer._halves = [half + np.float32(2) for half in renderer._halves]
-    assert float(np.abs(Denoised(renderer, lambda p, *_: p + 1, transfer).squared_error().values).max()) < 1e-12
+    assert float(np.abs(DenoisedPicture(renderer, lambda p, *_: p + 1, transfer).squared_error().values).max()) < 1e-12
 
 
 def test_light_spread_beyond_white_counts_by_what_the_tone_map_makes_of_it(as_denoised):
     random = np.random.default_rng(4)
     renderer = Noise()
     renderer._halves = [np.float32(0.35) + random.normal(0, 0.02, SHAPE).astype(np.float32) for _ in range(2)]
-    told = Denoised(renderer, lambda p, *_: np.full_like(p, 1.2), "pbr-neutral").squared_error()
+    told = DenoisedPicture(renderer, lambda p, *_: np.full_like(p, 1.2), "pbr-neutral").squared_error()
     codes = encode(np.array([[1.2] * 3, [0.35] * 3]), "pbr-neutral")
     assert float(told.values.mean()) == pytest.approx(np.square(codes[0] - codes[1]).mean(), rel=0.2)
 
@@ -321,7 +321,7 @@ def test_where_codes_are_steep_the_whole_step_counts(as_denoised):
     random = np.random.default_rng(5)
     renderer = Noise()
     renderer._halves = [truth + random.normal(0, 0.0005, SHAPE).astype(np.float32) for _ in range(2)]
-    told = Denoised(renderer, lambda p, *_: np.full_like(p, 0.02), "srgb").squared_error()
+    told = DenoisedPicture(renderer, lambda p, *_: np.full_like(p, 0.02), "srgb").squared_error()
     step = float(encode_srgb(np.float64(0.02)) - encode_srgb(np.float64(0.001)))
     assert step**2 < 1.5 * float(told.values.mean())
     assert float(told.values.mean()) < step**2
@@ -330,8 +330,8 @@ def test_where_codes_are_steep_the_whole_step_counts(as_denoised):
 def test_blur_of_caustics_counts_in_full():
     """It is the same in both halves, so that they do not tell of it."""
     renderer = Noise(seed=1)
-    plain = Denoised(renderer, blur, "srgb").squared_error()
+    plain = DenoisedPicture(renderer, blur, "srgb").squared_error()
     renderer.blurred = np.full(plain.values.shape, 0.01, np.float32)
-    counted = Denoised(renderer, blur, "srgb").squared_error()
+    counted = DenoisedPicture(renderer, blur, "srgb").squared_error()
     np.testing.assert_allclose(counted.values - plain.values, 0.01, rtol=1e-4)
     assert counted.blur is renderer.blurred

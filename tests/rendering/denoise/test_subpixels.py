@@ -39,13 +39,13 @@ def rays(window=None, display=SHEET):
     ("order", "window"), [pytest.param("rgb", None, marks=pytest.mark.long), ("brg", PixelWindow(20, 10, 40, 30))]
 )
 def test_own_colours_are_those_that_sub_pixels_have_alone(integrator, order, window):
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.film.sample_batches import BatchedRender
     from lippmann.rendering.transport.ray_source import SubpixelRays
 
     offsets = tuple((order.index(color) / 3 - 1 / 3, 0.0) for color in "rgb")
     source = rays(window, replace(SHEET, panel=replace(SHEET.panel, subpixel_offsets=offsets)))
-    alone = FullInBatches(integrator, source, seed=3, memory=1 << 28)
-    together = FullInBatches(integrator, SubpixelRays(source), seed=3, memory=1 << 28)
+    alone = BatchedRender(integrator, source, seed=3, memory=1 << 28)
+    together = BatchedRender(integrator, SubpixelRays(source), seed=3, memory=1 << 28)
     for batches in (alone, together):
         batches.add(5)
     assert alone.picture().std() > 0.05
@@ -58,11 +58,11 @@ def test_own_colours_are_those_that_sub_pixels_have_alone(integrator, order, win
 
 @pytest.mark.slow
 def test_a_denoiser_is_given_all_colours(integrator, as_denoised):
-    from lippmann.rendering.denoise.dual_buffer import Denoised
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.denoise.dual_buffer import DenoisedPicture
+    from lippmann.rendering.film.sample_batches import BatchedRender
     from lippmann.rendering.transport.ray_source import SubpixelRays
 
-    batches = FullInBatches(integrator, SubpixelRays(rays()), seed=3, memory=1 << 28)
+    batches = BatchedRender(integrator, SubpixelRays(rays()), seed=3, memory=1 << 28)
     given, turns = [], []
 
     def keep(pixels, samples, turned):
@@ -70,7 +70,7 @@ def test_a_denoiser_is_given_all_colours(integrator, as_denoised):
         turns.append(turned)
         return pixels + np.float32(0.5)
 
-    denoised = Denoised(batches, keep, "srgb")
+    denoised = DenoisedPicture(batches, keep, "srgb")
     for samples in (1, 3):
         batches.add(samples)
         np.testing.assert_allclose(denoised.picture(), batches.picture() + 0.5, atol=1e-5)

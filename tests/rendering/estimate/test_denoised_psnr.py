@@ -29,10 +29,10 @@ def made(seed, noise=0.05, left=0.01, spread=0.5, ratio=3.0):
     common, first, second, a, b, of_samples = strength * random.standard_normal((6, 64, 64))
     alike = left * math.sqrt(ratio / (1 + ratio)) * common
     first, second = (alike + left * math.sqrt(2 / (1 + ratio)) * chance for chance in (first, second))
-    apart = (np.square(first - second) / 4).astype(np.float32)
-    judged = ((noise * a - first) * (noise * b - second)).astype(np.float32) + apart
+    halves_variance = (np.square(first - second) / 4).astype(np.float32)
+    judged = ((noise * a - first) * (noise * b - second)).astype(np.float32) + halves_variance
     samples = PixelErrors(np.square(noise * of_samples).astype(np.float32))
-    return PixelErrors(judged, None, samples, apart), np.square((first + second) / 2)
+    return PixelErrors(judged, None, samples, halves_variance), np.square((first + second) / 2)
 
 
 def truth_of(true):
@@ -60,8 +60,10 @@ def kept_samples(seed, spread=0.5):
     """
     random = np.random.default_rng(seed)
     first, second = 0.01 * np.exp(spread * random.standard_normal((64, 64))) * random.standard_normal((2, 64, 64))
-    apart = (np.square(first - second) / 4).astype(np.float32)
-    return PixelErrors(apart, None, PixelErrors(apart), apart), np.square((first + second) / 2)
+    halves_variance = (np.square(first - second) / 4).astype(np.float32)
+    return PixelErrors(halves_variance, None, PixelErrors(halves_variance), halves_variance), np.square(
+        (first + second) / 2
+    )
 
 
 def test_where_samples_are_kept_their_difference_is_no_measure_of_what_they_have_in_common():
@@ -81,15 +83,17 @@ def test_a_negative_measurement_is_no_perfect_picture():
     values = errors.values - np.float32(2 * errors.values.std() / 64)
     found = PictureEstimator(SHOWN).estimate(replace(errors, values=values), 64)
     assert values.mean() < 0
-    assert found.psnr < psnr(float(errors.apart.mean()))
-    assert found.psnr_low < psnr(3 * float(errors.apart.mean()))
+    assert found.psnr < psnr(float(errors.halves_variance.mean()))
+    assert found.psnr_low < psnr(3 * float(errors.halves_variance.mean()))
 
 
 def test_halves_that_agree_though_their_samples_do_not_are_not_believed_to_be_right():
     """As if a denoiser made the same of everything."""
     errors, _ = made(1, noise=0.2)
-    same = np.zeros_like(errors.apart)
-    found = PictureEstimator(SHOWN).estimate(replace(errors, values=errors.values - errors.apart, apart=same), 64)
+    same = np.zeros_like(errors.halves_variance)
+    found = PictureEstimator(SHOWN).estimate(
+        replace(errors, values=errors.values - errors.halves_variance, halves_variance=same), 64
+    )
     assert found.psnr < psnr(1e-4 * float(errors.samples.values.mean()))
 
 
@@ -103,9 +107,9 @@ def test_what_is_measured_well_is_believed_whatever_is_usual():
 
 def test_where_the_halves_differ_the_picture_is_not_believed_to_be_good():
     errors, _ = made(3, noise=0.06, spread=0.0)
-    harder = errors.apart.copy()
+    harder = errors.halves_variance.copy()
     harder[24:32, 40:48] *= 30
-    found = PictureEstimator(SHOWN).estimate(replace(errors, apart=harder), 64)
+    found = PictureEstimator(SHOWN).estimate(replace(errors, halves_variance=harder), 64)
     assert found.worst_lens == (5, 3)
     assert found.worst < found.psnr - 6
 
@@ -177,7 +181,7 @@ def test_micro_images_of_few_pixels_may_be_worse_than_expected():
         random = np.random.default_rng(4)
         even = PixelErrors(np.full((64, 64), 2.5e-3, np.float32))
         judged = np.float32(1e-4) * (1 + 0.1 * random.standard_normal((64, 64)).astype(np.float32))
-        apart = np.full((64, 64), 3e-5, np.float32)
-        found = PictureEstimator(display).estimate(PixelErrors(judged, None, even, apart), 64)
+        halves_variance = np.full((64, 64), 3e-5, np.float32)
+        found = PictureEstimator(display).estimate(PixelErrors(judged, None, even, halves_variance), 64)
         low[name] = found.worst_low
     assert low["cut"] < low["whole"] - 3

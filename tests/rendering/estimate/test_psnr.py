@@ -14,7 +14,7 @@ from lippmann.display.panel import Panel
 from lippmann.metrics.mse_psnr import micro_image_means, psnr
 from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 from lippmann.rendering.estimate.psnr import FLOOR, Estimate, Parts, PixelErrors
-from lippmann.rendering.request.preconditions import why_no_estimate
+from lippmann.rendering.request.preconditions import explain_missing_estimate
 from lippmann.rendering.request.render_request import RenderRequest
 
 ARRAYS = {
@@ -81,11 +81,11 @@ def test_outliers_widen_the_interval_to_the_worse_side_only():
     shown = display()
     errors, _ = noisy_picture(shown, 1)
     calm = PictureEstimator(shown).estimate(errors, 64)
-    doubted = PictureEstimator(shown).estimate(PixelErrors(errors.values, errors.values), 64)
-    assert doubted.psnr == calm.psnr
-    assert doubted.psnr_low < calm.psnr_low - 1
-    assert doubted.psnr_high <= calm.psnr_high + 0.01
-    assert doubted.worst_low < calm.worst_low
+    pessimistic = PictureEstimator(shown).estimate(PixelErrors(errors.values, errors.values), 64)
+    assert pessimistic.psnr == calm.psnr
+    assert pessimistic.psnr_low < calm.psnr_low - 1
+    assert pessimistic.psnr_high <= calm.psnr_high + 0.01
+    assert pessimistic.worst_low < calm.worst_low
 
 
 def test_what_may_not_be_there_widens_the_interval_of_the_whole_to_the_better_side_only():
@@ -125,7 +125,7 @@ def test_an_estimate_survives_its_plain_form():
     ],
 )
 def test_pictures_without_an_estimate_say_why(settings, reason):
-    found = why_no_estimate(RenderRequest(**settings))
+    found = explain_missing_estimate(RenderRequest(**settings))
     assert found is None if reason is None else reason in found
 
 

@@ -12,11 +12,11 @@ pytestmark = pytest.mark.usefixtures("engine")
 
 def errors(batches, taken=None, transfer="srgb"):
     """Of the means ``batches`` ``(K, pixels)`` of grey pixels, each of ``taken`` samples."""
-    from lippmann.rendering.film.batched_picture import error_of_batches
+    from lippmann.rendering.film.batched_picture import estimate_batch_errors
 
     taken = [1] * len(batches) if taken is None else taken
     sums = np.repeat(np.asarray(batches)[..., None] * np.asarray(taken)[:, None, None], 3, axis=2)
-    return error_of_batches(sums.astype(np.float32), taken, transfer)
+    return estimate_batch_errors(sums.astype(np.float32), taken, transfer)
 
 
 def slow_errors(sums, taken):
@@ -65,12 +65,12 @@ def slow_errors(sums, taken):
     "taken", [[1, 1], [2, 2, 1, 1], [3, 3, 2, 2, 3, 2, 2, 2], [1, 1, 0, 0, 1, 0, 0, 0], [8] * 8], ids=str
 )
 def test_errors_are_those_of_the_definition(taken):
-    from lippmann.rendering.film.batched_picture import error_of_batches
+    from lippmann.rendering.film.batched_picture import estimate_batch_errors
 
     random = np.random.default_rng(3)
     values = random.lognormal(-1, 0.7, (len(taken), 500, 3)) + 30 * (random.random((len(taken), 500, 1)) < 0.02)
     sums = (values * np.array(taken)[:, None, None]).astype(np.float32)
-    found, outliers = error_of_batches(sums, taken, "srgb")
+    found, outliers = estimate_batch_errors(sums, taken, "srgb")
     expected, expected_outliers = slow_errors(sums, taken)
     np.testing.assert_allclose(found, expected, rtol=1e-3, atol=2e-6)
     np.testing.assert_allclose(outliers, expected_outliers, rtol=1e-3, atol=2e-6)

@@ -72,9 +72,9 @@ def blur_of(light, radius, *, samples=8, window=WHOLE, seed=3):
 
 
 def test_pictures_without_photons_have_none():
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.film.sample_batches import BatchedRender
 
-    assert FullInBatches(*matt_plane(None), memory=1 << 30).squared_blur() is None
+    assert BatchedRender(*matt_plane(None), memory=1 << 30).squared_blur() is None
 
 
 @pytest.mark.long
@@ -125,17 +125,17 @@ def test_it_is_measured_once_and_follows_the_radii_of_later_passes():
 @pytest.mark.long
 def test_the_estimate_of_a_picture_counts_it():
     from lippmann.color.transfer import coding_slope
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.film.sample_batches import BatchedRender
 
     integrator, source = matt_plane(PlaneOfPhotons(lambda x: np.where(x > 0, 1.0, 0.0), 0.1))
-    batches = FullInBatches(integrator, source, seed=3, memory=1 << 28)
+    batches = BatchedRender(integrator, source, seed=3, memory=1 << 28)
     batches.add(8)
     blur = batches.squared_blur()
     errors = batches.squared_error()
     counted = errors.values.copy()
     np.testing.assert_array_equal(errors.blur, blur)
     without = integrator.lit_by(replace(integrator.light, photon_passes=None))
-    plain = FullInBatches(without, source, seed=3, memory=1 << 28)
+    plain = BatchedRender(without, source, seed=3, memory=1 << 28)
     plain.add(8)
     assert plain.squared_blur() is None
     assert plain.squared_error().blur is None

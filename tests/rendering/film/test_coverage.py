@@ -43,10 +43,10 @@ def rays(subpixels=False, window=None):
 
 
 def batches(session, source, samples, seed=3, window=None, for_denoiser=True):
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.film.sample_batches import BatchedRender
 
     integrator = session.integrator(rays(), np.eye(4))
-    found = FullInBatches(integrator, source, seed=seed, memory=1 << 28, window=window, for_denoiser=for_denoiser)
+    found = BatchedRender(integrator, source, seed=seed, memory=1 << 28, window=window, for_denoiser=for_denoiser)
     found.add(samples)
     return found
 
@@ -120,12 +120,12 @@ def test_it_is_told_with_chains_and_left_out_elsewhere(session):
     import drjit as dr
     import mitsuba as mi
 
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.film.sample_batches import BatchedRender
 
     plain = batches(session, rays(), 4).coverage_halves()
     integrator = session.integrator(rays(), np.eye(4))
     integrator = integrator.lit_by(replace(integrator.light, chains=dr.opaque(mi.UInt32, 2)))
-    chained = FullInBatches(integrator, rays(), seed=3, memory=1 << 28, for_denoiser=True)
+    chained = BatchedRender(integrator, rays(), seed=3, memory=1 << 28, for_denoiser=True)
     chained.add(4)
     for a, b in zip(plain, chained.coverage_halves(), strict=True):
         assert np.array_equal(a.share, b.share)

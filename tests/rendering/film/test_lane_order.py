@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lippmann.rendering.film.wavefront import STRIP_ROWS, in_strips, pixel_at, to_rows
+from lippmann.rendering.film.wavefront import STRIP_ROWS, in_strips, locate_pixel, reorder_to_rows
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -18,7 +18,9 @@ def places(width: int, height: int) -> np.ndarray:
 
     count = width * height
     number = mi.UInt32(np.arange(count, dtype=np.uint32))
-    return np.stack([np.array(part) for part in pixel_at(number, width, mi.UInt32(in_strips(count, width)))], axis=1)
+    return np.stack(
+        [np.array(part) for part in locate_pixel(number, width, mi.UInt32(in_strips(count, width)))], axis=1
+    )
 
 
 @settings(deadline=None)
@@ -32,7 +34,7 @@ def test_every_pixel_has_one_place(width, height):
 @given(width=st.integers(1, 23), height=st.integers(1, 23))
 def test_what_was_placed_comes_back_in_rows(width, height):
     found = places(width, height)
-    found = to_rows(found, width)
+    found = reorder_to_rows(found, width)
     rows, columns = np.divmod(np.arange(width * height), width)
     assert found.tolist() == np.stack([rows, columns], axis=1).tolist()
 
@@ -45,7 +47,7 @@ def test_sixteen_lanes_are_a_square():
 def test_a_picture_all_in_rows():
     import mitsuba as mi
 
-    row, column = pixel_at(mi.UInt32([0, 7, 8, 63]), 8, mi.UInt32(0))
+    row, column = locate_pixel(mi.UInt32([0, 7, 8, 63]), 8, mi.UInt32(0))
     assert np.array(row).tolist() == [0, 0, 1, 7]
     assert np.array(column).tolist() == [0, 7, 0, 7]
 
@@ -53,7 +55,7 @@ def test_a_picture_all_in_rows():
 @pytest.mark.parametrize("inner", [(), (3,), (2, 3)])
 def test_values_of_any_shape(inner):
     values = np.arange(np.prod((26, *inner))).reshape(26, *inner)
-    ordered = to_rows(values, 2)
+    ordered = reorder_to_rows(values, 2)
     # The first strip of two columns, four rows each, and what is left below whole strips.
     assert ordered[:8].tolist() == values[[0, 4, 1, 5, 2, 6, 3, 7]].tolist()
     assert ordered[24:].tolist() == values[24:].tolist()

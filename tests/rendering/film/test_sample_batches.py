@@ -58,9 +58,9 @@ def rays(subpixels=False):
 
 
 def batches(integrator, *, seed=1, memory=2**30, subpixels=False, **options):
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.film.sample_batches import BatchedRender
 
-    return FullInBatches(integrator, rays(subpixels), seed=seed, memory=memory, **options)
+    return BatchedRender(integrator, rays(subpixels), seed=seed, memory=memory, **options)
 
 
 #: Enough for all batches and small wavefronts.
@@ -152,11 +152,11 @@ def test_the_mean_is_that_of_full_and_the_error_what_it_says(integrator, subpixe
 @pytest.mark.slow
 def test_a_quality_that_is_asked_for_is_kept(integrator):
     from lippmann.color.transfer import encode_srgb
-    from lippmann.rendering.adaptive.stopping import Goal, reach
+    from lippmann.rendering.adaptive.stopping import Goal, sample_until
     from lippmann.rendering.estimate.denoised_psnr import PictureEstimator
 
     renderer = batches(integrator, seed=5)
-    outcome = reach(Goal(quality_worst=30), renderer, renderer, PictureEstimator(SHOWN), first=16)
+    outcome = sample_until(Goal(quality_worst=30), renderer, renderer, PictureEstimator(SHOWN), first=16)
     long = batches(integrator, seed=6)
     long.add(768)
     errors = np.square(encode_srgb(renderer.picture()) - encode_srgb(long.picture())).mean(axis=2)
@@ -194,7 +194,7 @@ def test_samples_of_one_pass_are_taken_together():
     import mitsuba as mi
 
     from lippmann.device.pbr.scene import make_scene_features
-    from lippmann.rendering.film.sample_batches import _stretches
+    from lippmann.rendering.film.sample_batches import _split_by_light
     from lippmann.rendering.transport.path import PathIntegrator
 
     class Passes:
@@ -205,11 +205,11 @@ def test_samples_of_one_pass_are_taken_together():
 
     scene = mi.load_dict({"type": "scene", "sky": {"type": "constant"}})
     integrator = PathIntegrator(scene, make_scene_features(scene, has_null=False), 3)
-    assert list(_stretches(integrator, 7, 100)) == [(integrator, 100)]
+    assert list(_split_by_light(integrator, 7, 100)) == [(integrator, 100)]
     integrator = integrator.lit_by(replace(integrator.light, photon_passes=Passes()))
-    found = [(count, each.light.photons) for each, count in _stretches(integrator, 20, 50)]
+    found = [(count, each.light.photons) for each, count in _split_by_light(integrator, 20, 50)]
     assert found == [(12, "photons 0"), (32, "photons 1"), (6, "photons 2")]
-    assert [count for _, count in _stretches(integrator, 64, 32)] == [32]
+    assert [count for _, count in _split_by_light(integrator, 64, 32)] == [32]
 
 
 @pytest.mark.long
@@ -236,7 +236,7 @@ def test_wavefronts_of_any_size_share_a_kernel(engine):
         kernels.append(max(launched, key=lambda kernel: kernel.get("operation_count", 0))["hash"])
 
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True), pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sample_batches, "compile_seconds", lambda started: 0.0)  # it takes the history
+        patch.setattr(sample_batches, "measure_compilation", lambda started: 0.0)  # it takes the history
         patch.setattr(sample_batches, "evaluate", evaluate_alone)
         found.add(1)
         found.add(7)

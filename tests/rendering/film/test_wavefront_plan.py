@@ -12,7 +12,7 @@ from lippmann.rendering.film.memory_model import (
     PICTURE,
     cut_batches,
     cut_wavefronts,
-    equal_length,
+    divide_evenly,
     preferred_lanes,
 )
 
@@ -58,7 +58,7 @@ def test_too_little_memory_says_how_much_is_needed():
 
 @given(total=st.integers(1, 10**6), most=st.integers(-3, 10**6))
 def test_equal_parts_are_few_and_no_longer_than_allowed(total, most):
-    length = equal_length(total, most)
+    length = divide_evenly(total, most)
     assert 1 <= length <= max(1, min(total, most))
     parts = -(-total // length)
     assert parts == -(-total // max(1, min(total, most)))

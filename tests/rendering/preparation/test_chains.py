@@ -55,10 +55,11 @@ def prepared_chains(scene, **options):
     session = open_session(scene, resolve(RenderRequest(**(ASKED | options)), scene, DISPLAY))
     placement = session.place(DISPLAY)
 
+    from lippmann.rendering.transport.integrator import read_choices
     from lippmann.rendering.transport.ray_source import DisplayRays
 
-    session.integrator(DisplayRays(DISPLAY, placement.world_from_display), placement.display_from_world)
-    return session.choices.get("seen_chains", 0)
+    source = DisplayRays(DISPLAY, placement.world_from_display)
+    return read_choices(session.integrator(source, placement.display_from_world)).get("seen_chains", 0)
 
 
 def test_denoised_pictures_of_sharp_surfaces_have_them(engine):

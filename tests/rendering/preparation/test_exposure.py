@@ -176,17 +176,17 @@ def lit_by_few_paths(seed):
 
 
 def test_light_that_few_paths_find_is_exposed_for_by_means():
-    from lippmann.rendering.preparation.exposure import exposure_for
+    from lippmann.rendering.preparation.exposure import compute_exposure
 
-    found = exposure_for(lit_by_few_paths(1), None)
+    found = compute_exposure(lit_by_few_paths(1), None)
     assert found == pytest.approx(np.log2(0.18 / 0.5), abs=0.5)
 
 
 def test_what_is_not_lit_does_not_count():
-    from lippmann.rendering.preparation.exposure import exposure_for
+    from lippmann.rendering.preparation.exposure import compute_exposure
 
     pixels = np.random.default_rng(3).uniform(0.1, 0.5, (60, 63, 1)).astype(np.float32).repeat(3, axis=2)
     pixels[:20] = 0
-    assert exposure_for(pixels, None) == pytest.approx(np.log2(0.18 / 0.3), abs=0.1)
-    assert exposure_for(0 * pixels, None) == 0.0
-    assert exposure_for(pixels + 2, (2.0, 2.0, 2.0)) == pytest.approx(np.log2(0.18 / 2.3), abs=0.1)
+    assert compute_exposure(pixels, None) == pytest.approx(np.log2(0.18 / 0.3), abs=0.1)
+    assert compute_exposure(0 * pixels, None) == 0.0
+    assert compute_exposure(pixels + 2, (2.0, 2.0, 2.0)) == pytest.approx(np.log2(0.18 / 2.3), abs=0.1)

@@ -71,9 +71,9 @@ def given(integrator, source, /, *, gain=1.0, **options):
 
 
 def batches(integrator, source, memory=1 << 30, spp=16, seed=5):
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.film.sample_batches import BatchedRender
 
-    found = FullInBatches(integrator, source, seed=seed, memory=memory)
+    found = BatchedRender(integrator, source, seed=seed, memory=memory)
     found.add(spp)
     return found
 

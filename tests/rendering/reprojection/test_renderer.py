@@ -36,11 +36,11 @@ class Case:
 
     def _trace_full(self, samples):
         from lippmann.rendering.film.memory_model import cut_wavefronts
-        from lippmann.rendering.film.sample_batches import FullInBatches
+        from lippmann.rendering.film.sample_batches import BatchedRender
         from lippmann.rendering.film.wavefront import Frame, trace_frame
 
         if samples > 1:
-            batches = FullInBatches(self.integrator, self.source, memory=1 << 30)
+            batches = BatchedRender(self.integrator, self.source, memory=1 << 30)
             batches.add(samples)
             return Frame(batches.picture())
         plan = cut_wavefronts(self.source.width, self.source.height, samples, memory=1 << 30)

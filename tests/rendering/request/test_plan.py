@@ -8,7 +8,7 @@ import pytest
 from lippmann.display import load_display
 from lippmann.errors import UsageError
 from lippmann.options.choices import ASKED
-from lippmann.rendering.denoise.guided_denoiser import effort_of
+from lippmann.rendering.denoise.guided_denoiser import choose_effort
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import Choice, RenderRequest
 from lippmann.rendering.request.tuning import TUNING
@@ -78,9 +78,9 @@ def test_what_has_no_noise_is_not_denoised():
 
 
 def test_effort_follows_the_samples_unless_it_is_named():
-    assert [effort_of("oidn", samples) for samples in (TUNING.usual - 1, TUNING.usual)] == ["fast", "high"]
-    assert [effort_of(name, 1000) for name in ("oidn-fast", "oidn-high")] == ["fast", "high"]
-    assert effort_of("oidn-high", 1) == "high"
+    assert [choose_effort("oidn", samples) for samples in (TUNING.usual - 1, TUNING.usual)] == ["fast", "high"]
+    assert [choose_effort(name, 1000) for name in ("oidn-fast", "oidn-high")] == ["fast", "high"]
+    assert choose_effort("oidn-high", 1) == "high"
 
 
 def test_a_photograph_has_one_ray_a_pixel_and_keeps_its_colours():

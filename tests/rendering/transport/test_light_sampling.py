@@ -402,7 +402,7 @@ def test_emitters_without_size_are_as_likely_as_each_other():
     import drjit as dr
     import mitsuba as mi
 
-    from lippmann.rendering.transport.light_sampling import WithoutSize
+    from lippmann.rendering.transport.light_sampling import DeltaEmitters
 
     scene = mi.load_dict(
         room()
@@ -411,7 +411,7 @@ def test_emitters_without_size_are_as_likely_as_each_other():
             "sun": {"type": "directional", "direction": [0, -1, 0], "irradiance": {"type": "rgb", "value": [0, 2, 0]}},
         }
     )
-    emitters = WithoutSize(scene.emitters())
+    emitters = DeltaEmitters(scene.emitters())
     assert len(emitters) == 2
     reference = dr.zeros(mi.SurfaceInteraction3f, 1000)
     x = (dr.arange(mi.Float, 1000) + 0.5) / 1000
@@ -424,9 +424,9 @@ def test_emitters_without_size_are_as_likely_as_each_other():
 def test_a_scene_may_have_none():
     import mitsuba as mi
 
-    from lippmann.rendering.transport.light_sampling import WithoutSize
+    from lippmann.rendering.transport.light_sampling import DeltaEmitters
 
-    assert len(WithoutSize(mi.load_dict(room()).emitters())) == 0
+    assert len(DeltaEmitters(mi.load_dict(room()).emitters())) == 0
 
 
 @pytest.mark.parametrize("by_weight", [False, True])

@@ -182,7 +182,7 @@ def test_emitters_without_size_are_seen_in_narrow_lobes():
     sun[:3, :3] = [[1, 0, 0], [0, 0.8, 0.6], [0, -0.6, 0.8]]
     lights = [Light("point", (4.0, 5.0, 6.0), at), Light("directional", (1.5, 1.2, 0.9), sun)]
     integrator, source = described(replace(scene, lights=lights))
-    assert len(integrator.without_size) == 2
+    assert len(integrator.delta_emitters) == 2
     for depth in (1, 6):
         paths = PathIntegrator(integrator.scene, integrator.features, depth, light=integrator.light)
         plain, further = (pictures(paths, source, chains, seeds=range(40)) for chains in (0, 5))
@@ -194,13 +194,13 @@ def test_emitters_without_size_are_seen_in_narrow_lobes():
 def test_their_highlights_go_past_a_denoiser():
     """All that is seen in sharp lobes is told apart, that of emitters without size, too."""
 
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.film.sample_batches import BatchedRender
     from lippmann.scene.values.description import Light
 
     scene = small_emitter_in_glazed_balls()
     light = Light("directional", (3.0, 3.0, 3.0), np.eye(4))
     integrator, source = described(replace(scene, lights=[light]))
-    batches = FullInBatches(chained(integrator, 8), source, seed=1, memory=1 << 30, for_denoiser=True)
+    batches = BatchedRender(chained(integrator, 8), source, seed=1, memory=1 << 30, for_denoiser=True)
     batches.add(16)
     assert batches.specular().max() > 1
     assert (batches.picture() - batches.specular()).max() < 1
@@ -222,15 +222,15 @@ def test_gain_limit_and_background_are_those_of_paths(all_events):
 
 def test_chains_count_as_rays_and_depend_on_the_seed_alone(all_events):
 
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.film.sample_batches import BatchedRender
 
     integrator, source = all_events
-    whole = FullInBatches(chained(integrator, 4), source, seed=5, memory=1 << 30)
+    whole = BatchedRender(chained(integrator, 4), source, seed=5, memory=1 << 30)
     whole.add(8)
-    again = FullInBatches(chained(integrator, 4), source, seed=5, memory=(1 << 21))
+    again = BatchedRender(chained(integrator, 4), source, seed=5, memory=(1 << 21))
     again.add(8)
     np.testing.assert_allclose(whole.picture(), again.picture(), rtol=1e-5)
-    plain = FullInBatches(integrator, source, seed=5, memory=1 << 30)
+    plain = BatchedRender(integrator, source, seed=5, memory=1 << 30)
     plain.add(8)
     lanes = SIDE * SIDE * 8
     assert whole.rays.primary == plain.rays.primary == lanes
@@ -270,12 +270,12 @@ def test_seen_light_is_told_apart_and_is_all_that_is_seen(all_events):
     """The emitter's mirror images and the sky's; not what lies on matt surfaces."""
 
     from lippmann.rendering.film.memory_model import cut_wavefronts
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.film.sample_batches import BatchedRender
     from lippmann.rendering.film.wavefront import trace_frame
 
     integrator, source = all_events
     integrator = chained(integrator, 4)
-    both = [FullInBatches(integrator, source, seed=5, memory=1 << 30, for_denoiser=keeps) for keeps in (True, False)]
+    both = [BatchedRender(integrator, source, seed=5, memory=1 << 30, for_denoiser=keeps) for keeps in (True, False)]
     for batches in both:
         batches.add(16)
     frame = trace_frame(integrator, source, cut_wavefronts(SIDE, SIDE, 16, memory=2**30), seed=5, for_denoiser=True)
@@ -303,7 +303,7 @@ def test_what_one_chain_brings_beyond_a_limit_is_excess(all_events):
     from lippmann.device.kernel_ops import divide
     from lippmann.device.sobol import SampleStream
     from lippmann.rendering.transport.ray_source import PixelRays
-    from lippmann.rendering.transport.specular_chains import specular_light
+    from lippmann.rendering.transport.specular_chains import trace_specular_light
 
     integrator, source = all_events
     most, of_pixel, chains = 4.0, 64, 3
@@ -313,7 +313,7 @@ def test_what_one_chain_brings_beyond_a_limit_is_excess(all_events):
         row, column = divide(pixel, SIDE)
         stream = SampleStream.of_pixels(pixel, sample, dr.opaque(mi.UInt32, 1))
         pixels = PixelRays(source, column, row, mi.UInt32(0))
-        light, excess, _ = specular_light(
+        light, excess, _ = trace_specular_light(
             integrator, pixels, stream, dr.opaque(mi.UInt32, per_lane), mi.Bool(True), dr.opaque(mi.Float, most)
         )
         return np.array(mi.Color3f(light)).T, np.array(mi.Color3f(excess)).T
@@ -336,33 +336,33 @@ def test_of_many_chains_each_counts_as_a_whole(all_events):
     import mitsuba as mi
 
     from lippmann.rendering.film.memory_model import cut_wavefronts
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.film.sample_batches import BatchedRender
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.transport.specular_chains import most_of_chain
+    from lippmann.rendering.transport.specular_chains import limit_chain
 
-    assert 4 < most_of_chain(8.0) < 5
-    assert 20 < most_of_chain(64.0) < 30
+    assert 4 < limit_chain(8.0) < 5
+    assert 20 < limit_chain(64.0) < 30
     integrator, source = all_events
     four = chained(integrator, 4)
     dim = four.lit_by(replace(four.light, gain=mi.Float(0.25)))
-    few = [FullInBatches(four, source, seed=seed, memory=1 << 30, for_denoiser=True) for seed in range(16)]
-    many, limited = (FullInBatches(each, source, seed=5, memory=1 << 30, for_denoiser=True) for each in (four, dim))
+    few = [BatchedRender(four, source, seed=seed, memory=1 << 30, for_denoiser=True) for seed in range(16)]
+    many, limited = (BatchedRender(each, source, seed=5, memory=1 << 30, for_denoiser=True) for each in (four, dim))
     for each in few:
         each.add(2)
     many.add(16)
     limited.add(2)
     frame = trace_frame(dim, source, cut_wavefronts(SIDE, SIDE, 2, memory=2**30), seed=5, for_denoiser=True)
-    assert FullInBatches(integrator, source, memory=1 << 30).excess() is None
+    assert BatchedRender(integrator, source, memory=1 << 30).excess() is None
     assert many.excess().max() == 0
     assert limited.excess().max() == frame.excess.max() == 0  # the gain leaves less than 5.7
     excess, specular = (
-        np.stack([part(each) for each in few]) for part in (FullInBatches.excess, FullInBatches.specular)
+        np.stack([part(each) for each in few]) for part in (BatchedRender.excess, BatchedRender.specular)
     )
     bright = excess.max(axis=-1) > 0
     assert 5 < bright.sum() < 0.01 * bright.size
     assert np.all(excess <= specular * (1 + 1e-5))
     # Of single hits, by one of a pixel's chains, is left what counts of them.
-    assert (specular - excess).max(axis=-1)[bright].min() == pytest.approx(most_of_chain(8.0) / 8, rel=0.1)
+    assert (specular - excess).max(axis=-1)[bright].min() == pytest.approx(limit_chain(8.0) / 8, rel=0.1)
 
 
 def test_sky_at_outlines_stays_with_paths(engine):

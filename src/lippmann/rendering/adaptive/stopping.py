@@ -23,8 +23,8 @@ from lippmann.rendering.film.batched_picture import STREAMS
 from lippmann.rendering.request.render_request import RenderRequest
 
 if TYPE_CHECKING:
-    from lippmann.rendering.denoise.dual_buffer import Denoised
-    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.denoise.dual_buffer import DenoisedPicture
+    from lippmann.rendering.film.sample_batches import BatchedRender
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Goal:
         """Seconds of ``max_time`` that remain after ``spent`` and the reserve; infinite without a limit."""
         return math.inf if self.max_time is None else self.max_time - self.reserve - spent
 
-    def missing(self, estimate: Estimate) -> float:
+    def measure_shortfall(self, estimate: Estimate) -> float:
         """PSNR in dB that the picture lacks: at most 0 at the goal, minus infinity without a quality."""
         short = -math.inf
         for _, value, low, asked in self._list_requirements(estimate):
@@ -146,10 +146,10 @@ class Outcome:
     errors: PixelErrors | None = None
 
 
-def reach(
+def sample_until(
     goal: Goal,
-    sampler: FullInBatches,
-    picture: FullInBatches | Denoised,
+    sampler: BatchedRender,
+    picture: BatchedRender | DenoisedPicture,
     estimator: PictureEstimator,
     *,
     first: int,
@@ -187,8 +187,8 @@ def reach(
         estimate = estimator.estimate(errors, sampler.samples)
         assessment = clock() - started
         left = goal.seconds_left(clock() - began)
-        missing = goal.missing(estimate)
-        growth = 10 ** (min(missing, 100.0) / (10 * slope)) if goal.has_quality else math.inf
+        shortfall = goal.measure_shortfall(estimate)
+        growth = 10 ** (min(shortfall, 100.0) / (10 * slope)) if goal.has_quality else math.inf
         if growth <= (1.0 if goal.is_promise else TUNING.least_growth):
             return Outcome("quality", estimate, errors)
         if sampler.samples >= goal.most:
@@ -213,13 +213,13 @@ def _choose_total(samples: int, growth: float) -> int:
     return STREAMS * math.ceil(target / STREAMS)
 
 
-def _count_affordable(seconds: float, sampler: FullInBatches) -> int:
+def _count_affordable(seconds: float, sampler: BatchedRender) -> int:
     """Samples per pixel that are taken within a share of ``seconds``."""
     most = TUNING.time_share * max(0.0, seconds) / max(_time_sample(sampler), 1e-9)
     return math.floor(min(most, MOST_SAMPLES))
 
 
-def _time_sample(sampler: FullInBatches) -> float:
+def _time_sample(sampler: BatchedRender) -> float:
     """Seconds of one sample of every pixel, without compilation."""
     return sampler.seconds_trace / max(sampler.samples, 1)
 

@@ -13,7 +13,7 @@ denoiser does. The weight of a pixel is estimated from the other half leaving th
 independent of it.
 
 Before denoising, outlines in front of the background are improved by the coverage of the guides' rays
-(:func:`exchange_coverage`). Each half uses one half of these rays, so that their error is estimated, too.
+(:func:`correct_coverage`). Each half uses one half of these rays, so that their error is estimated, too.
 
 Errors are those between codes. The denoised halves are compared as codes. The samples are too noisy for that: what they
 say of the bias is converted by the slope of the curve. This fails for pixels that the denoiser made far brighter than
@@ -55,12 +55,12 @@ _AROUND = [step for step in np.ndindex(3, 3) if step != (1, 1)]
 Denoise = Callable[[Floats, int, bool], Floats]
 
 
-class Denoised:
+class DenoisedPicture:
     """The denoised picture of a renderer's samples; see the module.
 
     Parameters
     ----------
-    renderer:
+    samples:
         The samples, in two independent streams.
     denoise:
         Denoises an ``(H, W, 3)`` linear picture.
@@ -74,13 +74,13 @@ class Denoised:
 
     def __init__(
         self,
-        renderer: BatchedPicture,
+        samples: BatchedPicture,
         denoise: Denoise,
         coding: Coding,
         threads: int = 1,
         coverage: Callable[[], tuple[Coverage, Coverage] | None] | None = None,
     ) -> None:
-        self._renderer = renderer
+        self._samples = samples
         self._denoise = denoise
         self._coverage = coverage
         self._coding: Coding = coding
@@ -91,32 +91,33 @@ class Denoised:
 
     def picture(self) -> Floats:
         """``(H, W, 3)`` float32 linear RGB."""
-        return remove_excess(self._blend_halves(), self._renderer.excess())
+        return remove_excess(self._blend_halves(), self._samples.excess())
 
     def squared_error(self) -> PixelErrors:
         """Squared error of every pixel's code, estimated from the two halves."""
         noisy, clean = self._clean_halves()
         first, second = (encode(half, self._coding) for half in clean)
-        apart: Floats = over_channels(np.add, np.square(first - second)) * np.float32(1 / 12)
+        halves_variance: Floats = over_channels(np.add, np.square(first - second)) * np.float32(1 / 12)
         picture = self._blend_halves()
         codes, slope = encode_with_slope(picture, self._coding)
         bend = codes - np.float32(0.5) * (first + second)
-        self._take_chords(slope, picture, noisy)
+        slope = self._replace_by_secants(slope, picture, noisy)
         left = [slope * (half - smooth) + bend for half, smooth in zip(noisy, clean, strict=True)]
         common = over_channels(np.add, left[0] * left[1]) * np.float32(1 / 3)
-        limit = TUNING.hidden * max(1.0, REQUEST.usual / self._renderer.samples)
+        limit = TUNING.hidden * max(1.0, REQUEST.usual / self._samples.samples)
         hidden = over_channels(np.maximum, np.maximum(np.abs(left[0]), np.abs(left[1]))) > limit
-        common[hidden] = np.float32(ESTIMATE.outlier_ratio) * apart[hidden]
-        samples = self._renderer.squared_error()
-        if samples.blur is not None:
-            common += samples.blur
-        if self._renderer.samples < REQUEST.fewest:
+        common[hidden] = np.float32(ESTIMATE.outlier_ratio) * halves_variance[hidden]
+        of_samples = self._samples.squared_error()
+        if of_samples.blur is not None:
+            common += of_samples.blur
+        if self._samples.samples < REQUEST.fewest:
             # Too few batches to find outliers: part of the error is assumed to rest on them.
-            samples = replace(samples, outliers=np.float32(TUNING.untold_outliers) * np.maximum(samples.values, 0))
-        return PixelErrors(common + apart, None, samples, apart, samples.blur)
+            share = np.float32(TUNING.untold_outliers)
+            of_samples = replace(of_samples, outliers=share * np.maximum(of_samples.values, 0))
+        return PixelErrors(common + halves_variance, None, of_samples, halves_variance, of_samples.blur)
 
     def _blend_halves(self) -> Floats:
-        if self._renderer.samples < 2:
+        if self._samples.samples < 2:
             # A single sample makes no half-buffers and no error estimate.
             return self._clean_picture()
         _, (first, second) = self._clean_halves()
@@ -124,49 +125,49 @@ class Denoised:
         return mean
 
     def _clean_picture(self) -> Floats:
-        noisy, coverage = self._renderer.average_samples(), self._pair_coverages()
+        noisy, coverage = self._samples.average_samples(), self._pair_coverages()
         if coverage is not None:
             (paths, further), (more_paths, more_further) = coverage
-            noisy = exchange_coverage(noisy, paths + more_paths, further + more_further, threads=self._threads)
-        return self._renderer.to_display(
-            clean_light(noisy, self._renderer.specular(), self._denoise, self._renderer.samples)
+            noisy = correct_coverage(noisy, paths + more_paths, further + more_further, threads=self._threads)
+        return self._samples.to_display(
+            denoise_light(noisy, self._samples.specular(), self._denoise, self._samples.samples)
         )
 
     def _clean_halves(self) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
-        if self._halves is None or self._samples_of_halves != self._renderer.samples:
-            self._samples_of_halves = self._renderer.samples
-            traced, specular = self._average_noisy_halves(), self._renderer.specular_halves() or (None, None)
+        if self._halves is None or self._samples_of_halves != self._samples.samples:
+            self._samples_of_halves = self._samples.samples
+            traced, specular = self._average_noisy_halves(), self._samples.specular_halves() or (None, None)
             with keep_filters():
                 first, second = (
-                    self._renderer.to_display(
-                        clean_light(traced[k], specular[k], self._denoise, self._renderer.samples, turned=k == 1)
+                    self._samples.to_display(
+                        denoise_light(traced[k], specular[k], self._denoise, self._samples.samples, turned=k == 1)
                     )
                     for k in (0, 1)
                 )
-            noisy = self._renderer.to_display(traced[0]), self._renderer.to_display(traced[1])
+            noisy = self._samples.to_display(traced[0]), self._samples.to_display(traced[1])
             own = weigh_samples(noisy, (first, second), self._coding, threads=self._threads)
             self._halves = noisy, (first + own * (noisy[0] - first), second + own * (noisy[1] - second))
         return self._halves
 
     def _average_noisy_halves(self) -> tuple[Floats, Floats]:
         """The noisy half-buffers, with the coverage of all rays at outlines."""
-        halves, coverage = self._renderer.average_halves(), self._pair_coverages()
+        halves, coverage = self._samples.average_halves(), self._pair_coverages()
         if coverage is None:
             return halves
         threads = self._threads
         first, second = (
-            exchange_coverage(half, *both, threads=threads) for half, both in zip(halves, coverage, strict=True)
+            correct_coverage(half, *both, threads=threads) for half, both in zip(halves, coverage, strict=True)
         )
         return first, second
 
     def _pair_coverages(self) -> list[tuple[Coverage, Coverage]] | None:
         """Coverage of each half-buffer by its paths, and by its feature rays; None where either is not known."""
-        paths = self._renderer.coverage_halves()
+        paths = self._samples.coverage_halves()
         further = None if paths is None or self._coverage is None else self._coverage()
         return None if paths is None or further is None else list(zip(paths, further, strict=True))
 
-    def _take_chords(self, slope: Floats, picture: Floats, noisy: tuple[Floats, Floats]) -> None:
-        """Put the finite difference in place of the curve's ``slope`` at pixels far brighter than their samples."""
+    def _replace_by_secants(self, slope: Floats, picture: Floats, noisy: tuple[Floats, Floats]) -> Floats:
+        """The curve's ``slope``, but the finite difference of codes at pixels far brighter than their samples."""
         coding = self._coding
         displayed = np.float32(0.5) * (noisy[0] + noisy[1])
         scatter = over_channels(np.add, np.abs(noisy[0] - noisy[1])) * np.float32(1 / 3)
@@ -183,9 +184,12 @@ class Denoised:
             far = truth < picture
             low, high = truth[far], picture[far]
         slope[far] = coding_chord(low, high, coding)
+        return slope
 
 
-def clean_light(noisy: Floats, specular: Floats | None, denoise: Denoise, samples: int, turned: bool = False) -> Floats:
+def denoise_light(
+    noisy: Floats, specular: Floats | None, denoise: Denoise, samples: int, turned: bool = False
+) -> Floats:
     """The denoised picture; specular light and very bright light bypass the denoiser.
 
     Specular light has hardly any noise, and the denoiser takes its highlights for noise. So where the renderer
@@ -225,7 +229,7 @@ def remove_excess(picture: Floats, excess: Floats | None) -> Floats:
     return picture if excess is None else np.maximum(picture - excess, np.float32(0))
 
 
-def exchange_coverage(pixels: Floats, paths: Coverage, further: Coverage, *, threads: int = 1) -> Floats:
+def correct_coverage(pixels: Floats, paths: Coverage, further: Coverage, *, threads: int = 1) -> Floats:
     """``pixels (H, W, 3)``, linear, with the coverage of all rays at outlines in front of the background.
 
     There the coverage of a pixel with few samples is noisy, and a denoiser cannot know the right one. The difference

@@ -100,7 +100,7 @@ class GuidedDenoiser:
         """
         started = time.perf_counter()
         self._progress(Progress("denoise", 0, 1))
-        self.used = effort_of(self._kind, samples)
+        self.used = choose_effort(self._kind, samples)
         guides = self.guides()
         if self._shares and isinstance(self._source, QuiltRays):
             pixels = share_views(pixels, self._source, guides)
@@ -148,7 +148,7 @@ class GuidedDenoiser:
         """Estimated seconds to denoise both halves, guides included, extrapolated from a small picture."""
         side = 128
         small = np.zeros((side, side, 3), dtype=np.float32)
-        effort = effort_of(self._kind, samples)
+        effort = choose_effort(self._kind, samples)
         denoise(small, small, small, clean_guides=True, effort=effort, threads=self._threads)  # starts threads
         started = time.perf_counter()
         denoise(small, small, small, clean_guides=True, effort=effort, threads=self._threads)
@@ -187,7 +187,7 @@ class GuidedDenoiser:
         return self._guides
 
 
-def effort_of(kind: Denoiser, samples: int) -> Effort:
+def choose_effort(kind: Denoiser, samples: int) -> Effort:
     """The effort that ``kind`` names; where it names none, that for the number of samples per pixel."""
     if kind in ("oidn-fast", "oidn-high"):
         return "fast" if kind == "oidn-fast" else "high"
@@ -216,8 +216,8 @@ class SurfacePart:
         With ``is_open (H, W)``, the part with the pixels where it is true and that show surfaces or are close to one.
         """
         is_surface = (normal[..., 0] != 0) | (normal[..., 1] != 0) | (normal[..., 2] != 0)
-        near = _widen(is_surface)
-        place = _rectangle(is_surface if is_open is None else near & is_open)
+        near = _dilate(is_surface)
+        place = _bound_surfaces(is_surface if is_open is None else near & is_open)
         return None if place is None else SurfacePart(place, near[place][..., None])
 
 
@@ -248,7 +248,7 @@ def denoise_surfaces(
     return result
 
 
-def _widen(is_surface: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _dilate(is_surface: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """The mask dilated by one pixel: guides of few samples miss edges that barely reach into a pixel."""
     for axis in (0, 1):
         lines = np.swapaxes(is_surface, 0, axis)
@@ -259,7 +259,7 @@ def _widen(is_surface: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return is_surface
 
 
-def _rectangle(is_surface: NDArray[np.bool_]) -> tuple[slice, slice] | None:
+def _bound_surfaces(is_surface: NDArray[np.bool_]) -> tuple[slice, slice] | None:
     """Rows and columns with all surfaces, and a margin; None if there is none."""
     spans = []
     for axis in (1, 0):

@@ -37,11 +37,11 @@ from lippmann.rendering.estimate.psnr import (
     PartErrors,
     Parts,
     PixelErrors,
+    average_neighbours,
     estimate_plain,
     make_estimate,
-    neighbourhood,
-    parts_with_pixels,
     quantiles,
+    select_parts,
 )
 from lippmann.rendering.estimate.tuning import TUNING
 
@@ -95,25 +95,25 @@ def estimate_denoised(errors: ErrorSums, samples: ErrorSums, grid: tuple[int, in
 
     ``errors``: sums of the denoised picture; ``samples``: those of the samples it was made of.
     """
-    index, errors = parts_with_pixels(errors)
-    _, samples = parts_with_pixels(samples)
+    index, errors = select_parts(errors)
+    _, samples = select_parts(samples)
     pixels = float(errors.pixels.sum())
-    by_chance, error = float(errors.apart.sum()) / pixels, float(errors.values.sum()) / pixels
+    variance, error = float(errors.halves_variance.sum()) / pixels, float(errors.values.sum()) / pixels
     deviation = math.sqrt(float((errors.squares + errors.products).sum())) / pixels
     of_samples = max(float(samples.values.sum()), 1e-30)
     outliers = min(1.0, float(samples.outliers.sum()) / of_samples)
     # Denoised halves may agree by clipping, not by low noise: at least a 10 000th of the samples' error remains.
-    likely = likely_error(max(by_chance, 1e-4 * of_samples / pixels), error - by_chance, deviation, outliers)
-    middle = float(likely.quantiles(0.5))
+    posterior = estimate_posterior(max(variance, 1e-4 * of_samples / pixels), error - variance, deviation, outliers)
+    middle = float(posterior.quantiles(0.5))
     model = math.exp(NORMAL_95 * TUNING.model_uncertainty)
-    often_better = TUNING.often_better * (1 - errors.share_less(middle))
-    worse, better = likely.quantiles(np.array([0.975, 0.025])) * (model, often_better / model)
+    often_better = TUNING.often_better * (1 - errors.bound_blur_share(middle))
+    worse, better = posterior.quantiles(np.array([0.975, 0.025])) * (model, often_better / model)
 
     parts = _estimate_parts(errors, samples.squares, index, grid, middle)
-    common = likely.quantiles((np.arange(TUNING.draws) + 0.5) / TUNING.draws) / middle
+    common = posterior.quantiles((np.arange(TUNING.draws) + 0.5) / TUNING.draws) / middle
     largest, without_blur = _draw_worst(parts, common)
     worst = *quantiles(largest, (0.5, 0.975)), quantiles(without_blur, 0.025) * TUNING.often_better**2
-    return make_estimate((middle, worse, better, *worst, by_chance), int(index[np.argmax(parts.expected)]), grid)
+    return make_estimate((middle, worse, better, *worst, variance), int(index[np.argmax(parts.expected)]), grid)
 
 
 def _draw_worst(parts: PartErrors, common: Real) -> tuple[Real, Real]:
@@ -136,11 +136,11 @@ def _estimate_parts(
     ``mean`` is the mean squared error of the picture; ``of_samples`` are sums of squares of the samples' errors.
     """
     count = errors.pixels
-    apart = errors.apart / count
-    (near,), _ = neighbourhood(apart[None], index, grid)
-    least = 1e-3 * float(errors.apart.sum() / count.sum()) + 1e-30
+    halves_variance = errors.halves_variance / count
+    (near,), _ = average_neighbours(halves_variance[None], index, grid)
+    least = 1e-3 * float(errors.halves_variance.sum() / count.sum()) + 1e-30
     power = TUNING.neighbour_power
-    around = np.maximum(apart, least) ** (1 - power) * np.maximum(near, least) ** power
+    around = np.maximum(halves_variance, least) ** (1 - power) * np.maximum(near, least) ** power
     around *= mean / float((around * count).sum() / count.sum())
     # The moments of a single part are noisy estimates: they are shrunk towards those of all parts together.
     moments = np.stack([errors.squares, errors.products])
@@ -158,45 +158,45 @@ def _estimate_parts(
     # A part of few pixels, in a corner of the panel, has a larger variance.
     fewer = prior * np.maximum(1 / count - 1 / quantiles(count, 0.5), 0)
     variance = np.log1p((trust * noise + products) / np.square(expected)) + np.log1p(fewer)
-    return PartErrors(index, expected, expected, variance, errors.shares_less(expected))
+    return PartErrors(index, expected, expected, variance, errors.bound_blur_shares(expected))
 
 
 @dataclass(frozen=True, eq=False)
-class LikelyError:
-    """Posterior of the mean squared error of a denoised picture: ``by_chance`` (V) times 1 plus the ratio C / V.
+class ErrorPosterior:
+    """Posterior of the mean squared error of a denoised picture: its ``variance`` V times 1 plus the ratio C / V.
 
     ``weights`` are the probabilities of ratios from 0.01 to 10000, evenly spaced in their logarithm.
     """
 
-    by_chance: float
+    variance: float
     weights: Real
 
     def quantiles(self, shares: Real | float) -> Real:
         """Quantiles of the mean squared error, for probabilities ``shares``."""
         below = np.cumsum(self.weights) - 0.5 * self.weights
-        return np.asarray(self.by_chance * (1 + np.exp(np.interp(shares, below, _LOGARITHMS))))
+        return np.asarray(self.variance * (1 + np.exp(np.interp(shares, below, _LOGARITHMS))))
 
 
-def likely_error(by_chance: float, common: float, deviation: float, outliers: float) -> LikelyError:
-    """The posterior of the error.
+def estimate_posterior(variance: float, squared_bias: float, deviation: float, outliers: float) -> ErrorPosterior:
+    """Posterior of the mean squared error, from the prior of C / V and the measured C.
 
     Parameters
     ----------
-    by_chance, common:
+    variance, squared_bias:
         V and C as measured, means over all pixels, in squared codes.
     deviation:
-        The standard deviation of ``common``.
+        Standard error of ``squared_bias``.
     outliers:
         The share of the samples' error that rests on outliers, 0 to 1.
     """
     # At least a thousandth of a C that is surely larger; and above 0, so that its logarithm exists.
-    by_chance = max(by_chance, 1e-3 * (common - 3 * deviation), 1e-12)
+    variance = max(variance, 1e-3 * (squared_bias - 3 * deviation), 1e-12)
     middle = (1 - outliers) * math.log(TUNING.usual_ratio) + outliers * math.log(TUNING.outlier_ratio)
     prior = _log_t((_LOGARITHMS - middle) / TUNING.ratio_scale)
-    off = (common - _RATIOS * by_chance) / max(deviation, 1e-3 * by_chance)
+    off = (squared_bias - _RATIOS * variance) / max(deviation, 1e-3 * variance)
     weights = prior + _log_t(off)
     weights = np.exp(weights - weights.max())
-    return LikelyError(by_chance, weights / weights.sum())
+    return ErrorPosterior(variance, weights / weights.sum())
 
 
 def _log_t(deviations: Real) -> Real:

@@ -37,7 +37,7 @@ Floats = NDArray[np.float32]
 
 #: Largest share of an error that is ascribed to the blur of caustics, which is known as an upper bound only
 #: (:mod:`lippmann.rendering.film.caustic_blur`).
-MOST_LESS = 0.9
+MOST_BLUR_SHARE = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,35 +62,35 @@ class PixelErrors:
     values: Floats
     outliers: Floats | None = None
     samples: PixelErrors | None = None
-    apart: Floats | None = None
+    halves_variance: Floats | None = None
     blur: Floats | None = None
 
     def part(self, inside: slice | tuple[slice, slice]) -> PixelErrors:
         """The errors of some pixels."""
-        outliers, apart, blur = (
-            None if values is None else values[inside] for values in (self.outliers, self.apart, self.blur)
+        outliers, halves_variance, blur = (
+            None if values is None else values[inside] for values in (self.outliers, self.halves_variance, self.blur)
         )
         samples = None if self.samples is None else self.samples.part(inside)
-        return PixelErrors(self.values[inside], outliers, samples, apart, blur)
+        return PixelErrors(self.values[inside], outliers, samples, halves_variance, blur)
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorSums:
     """Sums over the pixels of each part, ``(parts,)`` each.
 
-    ``pixels``: their number; ``values``, ``outliers``, ``apart``, ``blur``: sums of the fields of
-    :class:`PixelErrors`; ``squares``: sum of the squares of ``values``, less ``apart``.
+    ``pixels``: their number; ``values``, ``outliers``, ``halves_variance``, ``blur``: sums of the fields of
+    :class:`PixelErrors`; ``squares``: sum of the squares of ``values``, less ``halves_variance``.
 
     ``products``: sum of the variances of the products of the halves' errors. ``values`` measure these products, except
-    where the halves are the samples themselves. The product has the variance 4 s^2, where s is the mean of ``apart``,
-    whose second moment is 3 s^2: four thirds of its square. It is small where the halves are smooth.
+    where the halves are the samples themselves. The product has the variance 4 s^2. Here s is the mean of
+    ``halves_variance``, whose second moment is 3 s^2: four thirds of its square. It is small for smooth halves.
     """
 
     pixels: Real
     values: Real
     squares: Real
     outliers: Real
-    apart: Real
+    halves_variance: Real
     blur: Real
     products: Real
 
@@ -107,11 +107,11 @@ class ErrorSums:
         self.values[:] += self._sum(owner, values)
         if errors.outliers is not None:
             self.outliers[:] += self._sum(owner, errors.outliers.astype(np.float64).ravel())
-        if errors.apart is not None:
-            apart = errors.apart.astype(np.float64).ravel()
-            self.apart[:] += self._sum(owner, apart)
-            squares = np.square(values - apart)
-            self.products[:] += self._sum(owner, 4 / 3 * np.square(apart))
+        if errors.halves_variance is not None:
+            halves_variance = errors.halves_variance.astype(np.float64).ravel()
+            self.halves_variance[:] += self._sum(owner, halves_variance)
+            squares = np.square(values - halves_variance)
+            self.products[:] += self._sum(owner, 4 / 3 * np.square(halves_variance))
         if errors.blur is not None:
             self.blur[:] += self._sum(owner, errors.blur.astype(np.float64).ravel())
         self.squares[:] += self._sum(owner, squares)
@@ -121,24 +121,24 @@ class ErrorSums:
         for field in fields(self):
             getattr(self, field.name)[parts] += getattr(sums, field.name)
 
-    def share_less(self, mean: float) -> float:
+    def bound_blur_share(self, mean: float) -> float:
         """Largest share by which blur may overstate the ``mean`` error of all pixels."""
-        return float(_share_less(self.blur.sum() / self.pixels.sum(), mean))
+        return float(_bound_blur_share(self.blur.sum() / self.pixels.sum(), mean))
 
-    def shares_less(self, means: Real) -> Real:
+    def bound_blur_shares(self, means: Real) -> Real:
         """The same share for each part, whose mean errors are ``means``, ``(parts,)`` each."""
-        return np.asarray(_share_less(self.blur / self.pixels, means))
+        return np.asarray(_bound_blur_share(self.blur / self.pixels, means))
 
     def _sum(self, owner: NDArray[np.integer], values: Real) -> Real:
         return np.asarray(np.bincount(owner, weights=values, minlength=len(self.pixels)), dtype=np.float64)
 
 
-def _share_less(blur: Real | float, error: Real | float) -> Real | np.float64:
-    share: Real | np.float64 = np.clip(blur / error, 0, MOST_LESS)
+def _bound_blur_share(blur: Real | float, error: Real | float) -> Real | np.float64:
+    share: Real | np.float64 = np.clip(blur / error, 0, MOST_BLUR_SHARE)
     return share
 
 
-def parts_with_pixels(sums: ErrorSums) -> tuple[NDArray[np.intp], ErrorSums]:
+def select_parts(sums: ErrorSums) -> tuple[NDArray[np.intp], ErrorSums]:
     """The flat indices of the parts that have pixels, and their sums."""
     index = np.flatnonzero(sums.pixels)
     return index, ErrorSums(*(getattr(sums, field.name)[index] for field in fields(ErrorSums)))
@@ -250,7 +250,7 @@ def estimate_plain(sums: ErrorSums, grid: tuple[int, int]) -> Estimate:
     distributed as s chi^2 with one degree of freedom. Its variance is 2 s^2, that of the true squared error 2 s^2 as
     well, and its second moment 3 s^2. So each variance is two thirds of the second moment.
     """
-    index, sums = parts_with_pixels(sums)
+    index, sums = select_parts(sums)
     count, squares = sums.pixels, 2 / 3 * sums.squares
     pixels, outliers = float(count.sum()), sums.outliers / count
     deviation = math.sqrt(float(squares.sum())) / pixels
@@ -258,18 +258,18 @@ def estimate_plain(sums: ErrorSums, grid: tuple[int, int]) -> Estimate:
     average = max(float(sums.values.sum()) / pixels, deviation, FLOOR)
     spread = NORMAL_95 * math.hypot(math.sqrt(math.log1p(2 * (deviation / average) ** 2)), TUNING.model_uncertainty)
     doubt = 1 + TUNING.outlier_doubt * min(1.0, float(sums.outliers.sum()) / (average * pixels))
-    ends = average * math.exp(spread) * doubt, average * math.exp(-spread) * (1 - sums.share_less(average))
+    ends = average * math.exp(spread) * doubt, average * math.exp(-spread) * (1 - sums.bound_blur_share(average))
 
     mean = sums.values / count
     # The second moment of a single part is a noisy estimate: it is shrunk towards that of its neighbours.
-    (near, squares_near), neighbours = neighbourhood(np.stack([mean, squares / count]), index, grid)
+    (near, squares_near), neighbours = average_neighbours(np.stack([mean, squares / count]), index, grid)
     noise = (squares + TUNING.prior_pixels * squares_near) / (count + TUNING.prior_pixels) / count
     # Means of neighbours are shrunk towards the mean of all, and each part towards its neighbours.
     around = shrink(near, np.full_like(near, average), noise / np.maximum(neighbours, 1))[0]
     expected, trust = shrink(mean, np.maximum(around, 1e-3 * average), noise)
-    doubted = expected + TUNING.outlier_doubt * np.clip(outliers, 0, expected)
+    pessimistic = expected + TUNING.outlier_doubt * np.clip(outliers, 0, expected)
     variance, fluctuation = (np.log1p(each / np.square(expected)) for each in (trust * noise, noise))
-    parts = PartErrors(index, expected, doubted, variance + fluctuation, sums.shares_less(expected))
+    parts = PartErrors(index, expected, pessimistic, variance + fluctuation, sums.bound_blur_shares(expected))
     largest, without_blur = parts.draw_largest()
     model = math.exp(TUNING.model_uncertainty)
     # Shrinkage raises the estimates beside a bad part, so the lower quantile is 0.01, not 0.025.
@@ -289,20 +289,20 @@ def make_estimate(errors: Sequence[float], worst: int, grid: tuple[int, int]) ->
 class PartErrors:
     """Posterior squared errors of the parts with pixels, ``(parts,)`` each.
 
-    ``index``: their numbers in the grid; ``expected``: the mean; ``doubted``: an upper mean, where outliers may have
-    been missed; ``variance``: of the logarithm; ``less``: the share by which blur may overstate the error.
+    ``index``: their numbers in the grid; ``expected``: the mean; ``pessimistic``: an upper mean, where samples may have
+    missed outliers; ``variance``: of the logarithm; ``blur_share``: the share by which blur may overstate the error.
     """
 
     index: NDArray[np.intp]
     expected: Real
-    doubted: Real
+    pessimistic: Real
     variance: Real
-    less: Real
+    blur_share: Real
 
     @cached_property
     def candidates(self) -> NDArray[np.intp]:
         """Positions of the parts that may be the worst, the likeliest first."""
-        reach = np.log(self.doubted) + 2.5 * np.sqrt(self.variance)
+        reach = np.log(self.pessimistic) + 2.5 * np.sqrt(self.variance)
         return np.argsort(-reach)[:1024]  # bounds the memory of the draws
 
     def draw_largest(self) -> tuple[Real, Real]:
@@ -313,10 +313,10 @@ class PartErrors:
         spread = np.sqrt(self.variance[best])[:, None]
         # The mean of a lognormal distribution is exp(variance / 2) times its median.
         middle = np.log(self.expected)[best][:, None] - 0.5 * np.square(spread)
-        doubt = (np.log(self.doubted) - np.log(self.expected))[best][:, None]
+        doubt = (np.log(self.pessimistic) - np.log(self.expected))[best][:, None]
         chance = np.square(random.random(TUNING.draws))
         draws = np.exp(middle + spread * random.standard_normal(shape) + doubt * chance)
-        return draws.max(axis=0), (draws * (1 - self.less[best])[:, None]).max(axis=0)
+        return draws.max(axis=0), (draws * (1 - self.blur_share[best])[:, None]).max(axis=0)
 
 
 def shrink(measured: Real, around: Real, noise: Real) -> tuple[Real, Real]:
@@ -343,7 +343,7 @@ def quantiles(values: Real, shares: Sequence[float] | float) -> Real:
     return np.asarray(np.interp(np.multiply(shares, len(values) - 1), np.arange(len(values)), np.sort(values)))
 
 
-def neighbourhood(values: Real, index: NDArray[np.intp], grid: tuple[int, int]) -> tuple[Real, Real]:
+def average_neighbours(values: Real, index: NDArray[np.intp], grid: tuple[int, int]) -> tuple[Real, Real]:
     """Means of ``(n, parts)`` values over the up to eight neighbours of each part in the grid, and their number.
 
     A part without neighbours has its own value.

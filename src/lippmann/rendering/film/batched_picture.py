@@ -28,7 +28,7 @@ from lippmann.device.types import Bool, Color3f, Float
 from lippmann.errors import UsageError
 from lippmann.rendering.estimate.psnr import PixelErrors
 from lippmann.rendering.estimate.tuning import TUNING
-from lippmann.rendering.film.memory_model import Run
+from lippmann.rendering.film.memory_model import BatchWavefront
 from lippmann.rendering.film.wavefront import Coverage
 from lippmann.rendering.request.tuning import TUNING as REQUEST
 
@@ -152,7 +152,7 @@ class BatchedPicture:
         return [sum(self._taken[s * each : (s + 1) * each]) for s in range(STREAMS)]
 
     def squared_error(self) -> PixelErrors:
-        """The expected squared error of every pixel's code, see :func:`error_of_batches`.
+        """The expected squared error of every pixel's code, see :func:`estimate_batch_errors`.
 
         Raises
         ------
@@ -162,7 +162,7 @@ class BatchedPicture:
         if self.samples < STREAMS:
             raise UsageError("one sample per pixel does not tell its own error", rule="two or more do")
         if self._errors is None:
-            error, outliers = error_of_batches(self.to_display(self._sums), self._taken, self._coding)
+            error, outliers = estimate_batch_errors(self.to_display(self._sums), self._taken, self._coding)
             shape = self.shape[0], -1
             error = error.reshape(shape)
             blur = self.squared_blur()
@@ -186,7 +186,7 @@ class BatchedPicture:
         """The display's pixels from traced values ``(..., W, 3)``."""
         return values
 
-    def _sums_of(self, run: Run) -> dict[str, list[Floats]]:
+    def _sums_of(self, run: BatchWavefront) -> dict[str, list[Floats]]:
         """The sums of a run's pixels by name, one for each of its batches."""
         streams = [batch // self._batches_of_stream for batch in run.batches]
         sums = {
@@ -200,7 +200,7 @@ class BatchedPicture:
         }
 
 
-def error_of_batches(sums: Floats, taken: Sequence[int], coding: Coding) -> tuple[Floats, Floats]:
+def estimate_batch_errors(sums: Floats, taken: Sequence[int], coding: Coding) -> tuple[Floats, Floats]:
     """Estimated squared error of the code of each pixel's mean, averaged over the three channels.
 
     Parameters
@@ -234,8 +234,8 @@ def error_of_batches(sums: Floats, taken: Sequence[int], coding: Coding) -> tupl
         index = dr.arange(mi.UInt32, size)
         values = [dr.gather(mi.Color3f, table, index + dr.opaque(mi.UInt32, k * size)) for k in range(len(counts))]
         of_part = _Batches(values, counts, coding)
-        jackknife, alone = of_part.jackknife()
-        result = jackknife + of_part.evenness()
+        variance, alone = of_part.estimate_jackknife()
+        result = variance + of_part.correct_stratification()
         dr.eval(result, alone)
         error[part], outliers[part] = np.array(result), np.array(alone)
     return error, outliers
@@ -253,7 +253,7 @@ class _Batches:
         self.total = sum(self.sums[1:], self.sums[0])
         self.count = sum(self.counts[1:], self.counts[0])
 
-    def jackknife(self) -> tuple[Float, Float]:
+    def estimate_jackknife(self) -> tuple[Float, Float]:
         """Jackknife estimate of the squared error, and the part of it that rests on outliers."""
         without = [
             encode((self.total - value) / dr.maximum(self.count - count, 1), self.coding)
@@ -275,7 +275,7 @@ class _Batches:
         decides &= weight >= REQUEST.fewest
         return error, dr.select(decides, error, 0)
 
-    def evenness(self) -> Float:
+    def correct_stratification(self) -> Float:
         """Squared difference between the two streams, less the mean of that between halves that mix both."""
         streams, _ = self._difference(range(len(self.sums) // 2))
         mixed, number = mi.Float(0), mi.Float(0)

@@ -19,8 +19,8 @@ from lippmann.device.sobol import lattice_point
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Color3f, Float, UInt32, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.film.memory_model import LAYERS, Pass, Plan, cut_wavefronts
-from lippmann.rendering.film.wavefront import Coverage, samples_of_tile, to_rows
+from lippmann.rendering.film.memory_model import LAYERS, Plan, SampleRange, cut_wavefronts
+from lippmann.rendering.film.wavefront import Coverage, lay_out_wavefront, reorder_to_rows
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource
 from lippmann.scene.matrices import inverse, rotation_of
@@ -93,7 +93,7 @@ def trace_guides(
     for tile in plan.tiles:
         rows = slice(tile.first_row, tile.first_row + tile.rows)
         # The order of pixels is the same as for a wavefront of paths.
-        pixels, _ = samples_of_tile(source, plan, tile, Pass(0, 1), 0, box_filter)
+        pixels, _ = lay_out_wavefront(source, plan, tile, SampleRange(0, 1), 0, box_filter)
         sums = _sum_samples(surfaces, pixels, weights, dr.opaque(mi.UInt32, plan.samples))
         dr.eval(sums)  # all at once: evaluated one by one, the rays would be traced nine times
         shape = (tile.rows, plan.width, plan.channels)
@@ -113,7 +113,7 @@ def _in_rows(values: Float | Vector3f, shape: tuple[int, int, int]) -> FloatArra
     """``(rows, columns, channels)`` or ``(rows, columns, channels, 3)`` from sums in the order of lanes."""
     rows, width, channels = shape
     lanes = to_numpy(values, rows * width * channels)
-    pixels = to_rows(lanes.reshape(rows * width, -1), width)
+    pixels = reorder_to_rows(lanes.reshape(rows * width, -1), width)
     return pixels.reshape(*shape, *lanes.shape[1:])
 
 

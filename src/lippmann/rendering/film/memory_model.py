@@ -71,7 +71,7 @@ def preferred_lanes() -> int:
     return PREFERRED_LANES_OF_GPU if engine.runs_on_gpu() else PREFERRED_LANES
 
 
-def lanes_within(memory: int, kept: int, needed: int, what: str, preferred: int | None = None) -> int:
+def fit_lanes(memory: int, kept: int, needed: int, what: str, preferred: int | None = None) -> int:
     """Lanes of a wavefront beside ``kept`` bytes in ``memory`` bytes, at most ``preferred``.
 
     Parameters
@@ -90,11 +90,11 @@ def lanes_within(memory: int, kept: int, needed: int, what: str, preferred: int 
     """
     lanes = (memory - kept) // BYTES_PER_LANE
     if lanes < needed:
-        raise too_small(memory, what, kept + needed * BYTES_PER_LANE)
+        raise make_memory_error(memory, what, kept + needed * BYTES_PER_LANE)
     return min(preferred or preferred_lanes(), lanes)
 
 
-def too_small(memory: int, what: str, required: int, fix: str = "raise the limit") -> MemoryLimitError:
+def make_memory_error(memory: int, what: str, required: int, fix: str = "raise the limit") -> MemoryLimitError:
     """The error that ``memory`` bytes do not hold ``what``, which needs ``required``."""
     return MemoryLimitError(
         f"{amount_in_words(memory)} are too small for {what}",
@@ -114,7 +114,7 @@ class Tile:
 
 
 @dataclass(frozen=True)
-class Pass:
+class SampleRange:
     """Samples ``first`` to ``first + count`` of every pixel."""
 
     first: int
@@ -122,7 +122,7 @@ class Pass:
 
 
 @dataclass(frozen=True)
-class Run:
+class BatchWavefront:
     """One wavefront of batches: ``count`` samples in each of ``batches`` for the pixels ``first`` to ``last``.
 
     ``starts``: the number of the first sample of each batch in its stream. ``step``: from pixel to pixel.
@@ -155,9 +155,9 @@ class Plan:
         return [Tile(i, row, min(self.rows_per_tile, self.height - row)) for i, row in enumerate(starts)]
 
     @property
-    def passes(self) -> list[Pass]:
+    def passes(self) -> list[SampleRange]:
         starts = range(0, self.samples, self.samples_per_pass)
-        return [Pass(first, min(self.samples_per_pass, self.samples - first)) for first in starts]
+        return [SampleRange(first, min(self.samples_per_pass, self.samples - first)) for first in starts]
 
     @property
     def lanes(self) -> int:
@@ -169,7 +169,7 @@ class Plan:
         """Samples of the whole picture, all channels."""
         return self.width * self.height * self.channels * self.samples
 
-    def __iter__(self) -> Iterator[tuple[Tile, Pass]]:
+    def __iter__(self) -> Iterator[tuple[Tile, SampleRange]]:
         return ((tile, run) for tile in self.tiles for run in self.passes)
 
 
@@ -194,15 +194,15 @@ def cut_wavefronts(
     """
     row_lanes = width * channels
     kept += width * height * PICTURE
-    most = max(row_lanes, lanes_within(memory, kept, row_lanes, f"{width}x{height} pixels", preferred_lanes))
-    run = equal_length(samples, most // row_lanes)
-    rows = equal_length(height, most // (row_lanes * run))
+    most = max(row_lanes, fit_lanes(memory, kept, row_lanes, f"{width}x{height} pixels", preferred_lanes))
+    run = divide_evenly(samples, most // row_lanes)
+    rows = divide_evenly(height, most // (row_lanes * run))
     return Plan(width, height, channels, samples, rows, run)
 
 
 def cut_batches(
     pixels: int, batches: tuple[int, ...], starts: tuple[int, ...], count: int, lanes: int, strip: int
-) -> Iterator[Run]:
+) -> Iterator[BatchWavefront]:
     """Divide ``count`` samples of each of ``batches`` for all pixels into wavefronts of at most about ``lanes`` lanes.
 
     Parameters
@@ -216,13 +216,13 @@ def cut_batches(
     """
     most = lanes // (count * len(batches)) or lanes // count or lanes
     in_strips = most >= strip
-    per_run = equal_length(-(-pixels // strip), most // strip) * strip if in_strips else equal_length(pixels, most)
+    per_run = divide_evenly(-(-pixels // strip), most // strip) * strip if in_strips else divide_evenly(pixels, most)
     together = max(1, min(len(batches), lanes // (per_run * count)))
     length = max(1, min(count, lanes // per_run))
     for first in range(0, pixels, per_run):
         for batch in range(0, len(batches), together):
             for before in range(0, count, length):
-                yield Run(
+                yield BatchWavefront(
                     first,
                     min(first + per_run, pixels),
                     batches[batch : batch + together],
@@ -232,7 +232,7 @@ def cut_batches(
                 )
 
 
-def equal_length(total: int, most: int) -> int:
+def divide_evenly(total: int, most: int) -> int:
     """Length of the fewest equal parts of ``total`` that are not longer than ``most`` (taken for 1 if less).
 
     Equal parts, so that the last is not a stub with a kernel of its own.

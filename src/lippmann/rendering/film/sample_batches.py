@@ -25,16 +25,16 @@ from lippmann.progress import Progress, ProgressCallback, of_part, silent
 from lippmann.rendering.estimate.psnr import PixelErrors
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.batched_picture import STREAMS, BatchedPicture
-from lippmann.rendering.film.memory_model import Run, cut_batches
+from lippmann.rendering.film.memory_model import BatchWavefront, cut_batches
 from lippmann.rendering.film.wavefront import (
     STRIP_ROWS,
     Frame,
     RayTotals,
     add_samples,
-    compile_seconds,
     evaluate,
     in_strips,
-    pixel_at,
+    locate_pixel,
+    measure_compilation,
     sample_pixels,
 )
 from lippmann.rendering.transport.integrator import Integrator
@@ -44,7 +44,7 @@ from lippmann.rendering.transport.ray_source import PixelRays, RaySource, Subpix
 Floats = NDArray[np.float32]
 
 
-class FullInBatches(BatchedPicture):
+class BatchedRender(BatchedPicture):
     """A progressive picture with an estimate of its own error; :meth:`add` takes more samples.
 
     Parameters
@@ -99,7 +99,7 @@ class FullInBatches(BatchedPicture):
         keeps_coverage = for_denoiser and isinstance(integrator, PathIntegrator)
         keeps_specular = isinstance(integrator, PathIntegrator) and for_denoiser and integrator.light.chains is not None
         further = memory_model.FOR_DENOISER * keeps_coverage
-        batches, self._lanes = _sizes(self._window, source.channels, memory, further)
+        batches, self._lanes = _fit_batches(self._window, source.channels, memory, further)
         super().__init__(
             batches,
             self._window.shape,
@@ -107,7 +107,7 @@ class FullInBatches(BatchedPicture):
             coding,
             keeps_specular=keeps_specular,
             keeps_coverage=keeps_coverage,
-            blur_after=_blur_after(integrator, source, self._window, seed),
+            blur_after=_make_blur_estimator(integrator, source, self._window, seed),
         )
 
     def add(self, samples: int, progress: ProgressCallback = silent) -> None:
@@ -116,13 +116,13 @@ class FullInBatches(BatchedPicture):
         together = self.samples + samples
         started, done, compiled = time.perf_counter(), 0, 0.0
         self._errors = None
-        for integrator, stretch in _stretches(self._integrator, self.samples, samples):
+        for integrator, stretch in _split_by_light(self._integrator, self.samples, samples):
             taken = list(self._taken)
-            for run in self._runs(stretch):
+            for run in self._cut_wavefronts(stretch):
                 with dr.scoped_set_flag(dr.JitFlag.KernelHistory, done == 0):
                     self._trace(integrator, run, together)
                     if done == 0:
-                        compiled = compile_seconds(started)
+                        compiled = measure_compilation(started)
                 if run.last == pixels:
                     for batch in run.batches:
                         taken[batch] += run.count
@@ -136,14 +136,14 @@ class FullInBatches(BatchedPicture):
         """``(..., H, W, 3)``; of sub-pixels whose rays keep all colours, ``(..., H, 3 W, 3)``, each its own colour."""
         return self._source.own_colors(values) if isinstance(self._source, SubpixelRays) else values
 
-    def _runs(self, samples: int) -> Iterator[Run]:
+    def _cut_wavefronts(self, samples: int) -> Iterator[BatchWavefront]:
         """Wavefronts that take ``samples`` more of every pixel."""
         number, per_stream = self.batches, self._batches_of_stream
         each, rest = divmod(samples, number)
         # The next sample of each stream; its batches take consecutive runs of samples.
         had = self._per_stream()
         # The remainder goes to the batches with the fewest samples, alternating between streams.
-        fewest = sorted(_alternate(number), key=lambda batch: self._taken[batch])
+        fewest = sorted(_alternate_streams(number), key=lambda batch: self._taken[batch])
         for batches, count in ((tuple(range(number)), each), (tuple(sorted(fewest[:rest])), 1)):
             starts = []
             for batch in batches:
@@ -154,7 +154,7 @@ class FullInBatches(BatchedPicture):
                 strip = STRIP_ROWS * self._window.width
                 yield from cut_batches(pixels, batches, tuple(starts), count, lanes, strip)
 
-    def _trace(self, integrator: Integrator, run: Run, together: int) -> None:
+    def _trace(self, integrator: Integrator, run: BatchWavefront, together: int) -> None:
         """Add the samples of a run; every pixel then has ``together`` samples, by which excess is limited.
 
         Lanes are ordered pixel (see :mod:`.wavefront`), channel, batch, sample. Values that differ from run to run are
@@ -168,12 +168,12 @@ class FullInBatches(BatchedPicture):
         pixel, channel = divide(rest, channels)
         pixel = dr.opaque(mi.UInt32, run.first) + pixel * dr.opaque(mi.UInt32, run.step)
         strips = in_strips(self._sums.shape[1], window.width) if run.in_strips else 0
-        row, column = pixel_at(pixel, window.width, dr.opaque(mi.UInt32, strips))
+        row, column = locate_pixel(pixel, window.width, dr.opaque(mi.UInt32, strips))
         row += dr.opaque(mi.UInt32, window.top)
         column += dr.opaque(mi.UInt32, window.left)
         pixel = self._source.number(column, row)
-        sample += dr.gather(mi.UInt32, _table(run.starts), place)
-        stream_of = dr.gather(mi.UInt32, _table([batch // per_stream for batch in run.batches]), place)
+        sample += dr.gather(mi.UInt32, _upload_padded(run.starts), place)
+        stream_of = dr.gather(mi.UInt32, _upload_padded([batch // per_stream for batch in run.batches]), place)
         stream = SampleStream.of_pixels(pixel * channels + channel, sample, dr.opaque(mi.UInt32, self._seed), stream_of)
         pixels = PixelRays(self._source, column, row, channel, self._box_filter)
         samples = None if self._covered is None else dr.opaque(mi.Float, together)
@@ -182,7 +182,7 @@ class FullInBatches(BatchedPicture):
         add_samples(traced, self._sums_of(run), channels, run.count, window.width if run.in_strips else None)
 
 
-def _blur_after(
+def _make_blur_estimator(
     integrator: Integrator, source: RaySource, window: PixelWindow, seed: int
 ) -> Callable[[int], Floats] | None:
     """The function from samples per pixel to the squared bias of photon density estimation; None without photons."""
@@ -193,7 +193,7 @@ def _blur_after(
     return SquaredBlur(integrator, integrator.light.photon_passes, source, window, seed).after
 
 
-def _stretches(integrator: Integrator, first: int, samples: int) -> Iterator[tuple[Integrator, int]]:
+def _split_by_light(integrator: Integrator, first: int, samples: int) -> Iterator[tuple[Integrator, int]]:
     """Runs of ``samples`` samples per pixel from number ``first`` on, each with the integrator of its photon pass."""
     while samples > 0:
         count, current = samples, integrator
@@ -206,7 +206,7 @@ def _stretches(integrator: Integrator, first: int, samples: int) -> Iterator[tup
 
 
 def trace_in_batches(
-    make_batches: Callable[[int, PixelWindow], FullInBatches],
+    make_batches: Callable[[int, PixelWindow], BatchedRender],
     size: tuple[int, int],
     samples: int,
     memory: int,
@@ -248,13 +248,13 @@ def trace_in_batches(
     return frame, PixelErrors(error, outliers, blur=blur)
 
 
-def _alternate(number: int) -> tuple[int, ...]:
+def _alternate_streams(number: int) -> tuple[int, ...]:
     """Batch numbers, alternating between streams."""
     per_stream = number // STREAMS
     return tuple(stream * per_stream + place for place in range(per_stream) for stream in range(STREAMS))
 
 
-def _sizes(window: PixelWindow, channels: int, memory: int, further: int) -> tuple[int, int]:
+def _fit_batches(window: PixelWindow, channels: int, memory: int, further: int) -> tuple[int, int]:
     """Number of batches whose sums fit into ``memory``, and the lanes of a wavefront that fit into the rest.
 
     ``further`` are the bytes that each pixel takes beside its sums; a wavefront has room for one row at least.
@@ -265,10 +265,10 @@ def _sizes(window: PixelWindow, channels: int, memory: int, further: int) -> tup
         if memory >= kept + row * memory_model.BYTES_PER_LANE or batches == STREAMS:
             break
     what = f"a picture of {pixels} pixels that is to know its own error"
-    return batches, memory_model.lanes_within(memory, kept, row, what)
+    return batches, memory_model.fit_lanes(memory, kept, row, what)
 
 
-def _table(numbers: Sequence[int]) -> UInt32:
+def _upload_padded(numbers: Sequence[int]) -> UInt32:
     """``numbers`` on the device, padded by two zeros: Dr.Jit would compile a single number into the kernel."""
     table: UInt32 = upload(np.append(numbers, [0, 0]).astype(np.uint32))
     return table

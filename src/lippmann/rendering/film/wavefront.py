@@ -23,7 +23,7 @@ from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, Color3f, Float, Spectrum, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.film.memory_model import Pass, Plan, Tile
+from lippmann.rendering.film.memory_model import Plan, SampleRange, Tile
 from lippmann.rendering.transport.integrator import Integrator, PixelSample
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource
@@ -128,12 +128,12 @@ def trace_frame(
     for tile, run in plan:
         lanes = tile.rows * plan.width * plan.channels * run.count
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, done == 0):
-            pixels, stream = samples_of_tile(source, plan, tile, run, seed, box_filter, corner)
+            pixels, stream = lay_out_wavefront(source, plan, tile, run, seed, box_filter, corner)
             samples = dr.opaque(mi.Float, plan.samples) if for_denoiser else None
             sample = sample_pixels(integrator, pixels, stream, samples)
             evaluate(sample, lanes, frame.rays)
             if done == 0:
-                frame.seconds_compile = compile_seconds(started)
+                frame.seconds_compile = measure_compilation(started)
         for name in ("specular", "excess", "covered"):
             if name not in parts and getattr(sample, name) is not None:
                 layers = plan.channels if name == "covered" else 3
@@ -151,11 +151,11 @@ def trace_frame(
     return frame
 
 
-def samples_of_tile(
+def lay_out_wavefront(
     source: RaySource,
     plan: Plan,
     tile: Tile,
-    run: Pass,
+    run: SampleRange,
     seed: int,
     box_filter: bool,
     corner: tuple[int, int] = (0, 0),
@@ -169,7 +169,7 @@ def samples_of_tile(
     per_channel, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
     pixel, channel = divide(per_channel, plan.channels)
     strips = in_strips(tile.rows * plan.width, plan.width)
-    row, column = pixel_at(pixel, plan.width, dr.opaque(mi.UInt32, strips))
+    row, column = locate_pixel(pixel, plan.width, dr.opaque(mi.UInt32, strips))
     row += dr.opaque(mi.UInt32, tile.first_row + corner[0])
     column += dr.opaque(mi.UInt32, corner[1])
     sample += dr.opaque(mi.UInt32, run.first)
@@ -192,19 +192,19 @@ def sample_pixels(
 def evaluate(sample: PixelSample, lanes: int, totals: RayTotals) -> None:
     """Evaluate the radiance of a wavefront, set it to black where it is not finite, and add its rays to ``totals``."""
     counts = sample.counts
-    sample.radiance, finite = finite_or_black(sample.radiance)
+    sample.radiance, finite = blacken_invalid(sample.radiance)
     if sample.specular is not None:
         sample.specular = dr.select(finite, sample.specular, mi.Color3f(0))
         sample.excess = dr.select(finite, sample.excess, mi.Color3f(0))
     # All at once: a sum of an unevaluated radiance would run the path loop anew.
     dr.eval(sample.radiance, sample.specular, sample.excess, sample.covered, counts.secondary, counts.shadow, finite)
     totals.primary += lanes
-    totals.secondary += lane_sum_lanes(counts.secondary)
-    totals.shadow += lane_sum_lanes(counts.shadow)
+    totals.secondary += sum_counts(counts.secondary)
+    totals.shadow += sum_counts(counts.shadow)
     totals.discarded += lanes - int(dr.count(finite)[0])
 
 
-def finite_or_black(radiance: Spectrum) -> tuple[Color3f, Bool]:
+def blacken_invalid(radiance: Spectrum) -> tuple[Color3f, Bool]:
     """``radiance`` where all of it is finite, else black; and where it is."""
     finite = dr.isfinite(radiance.x) & dr.isfinite(radiance.y) & dr.isfinite(radiance.z)
     return dr.select(finite, radiance, mi.Color3f(0)), finite
@@ -235,7 +235,7 @@ def add_samples(
         for index, total in enumerate(components):
             lanes = total.reshape(-1, channels, len(sums[name]))[:, index % channels]
             for batch, sum_of_batch in enumerate(sums[name]):
-                sum_of_batch[:, index] += to_rows(lanes[:, batch], width)
+                sum_of_batch[:, index] += reorder_to_rows(lanes[:, batch], width)
 
 
 def select_colors(values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -248,13 +248,13 @@ def select_colors(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.stack([values[:, c, ..., c] for c in range(3)], axis=-1)
 
 
-def lane_sum_lanes(counts: UInt32) -> int:
+def sum_counts(counts: UInt32) -> int:
     """The sum of evaluated counts over all lanes."""
     # Sums of 32-bit counts overflow beyond 2^32 rays a wavefront; 64 bits do not.
     return int(dr.sum(mi.UInt64(counts))[0])
 
 
-def compile_seconds(started: float) -> float:
+def measure_compilation(started: float) -> float:
     """Seconds of compilation since ``started`` (:func:`time.perf_counter`), from Dr.Jit's history of kernels.
 
     The history belongs to the process: kernels of an interrupted render or of another thread may be in it.
@@ -270,7 +270,7 @@ def in_strips(pixels: int, width: int) -> int:
     return pixels // strip * strip
 
 
-def pixel_at(place: UInt32, width: int, strips: UInt32) -> tuple[UInt32, UInt32]:
+def locate_pixel(place: UInt32, width: int, strips: UInt32) -> tuple[UInt32, UInt32]:
     """Row and column of a place.
 
     Parameters
@@ -290,7 +290,7 @@ def pixel_at(place: UInt32, width: int, strips: UInt32) -> tuple[UInt32, UInt32]
     return dr.select(stands, strip * STRIP_ROWS + strip_row, row), dr.select(stands, strip_column, column)
 
 
-def to_rows(values: NDArray[T], width: int | None) -> NDArray[T]:
+def reorder_to_rows(values: NDArray[T], width: int | None) -> NDArray[T]:
     """``values (pixels, ...)`` from places, which begin with a strip, to rows; as they are without ``width``."""
     if width is None or not (whole := in_strips(len(values), width)):
         return values

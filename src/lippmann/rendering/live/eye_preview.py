@@ -64,11 +64,12 @@ def render_eye_preview(
     placement = session.place(display)
 
     # Mitsuba may be loaded now that the engine has chosen its libraries.
-    from lippmann.rendering.denoise.dual_buffer import clean_light
-    from lippmann.rendering.denoise.guided_denoiser import SurfacePart, denoise_surfaces, effort_of
+    from lippmann.rendering.denoise.dual_buffer import denoise_light
+    from lippmann.rendering.denoise.guided_denoiser import SurfacePart, choose_effort, denoise_surfaces
     from lippmann.rendering.denoise.tuning import TUNING as DENOISE
     from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
     from lippmann.rendering.film.wavefront import trace_frame
+    from lippmann.rendering.transport.integrator import read_choices
     from lippmann.rendering.transport.ray_source import SinglePixelRays
 
     whole = session.rays(display, placement)
@@ -84,7 +85,7 @@ def render_eye_preview(
         guides = trace_guides(
             session.built, source, plan, placement.display_from_world, box_filter=box_filter, progress=progress
         )
-        effort = effort_of(request.denoise, samples)
+        effort = choose_effort(request.denoise, samples)
         buffers = frame.pixels, guides.albedo, guides.normal
         noisy, albedo, normal = (visible.arrange_for_denoiser(values[0]) for values in buffers)
         surfaces = SurfacePart.of(normal)
@@ -92,7 +93,7 @@ def render_eye_preview(
         def take_noise_out(light: Floats, *_: object) -> Floats:
             return denoise_surfaces(light, albedo, normal, surfaces, effort=effort)
 
-        clean = session.watch.stage("denoise", lambda: clean_light(noisy, None, take_noise_out, samples))
+        clean = session.watch.stage("denoise", lambda: denoise_light(noisy, None, take_noise_out, samples))
         picture = visible.arrange_denoised(clean)
         options = {"denoise": "oidn", "denoise_effort": effort}
     frame.pixels = picture = mean_of_points(picture, across)
@@ -101,6 +102,7 @@ def render_eye_preview(
         frame,
         samples=samples,
         options={"eye": list(eye), **options, **describe_placement(resolved, placement)},
+        choices=read_choices(integrator),
         notes=placement.warnings,
     )
     return Preview(resolved.tone_mapped(picture), provenance)

@@ -2,7 +2,7 @@
 
 A pixel has the rays and random numbers of a render: with one stream those of
 :func:`lippmann.rendering.film.wavefront.trace_frame`, with two streams those of
-:class:`lippmann.rendering.film.sample_batches.FullInBatches`. Placement, light, exposure, seed and pixels are inputs of
+:class:`lippmann.rendering.film.sample_batches.BatchedRender`. Placement, light, exposure, seed and pixels are inputs of
 the kernel, so that changing them needs no other kernel.
 """
 
@@ -21,7 +21,7 @@ from lippmann.device.types import Array, Float, Float64, Ray3f, UInt32
 from lippmann.display import Display
 from lippmann.display.panel import PixelWindow
 from lippmann.display.visible_pixels import PixelSet, window_pixels
-from lippmann.rendering.film.wavefront import finite_or_black
+from lippmann.rendering.film.wavefront import blacken_invalid
 from lippmann.rendering.transport.first_surface import Surfaces
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays, opaque_rows, world_ray_by
@@ -180,7 +180,7 @@ class LiveTracer(_PixelTracer):
         else:
             radiance, _ = integrator.sample(ray, stream, mi.Bool(True))
             distance = integrator.scene.ray_intersect_preliminary(ray, coherent=True, active=True).t
-        radiance, _ = finite_or_black(radiance)
+        radiance, _ = blacken_invalid(radiance)
         hits = dr.isfinite(distance) & (distance < dr.largest(mi.Float) / 2)
         p = ray(dr.select(hits, distance, 0))
         a, b, c, d = height_row

@@ -15,10 +15,10 @@ from lippmann.display import Display
 from lippmann.options.light import LightOptions
 from lippmann.rendering.film.memory_model import BYTES_PER_LANE, PREFERRED_LANES
 from lippmann.rendering.live.live_tracer import FeatureTracer, LiveIntegrator, LiveTracer
-from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
+from lippmann.rendering.preparation.exposure import compute_gain, measure_exposure
 from lippmann.rendering.preparation.prepare import make_light_sampler, trace_pilot
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.session import Session, even_background, make_integrator
+from lippmann.rendering.session import Session, find_uniform_background, make_integrator
 from lippmann.rendering.transport.first_surface import make_surfaces
 from lippmann.rendering.transport.path import PathIntegrator, PreparedLight
 from lippmann.rendering.transport.ray_source import DisplayRays
@@ -105,12 +105,12 @@ class SceneKernels:
         if exposure == "auto":
             if measure or self._exposure is None:
                 plain = integrator.lit_by(PreparedLight(sampler, gain=dr.opaque(mi.Float, 1.0)))
-                background = even_background(self.built, request)
+                background = find_uniform_background(self.built, request)
                 self._exposure = measure_exposure(plain, source, background, self.session.memory, request.seed)
             exposure = self._exposure
         else:
-            exposure += self.session.count_exposure(placement.exposure)
-        gain, clamp = gain_of(exposure), request.clamp_indirect
+            exposure += self.session.choose_own_exposure(placement.exposure)
+        gain, clamp = compute_gain(exposure), request.clamp_indirect
         most_indirect = None if clamp is None else dr.opaque(mi.Float, clamp / gain)
         light = PreparedLight(sampler, dr.opaque(mi.Float, gain), most_indirect)
         self._integrators[_traced_by(request)] = integrator.lit_by(light)

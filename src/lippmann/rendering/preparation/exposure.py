@@ -22,7 +22,7 @@ from lippmann.rendering.transport.tuning import TUNING as TRANSPORT
 from lippmann.scene.values.description import Color
 
 
-def gain_of(exposure: float) -> float:
+def compute_gain(exposure: float) -> float:
     """Factor on radiance of an exposure in stops (EV)."""
     return float(2.0**exposure)
 
@@ -50,10 +50,10 @@ def measure_exposure(
     )
     few = ChosenRays(source, *np.meshgrid(columns, rows))
     plan = cut_wavefronts(few.width, few.height, 1, channels=few.channels, memory=memory)
-    return exposure_for(trace_frame(integrator, few, plan, seed=seed, box_filter=True).pixels, background)
+    return compute_exposure(trace_frame(integrator, few, plan, seed=seed, box_filter=True).pixels, background)
 
 
-def exposure_for(pixels: NDArray[np.float32], background: Color | None) -> float:
+def compute_exposure(pixels: NDArray[np.float32], background: Color | None) -> float:
     """The exposure in stops for linear RGB ``(height, width, 3)``; see :func:`measure_exposure`.
 
     Rounded, so that all machines that render parts of a picture choose the same.

@@ -24,7 +24,7 @@ from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, Float, MitsubaScene, Point2f, Point3f, Ray3f, UInt32
 from lippmann.options.choices import REUSING
 from lippmann.rendering.film import memory_model
-from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
+from lippmann.rendering.preparation.exposure import compute_gain, measure_exposure
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import find_casters, has_sharp_surfaces, hides_caustics
@@ -37,7 +37,7 @@ from lippmann.rendering.transport.path_vertex import DIMENSIONS
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource
 from lippmann.rendering.transport.sharp_events import sharp_lobe
-from lippmann.rendering.transport.specular_chains import specular_light
+from lippmann.rendering.transport.specular_chains import trace_specular_light
 from lippmann.rendering.transport.tuning import TUNING as TRANSPORT
 from lippmann.scene.values.description import Color
 
@@ -77,7 +77,7 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
     paths = TRANSPORT.rays_of_each(emitters)
     lane = dr.arange(mi.UInt32, paths * emitters)
     emitter, path = divide(lane, dr.opaque(mi.UInt32, paths))
-    stream, column, row, jitter = _place_of(path, source)
+    stream, column, row, jitter = _choose_pixels(path, source)
     ray = source.rays(column, row, mi.UInt32(0), jitter)
     traced = _sample_contributions(integrator, ray, stream, emitter, dr.opaque(mi.Float, emitters))
     dr.eval(traced)
@@ -85,20 +85,20 @@ def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
     hit, point = (np.array(each)[..., :paths] for each in traced[2:])
     # Invalid values, as from a normal of length 0, count as no contribution.
     moments = np.nan_to_num(squares).mean(axis=1) if emitters == count else np.zeros(count)
-    placed = _has_place(lights) if emitters == count else np.zeros(emitters, bool)
+    placed = _are_local(lights) if emitters == count else np.zeros(emitters, bool)
     brightest = float(np.nan_to_num(indirect[placed]).sum(axis=0).max())
     return Pilot(moments, brightest, _bound_region(point.T[hit != 0].astype(np.float64)))
 
 
 def find_brightest_specular_light(integrator: PathIntegrator, source: RaySource) -> float:
     """Largest exposed radiance, mean of its components, of the pilot's specular chains."""
-    stream, column, row, _ = _place_of(dr.arange(mi.UInt32, TRANSPORT.probe_side**2), source)
+    stream, column, row, _ = _choose_pixels(dr.arange(mi.UInt32, TRANSPORT.probe_side**2), source)
     pixel, number = PixelRays(source, column, row, mi.UInt32(0)), dr.opaque(mi.UInt32, 1)
-    light = integrator.expose(specular_light(integrator, pixel, stream, number, mi.Bool(True))[0])
+    light = integrator.expose(trace_specular_light(integrator, pixel, stream, number, mi.Bool(True))[0])
     return float(dr.max(dr.mean(light))[0])
 
 
-def _place_of(path: UInt32, source: RaySource) -> tuple[SampleStream, UInt32, UInt32, Point2f]:
+def _choose_pixels(path: UInt32, source: RaySource) -> tuple[SampleStream, UInt32, UInt32, Point2f]:
     """For each path by its number: its sample stream, the column and row of its pixel, and the point in the pixel."""
     stream = SampleStream.of_pixels(mi.UInt32(0), path, dr.opaque(mi.UInt32, named_seed("pilot")))
     place = stream.next_2d(PIXEL_DIMENSION)
@@ -127,7 +127,7 @@ def weigh_emitters(pilot: Pilot) -> NDArray[np.float64]:
     return np.asarray(share * uniform + (1 - share) * roots / roots.sum())
 
 
-def _has_place(emitters: list[mi.Emitter]) -> NDArray[np.bool_]:
+def _are_local(emitters: list[mi.Emitter]) -> NDArray[np.bool_]:
     """``(emitters,)``: which are at a finite distance, neither an environment nor directional."""
     flags = np.array([int(emitter.flags()) for emitter in emitters], np.uint32)
     return np.asarray(flags & int(mi.EmitterFlags.Surface | mi.EmitterFlags.DeltaPosition), bool)
@@ -248,7 +248,7 @@ def prepare_light(
     exposure = request.exposure
     if exposure == "auto":
         exposure = measure_exposure(paths.lit_by(light), source, background, memory, request.seed)
-    gain = gain_of(exposure) if exposure else 1.0
+    gain = compute_gain(exposure) if exposure else 1.0
     if caustics.way is not None:
         choices["caustics"] = caustics.way
     if exposure:
@@ -346,7 +346,7 @@ def shoot_photons(
     if required > memory:
         if request.caustics == "auto":
             return _left_to_paths(integrator)
-        raise memory_model.too_small(memory, "photons of caustics", required)
+        raise memory_model.make_memory_error(memory, "photons of caustics", required)
     photons = CausticPhotons(
         integrator.scene,
         integrator.features,

@@ -15,7 +15,7 @@ from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Array, Float, Ray3f, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.batched_picture import STREAMS
-from lippmann.rendering.film.wavefront import RayTotals, compile_seconds, finite_or_black
+from lippmann.rendering.film.wavefront import RayTotals, blacken_invalid, measure_compilation
 from lippmann.rendering.reprojection.point_image import BACKGROUND, TRACED, BoolArray, IntArray, PointImage, RealArray
 from lippmann.rendering.reprojection.rules import alike, nearer
 from lippmann.rendering.reprojection.tuning import TUNING
@@ -69,7 +69,7 @@ class PixelTracer:
             # For all parts: with the flag changed, the kernel would be recorded again.
             with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
                 samples = self._trace(part)
-                compiling = compile_seconds(started)
+                compiling = measure_compilation(started)
             self.seconds_compile += compiling
             self.seconds_trace += time.perf_counter() - started - compiling
             self._bands.pixels(_enter, len(part), points, part, self._samples, *samples)
@@ -100,7 +100,7 @@ class PixelTracer:
         stream = SampleStream.of_pixels(pixel, number, seed, of_stream)
         ray = PixelRays(self._source, column, row, mi.UInt32(0), self._box_filter).ray(stream)
         radiance, counts, first = self._integrator.sample_with_hit(ray, stream, mi.Bool(True))
-        radiance, finite = finite_or_black(radiance)
+        radiance, finite = blacken_invalid(radiance)
         one, none = mi.UInt32(1), mi.UInt32(0)
         return (
             radiance,

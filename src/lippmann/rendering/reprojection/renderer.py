@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.film.memory_model import PICTURE, POINT_IMAGE, lanes_within
+from lippmann.rendering.film.memory_model import PICTURE, POINT_IMAGE, fit_lanes
 from lippmann.rendering.film.wavefront import Frame
 from lippmann.rendering.reprojection.default_order import DefaultOrder
 from lippmann.rendering.reprojection.paper_order import PaperOrder
@@ -131,4 +131,4 @@ def wavefront_lanes(memory: int, width: int, height: int, samples: int) -> int:
         If ``memory`` bytes do not hold even a small one.
     """
     kept = width * height * (PICTURE + POINT_IMAGE)
-    return max(samples, lanes_within(memory, kept, samples, f"{width}x{height} pixels and their points"))
+    return max(samples, fit_lanes(memory, kept, samples, f"{width}x{height} pixels and their points"))

@@ -48,30 +48,30 @@ def make_plan(
         An option of the request does not fit the scene.
     """
     check_scene(request, scene)
-    integrator = _integrator(request, scene)
+    integrator = _choose_integrator(request, scene)
     lens_display = None if form == "quilt" else display
     is_area_sampled = lens_display is not None and lens_display.lens is not None and request.pixel_filter != "point"
     facts = _Facts(request, scene, integrator.value, form, is_area_sampled)
-    method = _method(facts)
-    denoise = _denoise(facts, method)
-    subpixels = _subpixels(facts, method.value, lens_display)
+    method = _choose_method(facts)
+    denoise = _choose_denoiser(facts, method)
+    subpixels = _choose_subpixels(facts, method.value, lens_display)
     if size is None and display is not None:
         size = display.panel.width, display.panel.height
     values = None if size is None else size[0] * size[1] * (3 if subpixels.value else 1)
-    samples = _samples(facts, method.value, subpixels.value, values)
+    samples = _choose_samples(facts, method.value, subpixels.value, values)
     return RenderPlan(
         integrator=integrator,
-        depth=_depth(request, scene, integrator.value),
+        depth=_choose_depth(request, scene, integrator.value),
         method=method,
         denoise=denoise,
         samples=samples,
-        quality=_quality(facts, method.value),
-        reserve=_reserve(facts, method.value, samples.value, values),
+        quality=_choose_quality(facts, method.value),
+        reserve=_choose_reserve(facts, method.value, samples.value, values),
         subpixels=subpixels,
-        pixel_filter=_pixel_filter(facts, samples.value),
-        exposure=_exposure(facts),
-        tone_map=_tone_map(facts),
-        caustics=_caustics(facts),
+        pixel_filter=_choose_pixel_filter(facts, samples.value),
+        exposure=_choose_exposure(facts),
+        tone_map=_choose_tone_map(facts),
+        caustics=_choose_caustics(facts),
     )
 
 
@@ -109,12 +109,12 @@ def resolve(
     UsageError, PictureError
         The request does not fit this form of result, or this scene or display.
     """
-    planned = follow(make_plan(scene, display, request, form, size), request)
+    planned = apply_plan(make_plan(scene, display, request, form, size), request)
     check(planned, form, display)
     return planned
 
 
-def follow(plan: RenderPlan, request: RenderRequest) -> RenderRequest:
+def apply_plan(plan: RenderPlan, request: RenderRequest) -> RenderRequest:
     """``request`` with all values of ``plan``, and with the plan itself."""
     return replace(
         request,
@@ -191,12 +191,12 @@ class _Facts:
         return self.is_exact and (is_usual or request.spp == 1 or self.is_draft) and not request.is_open_ended
 
 
-def _first(*rules: tuple[bool, T, str]) -> Choice[T]:
+def _choose_first(*rules: tuple[bool, T, str]) -> Choice[T]:
     """The choice of the first rule that holds, of rules ``(whether it holds, value, reason)``."""
     return next(Choice(value, reason) for holds, value, reason in rules if holds)
 
 
-def _integrator(request: RenderRequest, scene: Scene) -> Choice[Integrator]:
+def _choose_integrator(request: RenderRequest, scene: Scene) -> Choice[Integrator]:
     if request.integrator == "classic" and scene.classic is None:
         raise UsageError(
             f"'{scene.name}' has no form for the classic light models",
@@ -204,14 +204,14 @@ def _integrator(request: RenderRequest, scene: Scene) -> Choice[Integrator]:
             rule="classic is for Tachyon (.dat) and NFF files and the bundled scenes",
             fix='use integrator="path"',
         )
-    return _first(
+    return _choose_first(
         (request.integrator != "auto", request.integrator, ASKED),
         (scene.is_classic, "classic", "the scene was made for the classic light models"),
         (True, "path", "all light"),
     )
 
 
-def _depth(request: RenderRequest, scene: Scene, integrator: Integrator) -> Choice[int]:
+def _choose_depth(request: RenderRequest, scene: Scene, integrator: Integrator) -> Choice[int]:
     asked = {line.partition(" ")[0] for line in scene.settings} & {"environment", "single_scattering"}
     if integrator == "classic" and (asked := {*asked, *changed_options(scene.light)}):
         raise UsageError(
@@ -227,11 +227,11 @@ def _depth(request: RenderRequest, scene: Scene, integrator: Integrator) -> Choi
     return Choice(default_depth(integrator), f"that of {integrator}")
 
 
-def _method(facts: _Facts) -> Choice[Method]:
+def _choose_method(facts: _Facts) -> Choice[Method]:
     request, scene, name = facts.request, facts.scene, facts.integrator
     kind, kinds = ("splats", "splats") if scene.has_splats else ("a volume", "volumes")
     denoising = "without denoising" if request.denoise == "none" else f"with denoise {request.denoise}"
-    return _first(
+    return _choose_first(
         (request.method != "auto", request.method, ASKED),
         (scene.is_off_surfaces_alone, "full", f"{kinds} have no noise"),
         (scene.lies_off_surfaces, "full", f"{kind}, whose light lies on no surface"),
@@ -247,10 +247,10 @@ def _method(facts: _Facts) -> Choice[Method]:
     )
 
 
-def _denoise(facts: _Facts, method: Choice[Method]) -> Choice[Denoiser]:
+def _choose_denoiser(facts: _Facts, method: Choice[Method]) -> Choice[Denoiser]:
     request = facts.request
     is_draft = facts.is_denoised_draft and request.method in ("auto", "pooled")
-    return _first(
+    return _choose_first(
         (facts.scene.lies_off_surfaces, "none", "light that lies on no surface is not denoised"),
         (request.denoise != "auto", request.denoise, ASKED),
         (is_draft, "oidn-fast", "a draft"),
@@ -260,11 +260,11 @@ def _denoise(facts: _Facts, method: Choice[Method]) -> Choice[Denoiser]:
     )
 
 
-def _subpixels(facts: _Facts, method: Method, display: Display | None) -> Choice[bool]:
+def _choose_subpixels(facts: _Facts, method: Method, display: Display | None) -> Choice[bool]:
     asked = facts.request.subpixels
     is_slanted = display is not None and display.has_slanted_stripes
     is_whole = facts.integrator in PROPERTIES or method in REUSING
-    return _first(
+    return _choose_first(
         (asked is not None, bool(asked), ASKED),
         (not is_slanted, False, "sub-pixels of a pixel see the same direction"),
         (is_whole, False, "whole pixels are traced"),
@@ -272,7 +272,7 @@ def _subpixels(facts: _Facts, method: Method, display: Display | None) -> Choice
     )
 
 
-def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None) -> Choice[int | None]:
+def _choose_samples(facts: _Facts, method: Method, subpixels: bool, values: int | None) -> Choice[int | None]:
     request = facts.request
     classic = facts.scene.classic if facts.integrator == "classic" else None
     of_file = 1 + (classic.camera.antialiasing if classic is not None and facts.form == "preview" else 0)
@@ -281,7 +281,7 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
     fewest = TUNING.fewest - subpixels * (1 + is_large) if method == "pooled" or facts.is_area_sampled else 1
     of_budget = 1 << max(round(math.log2(TUNING.values / (values or TUNING.values))), 0)
     budgeted = f"about a million for the picture, but {fewest} to {TUNING.usual} of each pixel"
-    usual = _first(
+    usual = _choose_first(
         (request.spp is not None, request.spp, ASKED),
         (request.is_open_ended, None, "as many as the goal takes"),
         (facts.is_one_ray, 1, "one ray through each pixel's middle shows it"),
@@ -293,24 +293,24 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
     )
     is_same = usual.value == 1 and not facts.is_denoised_draft
     of_draft = "a draft" + is_same * f" takes as many samples as the default: {usual.reason}"
-    return _first((facts.is_draft, 1, of_draft), (True, usual.value, usual.reason))
+    return _choose_first((facts.is_draft, 1, of_draft), (True, usual.value, usual.reason))
 
 
-def _quality(facts: _Facts, method: Method) -> Choice[float | None]:
-    return _first(
+def _choose_quality(facts: _Facts, method: Method) -> Choice[float | None]:
+    return _choose_first(
         (facts.is_final(method), TUNING.final_quality, "a final picture"),
         (facts.request.quality is not None, facts.request.quality, ASKED),
         (True, None, "none was asked for"),
     )
 
 
-def _reserve(facts: _Facts, method: Method, samples: int | None, values: int | None) -> Choice[int | None]:
+def _choose_reserve(facts: _Facts, method: Method, samples: int | None, values: int | None) -> Choice[int | None]:
     is_given = facts.request.spp is not None or facts.request.effort != "normal" or samples is None
     is_judged = method == "pooled" or (facts.shows_own_colors and not facts.is_one_ray)
     is_other = facts.form not in ("picture", "forecast") or not is_judged or values is None
     spent = (values or 1) * (samples or 1)
     factor = min(TUNING.reserve, TUNING.most_in_reserve // spent)
-    return _first(
+    return _choose_first(
         (is_given, None, "the number of samples, or the goal, was asked for"),
         (is_other, None, "pictures in one piece have one, pooled or unlit"),
         (factor < 2, None, "the picture is too large"),
@@ -318,22 +318,22 @@ def _reserve(facts: _Facts, method: Method, samples: int | None, values: int | N
     )
 
 
-def _pixel_filter(facts: _Facts, samples: int | None) -> Choice[PixelFilter]:
+def _choose_pixel_filter(facts: _Facts, samples: int | None) -> Choice[PixelFilter]:
     asked = facts.request.pixel_filter
     is_one_ray = facts.is_one_ray or (facts.integrator == "classic" and samples == 1)
-    return _first(
+    return _choose_first(
         (asked != "auto", asked, ASKED),
         (is_one_ray, "point", "one ray through each pixel's middle"),
         (True, "box", "samples are spread over the pixel"),
     )
 
 
-def _exposure(facts: _Facts) -> Choice[float | Literal["auto"]]:
+def _choose_exposure(facts: _Facts) -> Choice[float | Literal["auto"]]:
     asked = facts.request.exposure
     if asked not in ("auto", 0.0) and not facts.is_pooled_light:
-        raise _no_light(facts.integrator, "exposure")
+        raise _make_light_error(facts.integrator, "exposure")
     is_physical = facts.is_pooled_light and facts.scene.has_physical_lights
-    return _first(
+    return _choose_first(
         (asked != "auto", asked, ASKED),
         (facts.shows_own_colors, 0.0, "colours made for displays"),
         (is_physical, "auto", "physical light sources: a pilot measures it"),
@@ -341,11 +341,11 @@ def _exposure(facts: _Facts) -> Choice[float | Literal["auto"]]:
     )
 
 
-def _tone_map(facts: _Facts) -> Choice[ToneMap]:
+def _choose_tone_map(facts: _Facts) -> Choice[ToneMap]:
     asked, scene, name = facts.request.tone_map, facts.scene, facts.integrator
     if asked not in ("auto", "none") and not facts.is_pooled_light:
-        raise _no_light(name, "tone_map")
-    return _first(
+        raise _make_light_error(name, "tone_map")
+    return _choose_first(
         (asked != "auto", asked, ASKED),
         (scene.lies_off_surfaces or facts.shows_own_colors, "none", "colours made for displays"),
         (not facts.is_pooled_light, "none", f"the values of {name} are no amounts of light"),
@@ -354,15 +354,15 @@ def _tone_map(facts: _Facts) -> Choice[ToneMap]:
     )
 
 
-def _caustics(facts: _Facts) -> Choice[Caustics]:
+def _choose_caustics(facts: _Facts) -> Choice[Caustics]:
     asked = facts.request.caustics
-    return _first(
+    return _choose_first(
         (asked != "auto", asked, ASKED),
         (facts.scene.lies_off_surfaces, "paths", "photons land on surfaces"),
         (True, "auto", "a pilot finds whether photons are worth their cost"),
     )
 
 
-def _no_light(integrator: Integrator, parameter: str) -> UsageError:
+def _make_light_error(integrator: Integrator, parameter: str) -> UsageError:
     what, rule = f"the values of {integrator} are no amounts of light", f"it is for {' and '.join(POOLED_LIGHT)}"
     return UsageError(what, parameter=parameter, rule=rule, fix="leave it out")

@@ -22,7 +22,7 @@ _WHY: dict[Form, str] = {
 }
 
 #: Whether a request is refused; and of the error: what is wrong, in which parameter, by which rule, and its fix.
-_Refusal = tuple[bool, str, str, str, str]
+_Check = tuple[bool, str, str, str, str]
 
 _LEAVE = "leave it out"
 _FULL = 'use method="full"'
@@ -43,12 +43,12 @@ def check(request: RenderRequest, form: Form, display: Display | None) -> None:
         raise PictureError(what, rule="a quilt's views lie side by side, for cylindrical lenses")
     _refuse(
         [
-            *_of_form(request, form),
-            *_of_size(request, display, form),
-            *_of_denoiser(request),
-            *_of_caustics(request),
-            *_of_reuse(request),
-            *_of_goal(request),
+            *_check_form(request, form),
+            *_check_size(request, display, form),
+            *_check_denoiser(request),
+            *_check_caustics(request),
+            *_check_reuse(request),
+            *_check_goal(request),
         ]
     )
 
@@ -64,7 +64,7 @@ def check_scene(request: RenderRequest, scene: Scene) -> None:
         pooling or denoising, or for an exposure.
     """
     is_own, own = scene.keeps_its_colors, "all in this scene has a colour of its own, whatever light is given"
-    refusals = _of_surfaces(request, scene) if scene.lies_off_surfaces else []
+    refusals = _check_surfaces(request, scene) if scene.lies_off_surfaces else []
     goes_on = request.depth is not None and request.plan is None  # frames of a sequence are planned again
     caustics = request.caustics != "auto" and request.plan is None
     name, is_property, rule = request.integrator, request.integrator in PROPERTIES, "it tells of surfaces alone"
@@ -84,7 +84,7 @@ def check_scene(request: RenderRequest, scene: Scene) -> None:
     )
 
 
-def _of_surfaces(request: RenderRequest, scene: Scene) -> list[_Refusal]:
+def _check_surfaces(request: RenderRequest, scene: Scene) -> list[_Check]:
     what = "Gaussian splats" if scene.has_splats else "a volume"
     rule = f"this scene has {what}, and light that lies on none"
     exposed = scene.is_off_surfaces_alone and request.exposure not in ("auto", 0.0)
@@ -101,7 +101,7 @@ def _of_surfaces(request: RenderRequest, scene: Scene) -> list[_Refusal]:
     ]
 
 
-def why_no_estimate(request: RenderRequest) -> str | None:
+def explain_missing_estimate(request: RenderRequest) -> str | None:
     """Why a picture has no estimate of its error, as a sentence for its notes; None where it has one."""
     if request.pixel_filter == "point" and request.integrator not in POOLED_LIGHT:
         return "no estimate of the error: one ray through each pixel's middle leaves nothing to chance"
@@ -110,13 +110,13 @@ def why_no_estimate(request: RenderRequest) -> str | None:
     return request.judged_by or None
 
 
-def _refuse(refusals: list[_Refusal], where: str = "") -> None:
+def _refuse(refusals: list[_Check], where: str = "") -> None:
     for is_refused, what, parameter, rule, fix in refusals:
         if is_refused:
             raise UsageError(what, where=where, parameter=parameter, rule=rule, fix=fix)
 
 
-def _of_denoiser(request: RenderRequest) -> list[_Refusal]:
+def _check_denoiser(request: RenderRequest) -> list[_Check]:
     name, is_pooled = request.integrator, request.method == "pooled"
     pooled, light = f'method="pooled" works with {" and ".join(POOLED_LIGHT)}', f"it is for {', '.join(LIGHT)}"
     shared, no_network = "pooled shares denoised light", f"{_FULL}, or leave denoise out"
@@ -127,7 +127,7 @@ def _of_denoiser(request: RenderRequest) -> list[_Refusal]:
     ]
 
 
-def _of_caustics(request: RenderRequest) -> list[_Refusal]:
+def _check_caustics(request: RenderRequest) -> list[_Check]:
     name, clamps = request.integrator, request.clamp_indirect is not None
     no_indirect, no_caustics = f"{name} has no indirect light that is sampled", f"{name} has no caustics"
     of_path, of_some = 'it is for integrator="path"', "'photons' and 'none' are for integrator=\"path\""
@@ -138,7 +138,7 @@ def _of_caustics(request: RenderRequest) -> list[_Refusal]:
     ]
 
 
-def _of_reuse(request: RenderRequest) -> list[_Refusal]:
+def _check_reuse(request: RenderRequest) -> list[_Check]:
     method, name = request.method, request.integrator
     if method not in REUSING:
         what, rule = f"{method} reuses no points", f"it is for {' and '.join(REUSING)}"
@@ -154,12 +154,12 @@ def _of_reuse(request: RenderRequest) -> list[_Refusal]:
     ]
 
 
-def _of_goal(request: RenderRequest) -> list[_Refusal]:
+def _check_goal(request: RenderRequest) -> list[_Check]:
     """Refusals of goals: a quality or a time needs a picture whose error is estimated."""
     goals = [name for name in ("max_time", "quality", "quality_worst") if getattr(request, name) is not None]
     if not goals:
         return []
-    unknown, why = f"{request.method} does not know its own error", why_no_estimate(request)
+    unknown, why = f"{request.method} does not know its own error", explain_missing_estimate(request)
     return [
         (request.spp == 1, "1", "spp", "must be 2 or more, which tell their error", ""),
         (request.method in REUSING, unknown, goals[0], "full and pooled do", _FULL),
@@ -167,7 +167,7 @@ def _of_goal(request: RenderRequest) -> list[_Refusal]:
     ]
 
 
-def _of_form(request: RenderRequest, form: Form) -> list[_Refusal]:
+def _check_form(request: RenderRequest, form: Form) -> list[_Check]:
     plain = type(request)()
     needs = "needs the whole picture" if form == "tiles" else f"is not possible in a {form}"
     given = [name for name in LEFT_OUT[form] if getattr(request, name) not in (getattr(plain, name), False, "full")]
@@ -182,7 +182,7 @@ def _of_form(request: RenderRequest, form: Form) -> list[_Refusal]:
     ]
 
 
-def _of_size(request: RenderRequest, display: Display | None, form: Form) -> list[_Refusal]:
+def _check_size(request: RenderRequest, display: Display | None, form: Form) -> list[_Check]:
     if form != "tiles" or display is None:
         return []
     panel = display.panel

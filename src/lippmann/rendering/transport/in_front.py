@@ -18,7 +18,7 @@ from lippmann.device.kernel_ops import linear_to_srgb, srgb_to_linear, to_numpy,
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, Color3f, Float, Ray3f, Spectrum
 from lippmann.rendering.transport.first_surface import PhysicalSurfaces
-from lippmann.rendering.transport.integrator import Integrator, RayCounts
+from lippmann.rendering.transport.integrator import Integrator, RayCounts, read_choices
 
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
@@ -44,7 +44,7 @@ class _InFront:
     """
 
     def __init__(self, behind: Integrator, built: BuiltScene) -> None:
-        self.depth, self.name = behind.depth, behind.name
+        self.depth, self.name, self.choices = behind.depth, behind.name, read_choices(behind)
         self._behind = behind
         self._surfaces = PhysicalSurfaces(built) if len(built.mitsuba.shapes()) else None
 

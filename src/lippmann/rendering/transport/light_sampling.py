@@ -158,7 +158,7 @@ def by_registry(emitters: EmitterPtr, values: NDArray[np.floating]) -> NDArray[n
     return table
 
 
-class WithoutSize:
+class DeltaEmitters:
     """The emitters of a scene that no ray meets: points, spots, and directional ones; each is as likely as the others.
 
     Parameters

@@ -36,9 +36,9 @@ from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import (
     MAX_CROSSINGS,
     Clamp,
+    DeltaEmitters,
     SceneLightSampler,
     ShadowRays,
-    WithoutSize,
     first_emitter_samples,
     mis_weight,
     roulette_survival,
@@ -146,16 +146,17 @@ class PathIntegrator:
     ) -> None:
         self.scene, self.features, self.depth, self.name = scene, features, depth, name
         self.light = light or PreparedLight()
+        self.choices = self.light.choices
         self.light_sampler = self.light.sampler or SceneLightSampler(scene)
         self.shadow_rays = shadow_rays or ShadowRays(scene, features.has_null)
         emitters, self._environment = scene.emitters(), scene.environment()
-        self.without_size = WithoutSize(emitters)
+        self.delta_emitters = DeltaEmitters(emitters)
         # All samples of a single delta emitter are the same.
-        self._single_delta = len(emitters) == len(self.without_size) == 1
+        self._single_delta = len(emitters) == len(self.delta_emitters) == 1
         self._clamp = Clamp(self.light.most_indirect)
         self.absorption = Techniques(*self._make_absorption())
         self._techniques = Techniques(*self._make_absorption(), *self._make_sharing())
-        apart = WithoutSpecularLight(len(self.without_size) > 0)
+        apart = WithoutSpecularLight(len(self.delta_emitters) > 0)
         self._techniques_without_specular = Techniques(*self._make_absorption(), *self._make_sharing(), apart)
 
     def _make_absorption(self) -> list[Technique]:
@@ -212,12 +213,12 @@ class PathIntegrator:
             bsdf = si.bsdf(toward)
             shiny = (bsdf.flags() & int(mi.BSDFFlags.Glossy | mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
             view_dependent |= (trail.depth == 0) & si.is_valid() & shiny
-            throughput = techniques.travel(states, si, throughput)
+            throughput = techniques.attenuate(states, si, throughput)
 
             # ---- emission ----
             depth = trail.depth
             emission = self.emission(si, trail.last, depth, techniques, states, mi.UInt32(stream.half))
-            radiance += self.clamp_indirect(throughput * techniques.meet_emitter(states, depth, si, emission), depth)
+            radiance += self.clamp_indirect(throughput * techniques.keep_emission(states, depth, si, emission), depth)
 
             # ---- next-event estimation ----
             continues = si.is_valid() & (depth < self.depth)

@@ -49,7 +49,7 @@ class Technique:
         """State of a path that begins at the eye."""
         return ()
 
-    def travel(self, state: Any, si: SurfaceInteraction3f, throughput: Spectrum) -> Spectrum:
+    def attenuate(self, state: Any, si: SurfaceInteraction3f, throughput: Spectrum) -> Spectrum:
         """Throughput of a path that has arrived at ``si``, which need not be valid."""
         return throughput
 
@@ -59,7 +59,7 @@ class Technique:
         """MIS weight of the emitter ``ds`` that BSDF sampling hit; ``weight`` is that without the technique."""
         return weight
 
-    def meet_emitter(self, state: Any, depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
+    def keep_emission(self, state: Any, depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
         """The part of the ``emission`` at ``si`` that the path keeps."""
         return emission
 
@@ -85,7 +85,7 @@ class Absorption(Technique):
     def begin(self) -> Color3f:
         return mi.Color3f(0)
 
-    def travel(self, state: Color3f, si: SurfaceInteraction3f, throughput: Spectrum) -> Spectrum:
+    def attenuate(self, state: Color3f, si: SurfaceInteraction3f, throughput: Spectrum) -> Spectrum:
         return throughput * dr.exp(-state * dr.select(si.is_valid(), si.t, 0))
 
     def arrive(self, state: Color3f, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
@@ -133,7 +133,7 @@ class PhotonGathering(Technique):
     def begin(self) -> _Caustics:
         return _Caustics(mi.Bool(True), mi.UInt32(0), mi.Spectrum(0))
 
-    def meet_emitter(self, state: _Caustics, depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
+    def keep_emission(self, state: _Caustics, depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
         is_caustic = ~state.all_sharp & (state.sharp > 0) & (state.sharp <= MOST_EVENTS) & si.is_valid()
         return dr.select(is_caustic, emission * (1 - state.by_photons), emission)
 
@@ -189,18 +189,18 @@ class WithoutSpecularLight(Technique):
     Delta emitters are left out as well; sky that the primary ray sees is not. State: whether all events were sharp.
     """
 
-    def __init__(self, has_without_size: bool) -> None:
-        self._has_without_size = has_without_size
-        self.reads = ("lobe",) if has_without_size else ()
+    def __init__(self, has_delta_emitters: bool) -> None:
+        self._has_delta_emitters = has_delta_emitters
+        self.reads = ("lobe",) if has_delta_emitters else ()
 
     def begin(self) -> Bool:
         return mi.Bool(True)
 
-    def meet_emitter(self, state: Bool, depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
+    def keep_emission(self, state: Bool, depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
         return dr.select(state & ((depth > 0) | si.is_valid()), 0, emission)
 
     def sample_emitter(self, state: Bool, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
-        if not self._has_without_size:
+        if not self._has_delta_emitters:
             return light
         is_specular = state & ds.delta & is_sharp(vertex.si.wi, vertex.si.to_local(ds.d), vertex.lobe)
         return dr.select(is_specular, 0, light)
@@ -286,9 +286,9 @@ class Techniques:
     def begin(self) -> list[Any]:
         return [each.begin() for each in self._each]
 
-    def travel(self, states: list[Any], si: SurfaceInteraction3f, throughput: Spectrum) -> Spectrum:
+    def attenuate(self, states: list[Any], si: SurfaceInteraction3f, throughput: Spectrum) -> Spectrum:
         for each, state in zip(self._each, states, strict=True):
-            throughput = each.travel(state, si, throughput)
+            throughput = each.attenuate(state, si, throughput)
         return throughput
 
     def weigh_emission(
@@ -298,9 +298,9 @@ class Techniques:
             weight = each.weigh_emission(state, half, ds, weight, emitter_pdf, active)
         return weight
 
-    def meet_emitter(self, states: list[Any], depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
+    def keep_emission(self, states: list[Any], depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
         for each, state in zip(self._each, states, strict=True):
-            emission = each.meet_emitter(state, depth, si, emission)
+            emission = each.keep_emission(state, depth, si, emission)
         return emission
 
     def arrive(self, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:

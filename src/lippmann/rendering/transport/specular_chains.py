@@ -9,7 +9,7 @@ Delta emitters, which no ray can hit, are sampled at each sharp surface. They co
 event sharp.
 
 A pixel that is bright by a single chain is more likely an outlier than truly bright. The part of a chain's contribution
-beyond :func:`most_of_chain` is its *excess*. A picture without excess is biased, darker where images of emitters were
+beyond :func:`limit_chain` is its *excess*. A picture without excess is biased, darker where images of emitters were
 missed, but has a smaller error (docs/research/seen-light.md). The limit grows with the number of chains, so that the
 bias vanishes.
 """
@@ -62,8 +62,8 @@ def sample_pixel(
     rest, counts, hit = integrator.sample_with_hit(ray, stream, active, without_specular=True)
     chains = mi.Float(light.chains)
     scale = dr.rcp(chains) if light.gain is None else light.gain / chains
-    most = None if samples is None else most_of_chain(samples * chains) / (scale * chains)
-    specular, excess, traced = specular_light(integrator, pixel, stream, light.chains, active, most)
+    most = None if samples is None else limit_chain(samples * chains) / (scale * chains)
+    specular, excess, traced = trace_specular_light(integrator, pixel, stream, light.chains, active, most)
     specular *= scale
     counts = RayCounts(counts.secondary + traced.secondary, counts.shadow + traced.shadow)
     if samples is None:
@@ -75,13 +75,13 @@ def _find_coverage(hit: FirstHit) -> Float:
     return dr.select(dr.isfinite(hit.distance), mi.Float(1), mi.Float(0))
 
 
-def most_of_chain(chains: Float) -> Float:
+def limit_chain(chains: Float) -> Float:
     """Largest contribution of one of ``chains`` chains of a pixel that is no excess; linear, white is 1."""
     return chains**TUNING.most_power
 
 
 @syntax
-def specular_light(
+def trace_specular_light(
     integrator: PathIntegrator,
     pixel: PixelRays,
     stream: SampleStream,
@@ -95,7 +95,7 @@ def specular_light(
     """
     light = mi.Spectrum(0)
     excess: Any = None if most is None else mi.Spectrum(0)
-    takes_shadow_rays = len(integrator.without_size) > 0
+    takes_shadow_rays = len(integrator.delta_emitters) > 0
     rays = mi.UInt32(0)
     shadow: Any = mi.UInt32(0) if takes_shadow_rays else None
     number = mi.UInt32(0)
@@ -137,7 +137,7 @@ def _trace_chain(
     active = mi.Bool(active)
     light, throughput = mi.Spectrum(0), mi.Spectrum(1)
     rays = dr.select(active, mi.UInt32(1), mi.UInt32(0))
-    shadow = mi.UInt32(0) if len(integrator.without_size) > 0 else None
+    shadow = mi.UInt32(0) if len(integrator.delta_emitters) > 0 else None
     at_first = integrator.first_emitter_samples(path)
     states = techniques.begin()
 
@@ -147,7 +147,7 @@ def _trace_chain(
         toward = trail.ray
         si = pi.compute_surface_interaction(toward)
         bsdf = si.bsdf(toward)
-        throughput = techniques.travel(states, si, throughput)
+        throughput = techniques.attenuate(states, si, throughput)
         emission = integrator.emission(si, trail.last, trail.depth, techniques, states, mi.UInt32(0))
         light += integrator.clamp_indirect(throughput * emission, trail.depth)
 
@@ -172,7 +172,7 @@ def _leave(integrator: PathIntegrator, vertex: Vertex, at_first: UInt32, state: 
     context = mi.BSDFContext()
     context.type_mask |= SHARP_FIRST
     if continues:
-        if dr.hint(len(integrator.without_size) > 0, mode="scalar"):
+        if dr.hint(len(integrator.delta_emitters) > 0, mode="scalar"):
             point = stream.next_2d(dimension + 2)
             reflection, tests = _reflect_delta_emitter(integrator, si, bsdf, vertex.lobe, point, continues)
             light += integrator.clamp_indirect(throughput * reflection, vertex.depth + 1)
@@ -190,7 +190,7 @@ def _reflect_delta_emitter(
     integrator: PathIntegrator, si: SurfaceInteraction3f, bsdf: BSDFPtr, lobe: Vector3f, point: Point2f, active: Bool
 ) -> tuple[Spectrum, UInt32]:
     """Radiance toward ``si.wi`` by a sharp event from a sampled delta emitter, and the shadow rays traced."""
-    ds, radiance = integrator.without_size.sample_direction(si, point, active)
+    ds, radiance = integrator.delta_emitters.sample_direction(si, point, active)
     wo = si.to_local(ds.d)
     lit = active & is_sharp(si.wi, wo, lobe) & (dr.max(radiance) > 0)
     reflected = bsdf.eval(mi.BSDFContext(), si, wo, lit) * radiance
