@@ -1,7 +1,7 @@
 """Forecast of a picture: its depth, blur, rays, memory and time, from a few rendered pixels.
 
 The pixels of the probe are drawn at random in short runs, so that neighbouring rays stay neighbours, and traced with
-the picture's own settings in ever larger wavefronts for about two seconds. What they took is carried over to all.
+the picture's own settings in ever larger wavefronts for about two seconds. Their cost is extrapolated to all pixels.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Forecast:
     blurred_share:
         Share of the pixels that see a surface beyond what the display resolves.
     rays:
-        By kind: ``primary`` are counted, ``shadow`` and ``secondary`` carried over from the probe.
+        By kind: ``primary`` are counted, ``shadow`` and ``secondary`` extrapolated from the probe.
     memory:
         Bytes: ``expected`` at the peak, program and scene included, and the ``limit`` that the picture keeps to.
     seconds:
@@ -151,10 +151,10 @@ def forecast(
     frames: int = 1,
     size: tuple[int, int] | None = None,
 ) -> Forecast:
-    """Foresee what rendering ``scene`` for ``display`` will take; nothing but the probe is rendered.
+    """Estimate the cost of rendering ``scene`` for ``display``; only the probe is rendered.
 
-    ``frames`` alike, such as those of a turntable, take compiling once and all else anew for each. ``size`` is that of
-    an eye-tracked monitor's pair, by default its own.
+    Several similar ``frames``, such as those of a turntable, compile their kernels once and take all other costs each.
+    ``size`` is that of an eye-tracked monitor's pair, by default its own.
 
     Raises
     ------
@@ -225,7 +225,7 @@ def forecast(
 def _list_choices(
     session: Session, integrator: Integrator, source: DisplayRays | WindowRays, window: PixelWindow | None
 ) -> dict[str, dict[str, object]]:
-    """The plan with what the pilot, the scene's box and the memory came to."""
+    """Values and reasons of all choices by name, with the pilot's, the traced window and the wavefronts."""
     request = session.request
     assert request.plan is not None
     plan = request.plan.with_pilot(read_choices(integrator)).to_dict()
@@ -254,7 +254,7 @@ class _ProbeResult:
 
 
 class _Probe:
-    """Traces a sample of a picture's pixels, in runs of neighbours, for the time that its samples take."""
+    """Times the samples of randomly chosen pixels of a picture, in runs of neighbours."""
 
     def __init__(self, source: DisplayRays | WindowRays, seed: int) -> None:
         from lippmann.rendering.transport.ray_source import ChosenRays
@@ -282,7 +282,7 @@ class _Probe:
             memory=session.memory,
         )
         pixels = self._pixels.width * self._pixels.height * self._pixels.channels
-        # Twice the same: the first compiles.
+        # A round that compiles; its time does not count.
         batches.add(STREAMS)
         compiled, samples, spent, last = batches.seconds_compile, STREAMS, 0.0, 0.0
         count, done = STREAMS, 0
@@ -293,7 +293,7 @@ class _Probe:
                 counts.append((samples, getattr(batches.rays, kind)))
 
         count_rays()
-        # From 16 samples on each takes as many rays as the one before; the first samples more light.
+        # The first samples of a pixel sample more emitters; from the 16th on all take equally many rays.
         while spent < PROBE_SECONDS or samples < min(request.samples, 16):
             started = time.perf_counter()
             batches.add(count)
@@ -328,7 +328,7 @@ def _count_at(samples: int, counts: list[tuple[int, int]]) -> float:
 
 
 def _working_bytes(source: DisplayRays | WindowRays, session: Session) -> int:
-    """What batches, wavefront and denoiser take at the peak, see :mod:`~lippmann.rendering.film.sample_batches`."""
+    """Peak bytes of batches, wavefront and denoiser, see :mod:`~lippmann.rendering.film.sample_batches`."""
     request, limit = session.request, session.memory
     pixels = source.width * source.height * (3 if request.keeps_colors(source.display) else 1)
     lanes = cut_wavefronts(source.width, source.height, request.samples, channels=source.channels, memory=limit).lanes
@@ -338,7 +338,7 @@ def _working_bytes(source: DisplayRays | WindowRays, session: Session) -> int:
     elif request.denoises:
         kept = pixels * memory_model.batches(memory_model.MOST_BATCHES)
     else:
-        # Batches are kept for a band of rows only, of half of what the picture leaves.
+        # Batches are held for one band of rows at a time, in half of the memory beside the picture.
         left = limit - pixels * (memory_model.PICTURE + memory_model.ERROR_MAPS)
         kept = min(pixels * memory_model.batches(memory_model.MOST_BATCHES), max(0, left) // 2)
     if request.denoises:

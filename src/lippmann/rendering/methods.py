@@ -215,7 +215,7 @@ def _trace_in_rounds(job: Job) -> Traced:
         progress=job.progress,
     )
     if outcome.estimate is None and goal.seconds_left(time.perf_counter() - (goal.began or 0.0)) < assessment:
-        # The time is up after one sample, and denoising takes longer than what is left.
+        # No time is left to denoise: the picture is that of one sample.
         picture, denoiser = batches, None
     notes = _describe_end(goal, outcome)
     return _assemble(job, batches, picture, denoiser, errors=outcome.errors, estimate=outcome.estimate, notes=notes)
@@ -223,7 +223,7 @@ def _trace_in_rounds(job: Job) -> Traced:
 
 def _start_goal(job: Job) -> Goal:
     """The goal of the request; its time begins with the request and includes the work after the last sample."""
-    # Putting a picture together and writing it takes a tenth of a microsecond a pixel, as a rule.
+    # Assembling a picture and writing it takes about a tenth of a microsecond per pixel.
     writing = 1e-7 * job.source.width * job.source.height
     began = time.perf_counter() if job.request.began is None else job.request.began
     part = "view" if isinstance(job.source, QuiltRays) else "micro-image"
@@ -294,7 +294,7 @@ def _reproject(job: Job) -> Traced:
     request = job.request
     assert request.method in ("lens-view", "interpolated")
     assert isinstance(job.source, DisplayRays)
-    # Many modules, which no other method uses.
+    # Imported here: no other method uses these many modules.
     from lippmann.rendering.reprojection.renderer import trace_reused as trace_reprojected
 
     frame = trace_reprojected(

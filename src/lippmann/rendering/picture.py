@@ -45,7 +45,7 @@ def render_picture(
     build:
         As of :func:`~lippmann.rendering.session.open_session`.
     stands_as:
-        The display by which the picture is placed instead, of the same size: the unrefined one of a finer display.
+        Display of the same size that sets the placement instead: the original of a refined display.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def render_picture(
         estimate=traced.estimate,
         notes=(*placement.warnings, *describe_lens_gap(display), *traced.notes),
     )
-    # Files hold whole numbers of 32 bits.
+    # Files hold integers of 32 bits.
     maps = {name: v.astype(np.uint32) if v.dtype.kind in "iu" else v for name, v in frame.maps.items()}
     return IntegralImage(request.tone_mapped(frame.pixels), display, placement.world_from_display, provenance, maps)
 

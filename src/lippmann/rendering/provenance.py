@@ -1,4 +1,4 @@
-"""How a picture was made, for its file: with notes on exposure, missing or clamped light, and doubts on the error."""
+"""Provenance of a picture for its file: choices, costs, estimated error, and notes on missing or clamped light."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def make_provenance(
     notes: tuple[str, ...] = (),
     has_pixels: bool = True,
 ) -> Provenance:
-    """How a picture of ``frame`` was made, for its file.
+    """The provenance of a picture, for its file.
 
     ``choices`` are those of the integrator's prepared light. ``has_pixels`` says that the frame holds the picture, not
     its size alone.
@@ -91,7 +91,7 @@ def _warn_of_emptiness(session: Session, frame: Frame, has_pixels: bool) -> tupl
         background = (0.0, 0.0, 0.0)
     by_rays = background is None or not has_pixels
     if by_rays and (session.scene.keeps_its_colors or (background is not None and max(background) == 0.0)):
-        return ()  # neither colours nor rays would tell what glows from the background: paths end at both
+        return ()  # paths end at glowing surfaces as at the background: nothing tells them apart
     return warn_of_emptiness(measure_visible_share(frame.pixels if has_pixels else None, background, frame.rays))
 
 

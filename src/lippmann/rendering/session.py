@@ -45,7 +45,7 @@ DEFAULT_MEMORY_SHARE = 0.6
 
 T = TypeVar("T")
 
-#: :func:`lippmann.device.pbr.build`, or what stands for it.
+#: :func:`lippmann.device.pbr.build`, or a function in its place.
 Build: TypeAlias = "Callable[..., BuiltScene]"
 
 
@@ -96,7 +96,7 @@ class Session:
     built: BuiltScene | BuiltClassic
     memory: int
     watch: Stopwatch
-    #: Visible depths by the views of cameras: a film asks for the same ones at every frame.
+    #: Cached visible depths by camera view: films ask for the same ones in every frame.
     depths: dict[bytes, VisibleDepth | None] = field(default_factory=dict)
 
     def place(self, display: Display) -> Placement:
@@ -136,7 +136,7 @@ class Session:
         return DisplayRays(placement.traced(display), placement.world_from_display, bool(self.request.subpixels))
 
     def find_place(self, display: Display, bounds_in: Callable[[Matrix], Matrix] | None = None) -> Placement:
-        """As :meth:`place`, leaving the light as it is; ``bounds_in`` stands for the scene's, if given."""
+        """As :meth:`place`, without warnings and with the light as it is; ``bounds_in`` replaces the scene's."""
         scene, placement = self.scene, self.request.placement
         if isinstance(placement, Placement):
             return placement

@@ -198,7 +198,8 @@ def denoise_light(
     a mirrored emitter from it to the pixels beside.
 
     Elsewhere the network's input is clamped at ``far_beyond_white``: it would spread a single path that hit an emitter
-    over the pixels around. Where its output is at least half as bright (lone hits: a fifth), that part is added again.
+    over the pixels around. Where its output is at least half as bright (for fireflies: a fifth), that
+    part is added again.
 
     Parameters
     ----------

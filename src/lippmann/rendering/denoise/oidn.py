@@ -24,7 +24,7 @@ FloatArray = NDArray[np.float32]
 #: same as "high".
 Effort = Literal["high", "fast"]
 
-#: The network halves pictures four times: the pixels of such squares are seen together.
+#: Side of the squares of pixels that the network processes together: it halves pictures four times.
 NETWORK_STEP = 16
 
 
@@ -107,7 +107,7 @@ def _rotate(image: FloatArray) -> FloatArray:
 
 
 def _wrap_picture(values: NDArray[np.generic], name: str) -> FloatArray:
-    """Packed float32, as the C library wants it."""
+    """Packed float32, as the C library takes it."""
     array = np.ascontiguousarray(values, dtype=np.float32)
     if array.ndim != 3 or array.shape[2] != 3 or 0 in array.shape:
         raise UsageError(f"the {name} has the shape {array.shape}", parameter="denoise", rule="it must be (H, W, 3)")

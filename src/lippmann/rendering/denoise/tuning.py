@@ -17,18 +17,18 @@ class DenoiseTuning:
         Samples of a pixel for the guides. With 8 a textured or glossy surface may lose 0.3 dB, and 0.6 dB behind a
         ``[lens]``, where a pixel holds more of the scene; 16 gain up to 0.1 and 0.4 dB.
     far_beyond_white:
-        Linear value above which light goes past the network, white being 1: it would make the pixels around white, too
-        (docs/research/seen-light.md).
+        Linear value above which light bypasses the network, white being 1: the network would spread it over the pixels
+        around (docs/research/seen-light.md).
     reaches:
         Pixels to each side over which halves are compared, in a near and in a far neighbourhood.
     far_above:
-        A pixel that is brighter than its samples by so many times the halves' mean difference nearby is so by no
-        accident: then the step of its code counts.
+        Multiple of the halves' mean difference nearby by which a pixel must exceed its samples to be far brighter: then
+        the finite difference of codes replaces the slope of the curve.
     hidden:
-        Codes by which samples are off that hide what is wrong in their pixel. With fewer than the usual number a single
-        one is farther off, and more likely all there is of its light: less is left out then (``estimate_coverage.py``).
+        Difference in codes between a half-buffer and its denoised version beyond which the half cannot measure the
+        pixel's bias; larger with fewer samples, whose outliers are more often real light (``estimate_coverage.py``).
     untold_outliers:
-        Share of the samples' error that is taken to rest on outliers where too few batches tell them
+        Share of the samples' error that is assumed to rest on outliers where too few batches reveal them
         (docs/research/first-statements.md).
     """
 

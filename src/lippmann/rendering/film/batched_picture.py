@@ -75,9 +75,9 @@ class BatchedPicture:
         self._specular = np.zeros((STREAMS, pixels, 3), dtype=np.float32) if keeps_specular else None
         self._excess = np.zeros((1, pixels, 3), dtype=np.float32) if keeps_specular else None
         self._covered = np.zeros((STREAMS, pixels, channels), dtype=np.float32) if keeps_coverage else None
-        #: Samples that each batch has of every pixel.
+        #: Samples per pixel of each batch.
         self._taken = [0] * batches
-        # Plain and denoised pictures of the same samples both ask for their errors.
+        # Cached: the plain and the denoised picture both ask for it.
         self._errors: PixelErrors | None = None
         self._blur_after = blur_after
 
@@ -105,11 +105,11 @@ class BatchedPicture:
         return self.to_display(self.average_samples())
 
     def average_samples(self) -> Floats:
-        """:meth:`picture` with all that is traced of it, see :meth:`to_display`."""
+        """``(H, W, 3)``: the mean of all samples of traced pixels, before :meth:`to_display`."""
         return self._mean(self._sums)
 
     def average_halves(self) -> tuple[Floats, Floats]:
-        """Half-buffers A and B: the means of either stream, of all that is traced."""
+        """Half-buffers A and B: the mean of each stream, of traced pixels."""
         per_stream = self._batches_of_stream
         return self._means([self._sums[s * per_stream : (s + 1) * per_stream].sum(axis=0) for s in range(STREAMS)])
 
@@ -229,7 +229,7 @@ def estimate_batch_errors(sums: Floats, taken: Sequence[int], coding: Coding) ->
     step = 1 << 18  # pixels worked on at a time
     for first in range(0, pixels, step):
         part = slice(first, min(first + step, pixels))
-        # All at once, and not from a picture turned over, whose size the kernel would hold.
+        # From one table of all batches; transposing it would make its size a constant of the kernel.
         table, size = upload(streams[:, :, part]), part.stop - first
         index = dr.arange(mi.UInt32, size)
         values = [dr.gather(mi.Color3f, table, index + dr.opaque(mi.UInt32, k * size)) for k in range(len(counts))]
@@ -276,7 +276,7 @@ class _Batches:
         return error, dr.select(decides, error, 0)
 
     def correct_stratification(self) -> Float:
-        """Squared difference between the two streams, less the mean of that between halves that mix both."""
+        """Squared difference between the two streams, less the mean one between halves that mix both streams."""
         streams, _ = self._difference(range(len(self.sums) // 2))
         mixed, number = mi.Float(0), mi.Float(0)
         for split in _mix_halves(len(self.sums)):

@@ -122,7 +122,7 @@ def _sum_samples(
     surfaces: Surfaces, pixels: PixelRays, z_from_world: list[Float], samples: UInt32
 ) -> tuple[Color3f, Vector3f, Float, Float, Float]:
     """Sums over all samples of each lane's pixel: colours, world-space normals, heights, and hits of any surface by
-    the even and by the odd ones. In the kernel: sums of what it has written took longer than the rays."""
+    the even and by the odd ones. Summed in the kernel: reading samples back to sum them took longer than the rays."""
     albedo, normal = mi.Color3f(0), mi.Vector3f(0)
     height, even_hits, odd_hits = mi.Float(0), mi.Float(0), mi.Float(0)
     number = mi.UInt32(0)

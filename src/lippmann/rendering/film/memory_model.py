@@ -1,10 +1,10 @@
-"""How many bytes pictures take while they are made, and how a picture is cut into wavefronts that fit beside them.
+"""Memory model: bytes that a picture takes while it is rendered, and its division into wavefronts that fit beside it.
 
-Figures are bytes per pixel unless they are named otherwise. Measured: see ``docs/background/methods.md``.
+Constants are bytes per pixel unless they say otherwise, measured as ``docs/background/methods.md`` says.
 
-A tile is a band of whole rows; a pass is a run of samples of every pixel in it. Tile and pass together make one
-wavefront. A run is a wavefront of a picture whose samples are gathered in batches: some pixels, some samples of some
-batches. Wavefronts of a picture are about equally large, so that one compiled kernel serves them all.
+A tile is a band of whole rows. A tile and a range of samples of each of its pixels make one wavefront. Where samples
+are summed in batches, a wavefront holds some pixels, and some samples of some batches. Wavefronts of a picture are
+about equally large, so that one compiled kernel serves them all.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from lippmann.runtime.machine import amount_in_words
 
 #: A lane of a wavefront at its widest moment: its radiance, its ray counts, the sums and their copies.
 BYTES_PER_LANE = 96
-#: Beyond this many lanes a wavefront leaves the caches of a processor and nothing is gained; a GPU is to be busy for
-#: longer than the next wavefront takes to prepare.
+#: Lanes of a wavefront. More exceed a CPU's caches and gain nothing; a GPU gets enough to be busy while the next
+#: wavefront is prepared.
 PREFERRED_LANES, PREFERRED_LANES_OF_GPU = 1 << 20, 1 << 22
 
 #: Batches of samples where the memory allows: with more of them, fireflies stand out better against steady noise.
@@ -31,32 +31,31 @@ COLORS = 12
 PICTURE = COLORS + COLORS
 #: The squared error of each pixel, its outliers' share and its blur.
 ERROR_MAPS = COLORS
-#: Sums that a denoiser wants apart: specular light of both half-buffers, its excess above the clamp, and coverage of
+#: Separate sums for the denoiser: specular light of both half-buffers, its excess above the clamp, and coverage of
 #: both half-buffers in each channel.
 FOR_DENOISER = PICTURE + COLORS + PICTURE
-#: One emission of photons, which lands about once, with what sorting takes, in bytes.
+#: Bytes of one photon emission, sorting included; an emission lands about once.
 PHOTON = 128
-#: Bytes a pixel that reprojection takes beside the colours. The paper's order takes the most: 6 for points, 4 for
-#: lenses, 8 for their places beside pixels' centres, 12 for the sorted list.
+#: Reprojection, colours apart. The paper's order takes the most: 6 for points, 4 for lenses, 8 for offsets from pixel
+#: centres, 12 for the sorted list.
 POINT_IMAGE = 32
 #: Depth, normal, albedo, shape and position, and the copies that a file writer makes of them; or albedo, normal, height
 #: and coverage for the denoiser, and what a tile adds to them.
 LAYERS = 88
 #: Open Image Denoise with its feature buffers.
 DENOISER = 600
-#: The bytes that the network may take beside these: those of a million pixels. Larger pictures it works through in
-#: parts, which does not change a bit: 0.6 GB take a tenth longer than 1.5 GB, 0.2 GB twice as long.
+#: Memory limit of the network in bytes: that of a million pixels. It divides larger pictures into parts, with the
+#: same result: 0.6 GB take a tenth longer than 1.5 GB, 0.2 GB twice as long.
 NETWORK_MOST = DENOISER << 20
 
 
 def batches(number: int) -> int:
-    """Bytes per pixel of a picture kept in so many batches: their sums, the picture and its errors."""
+    """Bytes per pixel of a picture in ``number`` batches: their sums, the picture and its errors."""
     return number * COLORS + PICTURE + ERROR_MAPS
 
 
 def photons(emissions: int, passes: int) -> int:
-    """Bytes of the photons of passes of so many emissions, for both half-buffers: one pass is kept while the next is
-    shot."""
+    """Bytes of photon passes of ``emissions`` each, for both half-buffers: one pass is held while the next is shot."""
     return 2 * min(passes, 2) * emissions * PHOTON
 
 
@@ -77,9 +76,9 @@ def fit_lanes(memory: int, kept: int, needed: int, what: str, preferred: int | N
     Parameters
     ----------
     needed:
-        The fewest lanes that do.
+        Least number of lanes.
     what:
-        What is to fit, for the complaint: "512x512 pixels", say.
+        What must fit, for the error message, such as "512x512 pixels".
     preferred:
         None for :func:`preferred_lanes`.
 
@@ -185,7 +184,7 @@ def cut_wavefronts(
 ) -> Plan:
     """Divide ``width`` x ``height`` pixels of ``samples`` each so that the work fits into ``memory`` bytes.
 
-    ``kept``: bytes of them that something else takes beside the picture.
+    ``kept``: bytes that are taken by something else than the picture.
 
     Raises
     ------
@@ -212,7 +211,7 @@ def cut_batches(
     lanes:
         Lanes of one colour channel.
     strip:
-        Pixels of a strip. Runs consist of whole ones, but for the last, unless a run holds less than one.
+        Pixels of a strip. Wavefronts consist of whole strips, but for the last, unless one holds less than a strip.
     """
     most = lanes // (count * len(batches)) or lanes // count or lanes
     in_strips = most >= strip

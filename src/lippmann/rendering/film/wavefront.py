@@ -182,8 +182,10 @@ def lay_out_wavefront(
 def sample_pixels(
     integrator: Integrator, pixels: PixelRays, stream: SampleStream, samples: Float | None
 ) -> PixelSample:
-    """One sample of each lane's pixel; specular light and coverage separately where the integrator has them and
-    ``samples``, the pixel's samples up to and including these, are given."""
+    """One sample of each lane's pixel.
+
+    With ``samples``, the pixel's samples so far and these, specular light and coverage are separate where possible.
+    """
     if isinstance(integrator, PathIntegrator):
         return sample_pixel(integrator, pixels, stream, mi.Bool(True), samples)
     return PixelSample(*integrator.sample(pixels.ray(stream), stream, mi.Bool(True)))
@@ -286,12 +288,12 @@ def locate_pixel(place: UInt32, width: int, strips: UInt32) -> tuple[UInt32, UIn
     strip, inside = divide(place, columns * STRIP_ROWS)
     strip_column, strip_row = divide(inside, STRIP_ROWS)
     row, column = divide(place, columns)
-    stands = place < strips
-    return dr.select(stands, strip * STRIP_ROWS + strip_row, row), dr.select(stands, strip_column, column)
+    in_strip = place < strips
+    return dr.select(in_strip, strip * STRIP_ROWS + strip_row, row), dr.select(in_strip, strip_column, column)
 
 
 def reorder_to_rows(values: NDArray[T], width: int | None) -> NDArray[T]:
-    """``values (pixels, ...)`` from places, which begin with a strip, to rows; as they are without ``width``."""
+    """``values (pixels, ...)`` reordered from places, the first of a strip, to rows; unchanged without ``width``."""
     if width is None or not (whole := in_strips(len(values), width)):
         return values
     ordered = np.empty_like(values)

@@ -1,1 +1,1 @@
-"""Frames of a display while it is set up: the native pixels that an eye sees, traced as a render would trace them."""
+"""Live frames of a display: the native pixels that an eye sees, traced as in a render."""

@@ -34,7 +34,7 @@ def develop_picture(picture: Floats, pixels: PixelSet, request: RenderRequest) -
 
 
 def encode_light(values: Floats, request: RenderRequest) -> Codes:
-    """Codes of linear radiance ``(..., 3)``; same shape. One in 100 of the darkest is off by one."""
+    """Codes of linear radiance ``(..., 3)``; same shape. Of the darkest values one in 100 is off by one code."""
     table = _code_table()
     place = np.clip(request.tone_mapped(values), 0, 1) * np.float32(len(table) - 1)
     return table[(place + np.float32(0.5)).astype(np.int32)]

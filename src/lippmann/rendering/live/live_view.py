@@ -115,6 +115,6 @@ class PlacedView:
         if self.kernels.lit_for is self.placed:
             return
         self.kernels.light(self.view.light, rotation_of(self.placement.world_from_display))
-        whole = replace(self.placement, exposure=0.0)  # that of the camera is in it
+        whole = replace(self.placement, exposure=0.0)  # ``exposure`` includes the camera's
         self.kernels.expose(self.display, replace(self.request, exposure=exposure), whole, measure=False)
         self.kernels.lit_for = self.placed

@@ -135,8 +135,8 @@ def _denoise_halves(
 ) -> Iterator[Floats | None]:
     """Short steps of denoising, the last of which yields the picture.
 
-    A function, not a method: a picture that is left half-way and held by its own steps would stay in memory until
-    Python looks for such circles, which in a process of many objects it hardly ever does.
+    A function, not a method: a picture that its own generator refers to would be a reference cycle, which Python frees
+    late in a process of many objects.
     """
     albedo, normal = guides
     mean = np.asarray((noisy[0] + noisy[1]) / 2, np.float32)

@@ -177,7 +177,7 @@ def _gather_pixel(
         if front == 0.0 or nearer(s, front):
             front = s
         if rules.careful and not is_trusted(points, place, rules):
-            # Rejected only if its colour is used in the end.
+            # A bit per source: the pixel is rejected only if this source's colour is used in the end.
             doubted |= 1 << k
         for channel in range(3):
             color[k, channel] = color_at(points, place, channel)

@@ -61,7 +61,7 @@ class DefaultOrder:
         field, status = self._field, self._points.status
         keys, steps = refine(columns, field.rows, field.columns)
         for row in range(len(status)):
-            # Probes of all micro-images, also of those that are not made here.
+            # Probes of all micro-images, also of those in other columns, which are interpolated later.
             status[row, self._warp.probes(row)] = QUEUED
         self._tracer.trace(self._find_queued(), self._points)
         is_key = np.isin(np.arange(len(field.center)), keys)

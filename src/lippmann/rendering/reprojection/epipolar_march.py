@@ -43,7 +43,7 @@ class Place(NamedTuple):
 
 @uncounted
 def place_at(points: PointImage, field: LensField, lens: int, x: float, y: float) -> Place:
-    """The place (x, y) under ``lens``; at the rim of a micro-image, from the existing pixels alone."""
+    """Bilinear weights and disparity at (x, y) under ``lens``; at its border from the pixels inside alone."""
     height, width = points.status.shape
     column, row = int(np.floor(x + TUNING.on_center)), int(np.floor(y + TUNING.on_center))
     u, v = x - column, y - row
@@ -75,7 +75,7 @@ def place_at(points: PointImage, field: LensField, lens: int, x: float, y: float
     whole = total > 1.0 - TUNING.on_center
     is_known = (whole or (count > 1 and total >= TUNING.smallest_share)) and alike(low, high, TUNING.one_surface)
     share = 1.0 / total if total > 0.0 else 0.0
-    # Equal disparities must stay exact, as background is recognised by its value.
+    # Equal disparities must not be rounded: background is recognised by its exact value.
     disparity = s * share if low < high else low
     return Place(is_known, whole, row, column, a * share, b * share, c * share, d * share, disparity)
 

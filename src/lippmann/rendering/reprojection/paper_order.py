@@ -14,7 +14,7 @@ from lippmann.rendering.reprojection.rules import Rules, nearer
 from lippmann.runtime.numba_jit import uncounted
 from lippmann.runtime.row_threads import Bands
 
-#: The mean of two colours is taken whatever they are.
+#: Two corresponding pixels are averaged however much their colours differ.
 _ANY_COLOR = Rules(careful=False, tolerance=1.0, coded=False, probe_rows=1, probe_stride=1, run_step=1)
 
 

@@ -1,4 +1,4 @@
-"""Rules of reprojection, and the comparisons that its kernels share."""
+"""Tolerances of reprojection, and the comparisons that its kernels share."""
 
 from __future__ import annotations
 

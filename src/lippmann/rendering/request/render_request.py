@@ -184,7 +184,7 @@ class RenderRequest(MachineOptions, QualityOptions):
         return cls(**{**values, **others})
 
     def for_file(self, output: Path, bits: int | None = None) -> RenderRequest:
-        """The request for a file: left open, linear light (OpenEXR, 32 ``bits``) stays as it is, codes do not."""
+        """The request for a file: an automatic tone map is none for linear light (OpenEXR, 32 ``bits``)."""
         is_linear = output.suffix.lower() == ".exr" or bits == 32
         return replace(self, tone_map="none") if self.tone_map == "auto" and is_linear else self
 

@@ -1,8 +1,8 @@
 """Photons from emitters by way of mirrors, glass and smooth gloss to the rough surfaces where they make caustics.
 
-Paths from the eye meet such light only where they happen upon the emitter: hardly ever a small one, and never a point
-or a direction. Photons start at the *caster*, the surface that bends the light: a point on it, a direction to the
-emitter, and back along it. So none misses, and every emitter works that can be sampled.
+Paths from the eye find this light only if they hit the emitter by chance: hardly ever a small one, and never a delta
+emitter. Photons start at the *caster*, the surface that bends the light: a point on it, a direction to the
+emitter, and back along it. So no photon misses the caster, and any emitter that can be sampled works.
 
 What is gathered is exactly what :class:`~lippmann.rendering.transport.path.PathIntegrator` leaves out: light that comes
 by sharp events alone (:mod:`lippmann.rendering.transport.sharp_events`), one at least and :data:`MOST_EVENTS` at most,
@@ -53,13 +53,13 @@ class CausticPhotons:
     scene, features, casters:
         The scene, its features and its casters.
     samples:
-        Of all pixels together for which the photons of a pass are.
+        Samples of all pixels together that a pass of photons serves.
     pass_samples:
         Samples of one pixel that each pass serves.
     seed:
         0 to 2**32 - 1: the same gives the same photons.
     region:
-        Corners ``(2, 3)`` of the visible box: pairs get photons by what they bring there.
+        Corners ``(2, 3)`` of the visible box: pairs get photons in proportion to their flux there.
     kept:
         Passes whose photon maps are cached, at least 1.
     """
@@ -136,7 +136,7 @@ def _radius(photons: Photons, neighbours: float) -> float:
     number = int(min(max(2, round(neighbours)), max(2, len(photons) // 2)))
     if len(photons) < 2:
         return 1.0
-    # Axis by axis: a product of matrices would round by how many threads share it.
+    # Axis by axis: the rounding of a matrix product depends on the number of threads.
     axes = np.ascontiguousarray(photons.position.T)
     distances = []
     for point in photons.position[:: max(1, len(photons) // TUNING.probe_side)]:  # a subset suffices for a median

@@ -67,7 +67,7 @@ class EmitterRays:
         self._scene = scene
         self._sampler = sampler
         self._emitters = scene.emitters_dr()
-        # Pointers are compared by these.
+        # Emitter pointers are compared by their registry numbers.
         numbers = registry_numbers(self._emitters)
         flags = np.array(self._emitters.flags()).reshape(-1)
         has_place = (flags & int(mi.EmitterFlags.DeltaPosition)) != 0
@@ -147,7 +147,7 @@ class EmitterRays:
         cosine, geometric = dr.abs(si.wi.z), dr.dot(normal, -along)
         lit &= ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null)
         lit &= (dr.max(albedo) > 0) & (cosine > 0) & (geometric > 0)
-        # A surface of one side reflects nothing on the other.
+        # Seen from the back, a one-sided surface reflects nothing: it scatters no light.
         mirrored = mi.Vector3f(-si.wi.x, -si.wi.y, si.wi.z)
         lit &= dr.max(bsdf.eval(mi.BSDFContext(), si, mirrored, lit)) > 0
         # Emitted radiance toward the point, and the pdf of emitter sampling.

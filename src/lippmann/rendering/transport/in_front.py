@@ -64,7 +64,7 @@ class _InFront:
         colors, transmittances = self._composite(to_numpy(ray.o, lanes), to_numpy(ray.d, lanes), to_numpy(end, lanes))
         color, transmittance = mi.Color3f(np.ascontiguousarray(colors.T)), upload(transmittances)
         composited = self._over(color, transmittance, radiance)
-        # Where nothing is in front the radiance stays what it was, to the last bit.
+        # Where nothing is in front, the radiance stays exact.
         return mi.Spectrum(dr.select(transmittance < 1, composited, radiance)), counts
 
     def _composite(self, origins: Floats, directions: Floats, ends: Floats) -> tuple[Floats, Floats]:

@@ -103,7 +103,7 @@ class WeightedLightSampler:
         up to 1.
     """
 
-    # The arithmetic is that of Mitsuba's DiscreteDistribution, whose own arrays a recorded kernel could not be shown.
+    # As Mitsuba's DiscreteDistribution, whose arrays cannot be inputs of a recorded kernel.
     def __init__(self, scene: MitsubaScene, weights: NDArray[np.float64]) -> None:
         self._emitters = scene.emitters_dr()
         single = weights.astype(np.float32)
@@ -159,7 +159,7 @@ def by_registry(emitters: EmitterPtr, values: NDArray[np.floating]) -> NDArray[n
 
 
 class DeltaEmitters:
-    """The emitters of a scene that no ray meets: points, spots, and directional ones; each is as likely as the others.
+    """The delta emitters of a scene, which no ray can hit: points, spots and directional ones; sampled uniformly.
 
     Parameters
     ----------

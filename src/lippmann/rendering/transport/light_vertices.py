@@ -49,7 +49,7 @@ Floats = NDArray[np.float32]
 
 @dataclass
 class JointLight:
-    """The light at a path vertex that light vertices sample, too; state of the path loop.
+    """State of the path loop for MIS: the light at a path vertex that light vertices sample as well.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Arrival:
         self.half = half
 
     def joint(self, si: SurfaceInteraction3f, scattered: Color3f, wo: Vector3f, direction: Vector3f) -> JointLight:
-        """The joint light from ``wo`` (world-space ``direction``); ``scattered`` is the BSDF times the cosine."""
+        """The state after scattering to ``wo``, in world space ``direction``; ``scattered`` is the BSDF times the cosine."""
         share = lambertian_share(si, self.albedo, scattered, wo)
         return JointLight(share, self.reach * dr.abs(dr.dot(si.n, direction)), dr.abs(wo.z))
 
@@ -159,7 +159,7 @@ class LightVertices:
                 *(half.glow / scale, np.zeros(len(half))),
             )
             rows.append(np.column_stack(columns))
-        # Four numbers a row: such are fetched at once.
+        # Rows of four numbers are fetched at once.
         table = np.concatenate([*rows, np.zeros((1, 16))])  # gathers need something to point at
         self._place, self._normal, self._shading, self._glow = (upload(table[:, k : k + 4]) for k in (0, 4, 8, 12))
 
@@ -240,7 +240,7 @@ class LightVertexPasses:
     seed:
         0 to 2**32 - 1: the same gives the same light vertices.
     region:
-        Corners ``(2, 3)`` of the visible box: emitters get rays by what they bring there.
+        Corners ``(2, 3)`` of the visible box: emitters get rays in proportion to their light there.
     """
 
     def __init__(

@@ -100,10 +100,7 @@ class PreparedLight:
     pilot: Any = None
 
     def at(self, sample: int) -> tuple[PreparedLight, int | None]:
-        """The light for sample number ``sample`` of each pixel, and how many samples from there on use it.
-
-        None for all.
-        """
+        """The light for sample number ``sample`` of each pixel, and for how many samples it serves; None: for all."""
         light, served = self, list[int]()
         if self.photon_passes is not None:
             number, before = divmod(sample, self.photon_passes.pass_samples)

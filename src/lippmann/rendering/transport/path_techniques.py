@@ -60,7 +60,7 @@ class Technique:
         return weight
 
     def keep_emission(self, state: Any, depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
-        """The part of the ``emission`` at ``si`` that the path keeps."""
+        """The part of the ``emission`` at ``si`` that the technique leaves to the path."""
         return emission
 
     def arrive(self, state: Any, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
@@ -68,7 +68,7 @@ class Technique:
         return radiance, shadow
 
     def sample_emitter(self, state: Any, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
-        """The part of an emitter sample's ``light`` that the path keeps."""
+        """The part of an emitter sample's ``light`` that the technique leaves to the path."""
         return light
 
     def scatter(self, state: Any, vertex: Vertex, scattering: Scattering) -> Any:
@@ -213,7 +213,7 @@ class WithoutSpecularLight(Technique):
 class _Joint:
     """State of :class:`LightVertexJoins`.
 
-    ``departure``: pdf of the way here from a vertex that was joined; 0 from others. ``light``: what is met on this way.
+    ``departure``: pdf of the current direction if it left a joined vertex, else 0. ``light``: the light along it.
     """
 
     departure: Float

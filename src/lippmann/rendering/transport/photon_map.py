@@ -24,7 +24,7 @@ from lippmann.rendering.transport.tuning import TUNING
 
 Floats = NDArray[np.float32]
 
-#: Lower bounds of the area of a plane in a cell: slope of the plane, and area in faces of the cell.
+#: Lower bounds for the area of a plane in a cell: of its normal's components, and of the area over that of a face.
 _LEAST_SLOPE, _LEAST_AREA = 0.01, 0.05
 #: Odd factors of the coordinates of a cell in its hash.
 _FACTORS = SEED_STEP, pow(SEED_STEP, 2, 1 << 32), pow(SEED_STEP, 3, 1 << 32)
@@ -139,7 +139,7 @@ class PhotonMap:
         if not len(photons):  # gathers need something to point at
             photons = Photons.dark(1)
         self._start = upload(np.concatenate(starts).astype(np.uint32))
-        # Four numbers a row: such are fetched at once.
+        # Rows of four numbers are fetched at once.
         self._position, self._normal, self._toward = (
             upload(_rows_of_four(getattr(photons, name))) for name in ("position", "normal", "toward")
         )
@@ -220,7 +220,7 @@ class PhotonMap:
             bucket = first_bucket + (_hash_cell(cell) & self._last_bucket)
             number = dr.gather(mi.UInt32, self._start, bucket, looking)
             end = dr.gather(mi.UInt32, self._start, bucket + 1, looking)
-            # The least power of two of which `most` steps go through all.
+            # The smallest stride, a power of two, with which `most` steps reach the last photon.
             step = mi.UInt32(1) << (32 - dr.lzcnt((dr.maximum(end - number, 1) - 1) // most))
             number += (first - number) & (step - 1)
             inside = looking & touches & (number < end)
@@ -244,14 +244,14 @@ class PhotonMap:
                     fits &= ~is_sharp(si.wi, wo, lobe)
                     share_of_power = dr.select(by_kernel, 1 - distance2 / (r * r), 1)
                     power = dr.select(fits, mi.Color3f(brought.xyz) * (share_of_power * mi.Float(step)), 0)
-                    # dr.mean would write the number of lanes into the kernel, and make one for each.
+                    # dr.mean would make the number of lanes a constant of the kernel.
                     weight = (power.x + power.y + power.z) / 3
                     weights += weight
                     share = dr.select(weight > 0, weight / weights, 0)
                     is_chosen = choice < share
                     choice = dr.select(is_chosen, choice / share, (choice - share) / (1 - share))
                     chosen = dr.select(is_chosen, d, chosen)
-                    # Photons know the true surface; it is shaded by its interpolated normal.
+                    # Photons land on the true geometry, which is shaded by its interpolated normal.
                     power *= dr.minimum(dr.abs(wo.z) / dr.dot(d, normal), TUNING.steepest)
                     total += power
                     color = dr.select(is_chosen, power / weight, color)

@@ -108,7 +108,7 @@ class PhotonShooter:
             through = si.bsdf(ray).eval_null_transmission(si, other)
             power = dr.select(other, power * through, power)
             active &= ~other | (dr.max(through) > 0)
-            # Along the ray, not along the normal as the engine's own offset is: it is to end at the point.
+            # Offset along the ray, not along the normal as Mitsuba's own, so that the ray ends at the point.
             step = TUNING.rounding * (1 + dr.max(dr.abs(si.p)))
             ray = dr.select(other, mi.Ray3f(si.p + ray.d * step, ray.d), ray)
             again = scene.ray_intersect(ray, mi.RayFlags.All, False, other & active)

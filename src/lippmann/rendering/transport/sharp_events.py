@@ -17,8 +17,8 @@ import mitsuba as mi
 from lippmann.device.pbr.gltf_bsdf import LAMBERTIAN, SHARP_LOBE, WIDE_LOBES
 from lippmann.device.types import Bool, BSDFPtr, Color3f, SurfaceInteraction3f, Vector3f
 
-#: Sharp events between an emitter and a caustic, straight-through surfaces beside them, and specular surfaces in front
-#: of one whose features a denoiser gets, at most; light of more is left to paths.
+#: Most sharp events between an emitter and a caustic (paths sample light of more events), most straight-through
+#: surfaces among them, and most specular surfaces in front of the one whose features a denoiser gets.
 MOST_EVENTS = 6
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class TransportTuning:
-    """Constants of paths, of chains of seen light, of photons' look-ups and of light vertices.
+    """Constants of paths, specular chains, photon look-ups and light vertices.
 
     Attributes
     ----------
@@ -15,7 +15,7 @@ class TransportTuning:
         Rays along each side of the pictures by which a scene is probed: for depths, for the panel's edges and for the
         exposure; the pilots have as many rays as such a picture, and each emitter or pair at least as many as a side.
     rounding:
-        Relative error of places that counts as rounding of single precision.
+        Relative error of positions that counts as rounding of single precision.
     roulette_depth:
         Surfaces after which Russian roulette may end a path.
     lanes:
@@ -25,24 +25,24 @@ class TransportTuning:
         Emitter samples at the first surface of a path that is not purely specular, in each of as many first samples of
         a pixel; half as many in later ones. A power of two keeps all points stratified.
     most_power:
-        A specular chain counts up to white where it is its pixel's only one; of more chains one counts for as much more
-        as this power of their number says. With 1, mirrored balls lose 1.5 to 2.5 dB with 128 samples and promises of
-        their quality break; with 0.5 they lose 0.5 to 1 dB, and a ring of chrome 1.5 dB (``estimate_coverage.py``).
+        The clamp on one specular chain is white times this power of its pixel's number of chains. With 1, mirrored
+        balls lose 1.5 to 2.5 dB with 128 samples, and their quality is often below its goal; with 0.5 they lose 0.5 to
+        1 dB, and a ring of chrome 1.5 dB (``estimate_coverage.py``).
     small_emitter:
         Emitters are small whose area is less than this part of the square of the scene's diagonal.
     least_agreement, farthest_from_plane:
         The least cosine between the normals of a photon and of the point that it is looked up at, or of a sampled point
         and the hit there; and how far a photon may lie from the tangent plane of that point, in radii.
     steepest:
-        Limit on what interpolated normals may add to light that grazes the true surface.
+        Limit on the factor by which interpolated normals may brighten light that grazes the true surface.
     photons_of_cell:
-        Photons of a cell that one look-up meets at most: in the focus of a lens there are thousands. Successive samples
-        of a pixel meet others (``kernel_profile.py``).
+        Most photons of a cell that one look-up reads: in the focus of a lens there are thousands. Successive samples of
+        a pixel read others (``kernel_profile.py``).
     light_vertices:
-        Light vertices of each half of a picture, before those are left out that scatter nothing, and rays of their
-        pilot.
+        Rays from emitters for each half of a picture, of which those that hit a scattering surface give a light vertex;
+        and rays of their pilot.
     uniform_share:
-        Share of emitter samples, emissions and rays from emitters that goes to all alike, for what a pilot missed.
+        Share of emitter samples, photon emissions and emitter rays that is uniform, for light that a pilot missed.
     """
 
     probe_side: int = 128
@@ -60,7 +60,7 @@ class TransportTuning:
     uniform_share: float = 0.1
 
     def rays_of_each(self, kinds: int) -> int:
-        """Rays of a pilot for each of so many emitters, or pairs of an emitter and a caster."""
+        """Pilot rays per emitter, or per pair of an emitter and a caster, of which there are ``kinds``."""
         return max(self.probe_side**2 // kinds, self.probe_side)
 
 
