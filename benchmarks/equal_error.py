@@ -263,7 +263,7 @@ def light_up(stage: Any, request: Any, memory: int = 4 << 30) -> None:
     ``stage`` has the session, the integrator and the source of a :class:`Stage`.
     """
     from lippmann.rendering.preparation.prepare import prepare_light
-    from lippmann.rendering.transport.integrator import read_choices
+    from lippmann.rendering.session import read_choices
 
     # All pictures of a stage are exposed alike.
     request = replace(request, exposure=read_choices(stage.integrator).get("exposure", 0.0))

@@ -151,7 +151,7 @@ class Case:
     def beside_the_truth(self, traced: Any) -> dict[str, Any]:
         """What a picture says of itself, and what is true."""
         from lippmann.rendering.provenance import describe_estimate
-        from lippmann.rendering.transport.integrator import read_choices
+        from lippmann.rendering.session import read_choices
 
         psnr, worst = self.truth(traced.frame.pixels)
         told: Any = describe_estimate(traced.estimate, read_choices(self.integrator))

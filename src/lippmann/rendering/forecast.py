@@ -23,8 +23,7 @@ from lippmann.rendering.picture import describe_lens_gap, find_window
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.preconditions import explain_missing_estimate
 from lippmann.rendering.request.render_request import RenderRequest, format_value
-from lippmann.rendering.session import Session, open_session
-from lippmann.rendering.transport.integrator import read_choices
+from lippmann.rendering.session import Session, open_session, read_choices
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.runtime.machine import amount_in_words
 from lippmann.scene.placement import Placement, comfort_in_words

@@ -29,8 +29,8 @@ from lippmann.rendering.reprojection.point_image import STATUS_LAYER, TRACED
 from lippmann.rendering.request.preconditions import explain_missing_estimate
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.request.tuning import TUNING as REQUEST
-from lippmann.rendering.session import Session
-from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator, read_choices
+from lippmann.rendering.session import Session, read_choices
+from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays, OnePicture, QuiltRays, SubpixelRays, WindowRays
 
 Floats = NDArray[np.float32]

@@ -16,8 +16,7 @@ from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.provenance import make_provenance
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.session import Build, Session, find_uniform_background, open_session
-from lippmann.rendering.transport.integrator import read_choices
+from lippmann.rendering.session import Build, Session, find_uniform_background, open_session, read_choices
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.placement import Placement
 from lippmann.scene.scene import Scene

@@ -9,8 +9,7 @@ from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.provenance import make_provenance
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.session import open_session
-from lippmann.rendering.transport.integrator import read_choices
+from lippmann.rendering.session import open_session, read_choices
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.camera_placement import remove_scale
 from lippmann.scene.scene import Scene

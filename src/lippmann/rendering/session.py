@@ -7,7 +7,7 @@ loads Mitsuba: modules that need it are imported after that.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
@@ -107,7 +107,7 @@ class Session:
         UsageError, SceneError
             As :func:`lippmann.scene.placement.place`.
         """
-        placement = self.find_place(display)
+        placement = self.find_placement(display)
         self.face_viewer(rotation_of(placement.world_from_display))
         if placement.may_cut is None:
             return placement
@@ -135,7 +135,7 @@ class Session:
 
         return DisplayRays(placement.traced(display), placement.world_from_display, bool(self.request.subpixels))
 
-    def find_place(self, display: Display, bounds_in: Callable[[Matrix], Matrix] | None = None) -> Placement:
+    def find_placement(self, display: Display, bounds_in: Callable[[Matrix], Matrix] | None = None) -> Placement:
         """As :meth:`place`, without warnings and with the light as it is; ``bounds_in`` replaces the scene's."""
         scene, placement = self.scene, self.request.placement
         if isinstance(placement, Placement):
@@ -339,6 +339,12 @@ def make_integrator(built: BuiltScene | BuiltClassic, request: RenderRequest, fr
     with plugin.guard(EngineError):
         integrator: Integrator = function_of(plugin.value.make)(built, request, frame_from_world)
     return integrator
+
+
+def read_choices(integrator: Integrator) -> Mapping[str, object]:
+    """Choices and measured values of the integrator's prepared light, by option name; empty where none is prepared."""
+    choices: Mapping[str, object] = getattr(integrator, "choices", {})
+    return choices
 
 
 def make_whitted(built: BuiltClassic, request: RenderRequest, frame_from_world: Matrix) -> Integrator:

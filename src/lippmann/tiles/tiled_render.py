@@ -39,8 +39,7 @@ from lippmann.rendering.estimate.psnr import ErrorSums, Estimate
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.provenance import is_among_mirrors, make_provenance
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.session import memory_limit
-from lippmann.rendering.transport.integrator import read_choices
+from lippmann.rendering.session import memory_limit, read_choices
 from lippmann.runtime import engine as engines
 from lippmann.scene.scene import Scene
 from lippmann.tiles.job import SIDES, TileJob, make_job

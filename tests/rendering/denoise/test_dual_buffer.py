@@ -63,7 +63,7 @@ class Noise:
         return PixelErrors(difference, blur=self.blurred)
 
 
-def blur(picture, samples=2, turned=False):
+def blur(picture, samples=2, rotated=False):
     padded = np.pad(picture, ((2, 2), (2, 2), (0, 0)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, (5, 5), axis=(0, 1))
     return windows.mean(axis=(-1, -2)).astype(np.float32)
@@ -139,7 +139,7 @@ def test_seen_light_goes_past_the_denoiser(as_denoised):
         half += light
     given = []
 
-    def denoise(picture, samples, turned):
+    def denoise(picture, samples, rotated):
         given.append(picture.max())
         return blur(picture)
 
@@ -190,7 +190,7 @@ def test_an_emitter_in_a_narrow_lobe_does_not_light_the_pixels_beside_it():
         half[50, 50] += 30.0
     given = []
 
-    def denoise(picture, samples, turned):
+    def denoise(picture, samples, rotated):
         given.append(picture)
         return picture
 
@@ -246,15 +246,15 @@ def test_of_few_samples_any_hit_may_be_an_outlier(samples, all_may_be):
     told = DenoisedPicture(renderer, blur, "srgb").squared_error().samples
     assert (told.outliers is not None) == all_may_be
     if all_may_be:
-        assert np.array_equal(told.outliers, np.float32(TUNING.untold_outliers) * told.values)
+        assert np.array_equal(told.outliers, np.float32(TUNING.assumed_outliers) * told.values)
 
 
 def test_more_samples_are_cleaned_anew():
     renderer = Noise()
     calls = []
 
-    def denoise(picture, samples, turned):
-        calls.append((samples, turned))
+    def denoise(picture, samples, rotated):
+        calls.append((samples, rotated))
         return picture
 
     denoised = DenoisedPicture(renderer, denoise, "srgb")

@@ -35,7 +35,7 @@ def layers(*surfaces):
 
 def test_the_rectangle_of_all_surfaces_is_shown_and_they_are_cleaned(calls):
     color, albedo, normal = layers((70, 100), (90, 47))
-    result = denoise_surfaces(color, albedo, normal, SurfacePart.of(normal), effort="fast", turned=True, threads=1)
+    result = denoise_surfaces(color, albedo, normal, SurfacePart.of(normal), effort="fast", rotated=True, threads=1)
     cleaned = np.zeros(SHAPE, bool)
     for row, column in ((70, 100), (90, 47)):
         cleaned[row - 1 : row + 2, column - 1 : column + 2] = True
@@ -50,12 +50,12 @@ def test_the_rectangle_of_all_surfaces_is_shown_and_they_are_cleaned(calls):
 
 def test_the_network_is_shown_what_is_open_and_what_stands_around_it(calls):
     color, albedo, normal = layers((70, 100), (190, 250))
-    is_open = np.zeros(SHAPE, bool)
-    is_open[71, 101] = is_open[150, 20] = True  # beside a surface, and far from any
-    result = denoise_surfaces(color, albedo, normal, SurfacePart.of(normal, is_open))
+    mask = np.zeros(SHAPE, bool)
+    mask[71, 101] = mask[150, 20] = True  # beside a surface, and far from any
+    result = denoise_surfaces(color, albedo, normal, SurfacePart.of(normal, mask))
     assert result[71, 101, 0] == -1
     np.testing.assert_array_equal(calls[0][0], color[48 : 72 + MARGIN, 80 : 102 + MARGIN])
-    assert SurfacePart.of(normal, is_open[::-1]) is None
+    assert SurfacePart.of(normal, mask[::-1]) is None
 
 
 def test_at_the_edge_the_picture_ends(calls):

@@ -87,18 +87,18 @@ def test_equal_input_gives_equal_output_whatever_the_threads():
 
 
 @pytest.mark.parametrize("height", [96, 101])
-def test_turned_the_network_sees_the_whole_picture_and_errs_another_way(height):
+def test_rotated_the_network_sees_the_whole_picture_and_errs_another_way(height):
     """Nothing moves, also where the sides are no whole steps of the network."""
     color, albedo, normal = known(height, 155)
     halves = noisy(color, 1), noisy(color, 2)
     upright = [denoise(half, albedo, normal, clean_guides=True, effort="fast") for half in halves]
-    turned = denoise(halves[1], albedo, normal, clean_guides=True, effort="fast", turned=True)
-    assert turned.shape == color.shape
-    assert turned.flags.c_contiguous
-    assert error(turned, color) < 1.2 * error(upright[1], color)
-    assert not np.array_equal(turned, upright[1])
-    mean_of_turned, mean_of_upright = 0.5 * (upright[0] + turned), 0.5 * (upright[0] + upright[1])
-    assert error(mean_of_turned, color) < error(mean_of_upright, color)
+    rotated = denoise(halves[1], albedo, normal, clean_guides=True, effort="fast", rotated=True)
+    assert rotated.shape == color.shape
+    assert rotated.flags.c_contiguous
+    assert error(rotated, color) < 1.2 * error(upright[1], color)
+    assert not np.array_equal(rotated, upright[1])
+    mean_of_rotated, mean_of_upright = 0.5 * (upright[0] + rotated), 0.5 * (upright[0] + upright[1])
+    assert error(mean_of_rotated, color) < error(mean_of_upright, color)
 
 
 @pytest.mark.parametrize("width", [256, 250])

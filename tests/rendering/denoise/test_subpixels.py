@@ -65,9 +65,9 @@ def test_a_denoiser_is_given_all_colours(integrator, as_denoised):
     batches = BatchedRender(integrator, SubpixelRays(rays()), seed=3, memory=1 << 28)
     given, turns = [], []
 
-    def keep(pixels, samples, turned):
+    def keep(pixels, samples, rotated):
         given.append(pixels)
-        turns.append(turned)
+        turns.append(rotated)
         return pixels + np.float32(0.5)
 
     denoised = DenoisedPicture(batches, keep, "srgb")

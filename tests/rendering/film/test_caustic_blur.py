@@ -26,7 +26,7 @@ class PlaneOfPhotons:
         self.pass_samples = 8
 
     def of_pass(self, number):
-        from lippmann.rendering.transport.caustic_photons import radius_of_pass
+        from lippmann.rendering.transport.caustic_photons import shrink_radius
         from lippmann.rendering.transport.photon_map import PhotonMap, Photons
 
         halves = []
@@ -38,7 +38,7 @@ class PlaneOfPhotons:
             each = self._light(position[:, :1]) * (2 * self.EXTENT) ** 2 / self._count
             power = np.repeat(each, 3, axis=1).astype(np.float32)
             halves.append(Photons(position, up, up, power, np.ones(self._count, np.uint32)))
-        return PhotonMap((halves[0], halves[1]), self._radius * radius_of_pass(number))
+        return PhotonMap((halves[0], halves[1]), self._radius * shrink_radius(number))
 
 
 def matt_plane(passes):

@@ -55,7 +55,7 @@ def prepared_chains(scene, **options):
     session = open_session(scene, resolve(RenderRequest(**(ASKED | options)), scene, DISPLAY))
     placement = session.place(DISPLAY)
 
-    from lippmann.rendering.transport.integrator import read_choices
+    from lippmann.rendering.session import read_choices
     from lippmann.rendering.transport.ray_source import DisplayRays
 
     source = DisplayRays(DISPLAY, placement.world_from_display)

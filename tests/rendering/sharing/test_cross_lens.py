@@ -180,8 +180,8 @@ def test_a_window_is_a_part_of_the_whole(name):
 def test_pixels_that_are_not_open_stay_as_they_are():
     display, guides = DISPLAYS["slanted"], plain_guides(DISPLAYS["slanted"], -20.0)
     pixels = np.random.default_rng(5).random((*guides.height.shape, 3), dtype=np.float32)
-    is_open = np.zeros(guides.height.shape, bool)
-    is_open[20:30, 40:90] = True
-    whole, part = (share_light(pixels, display, guides, stop=0.0, is_open=only) for only in (None, is_open))
-    np.testing.assert_array_equal(part[is_open], whole[is_open])
-    np.testing.assert_allclose(part[~is_open], pixels[~is_open], rtol=1e-6)
+    mask = np.zeros(guides.height.shape, bool)
+    mask[20:30, 40:90] = True
+    whole, part = (share_light(pixels, display, guides, stop=0.0, mask=only) for only in (None, mask))
+    np.testing.assert_array_equal(part[mask], whole[mask])
+    np.testing.assert_allclose(part[~mask], pixels[~mask], rtol=1e-6)

@@ -323,7 +323,7 @@ def photons_of(scene_dict, **options):
 
 
 def test_passes_have_photons_of_their_own_and_shrinking_radii():
-    from lippmann.rendering.transport.caustic_photons import radius_of_pass
+    from lippmann.rendering.transport.caustic_photons import shrink_radius
 
     ball = {"ball": {"type": "sphere", "bsdf": {"type": "dielectric"}}, "room": room(), "lamp": lamp([0, 0, 4.0])}
     photons = photons_of(ball, kept=2)
@@ -336,7 +336,7 @@ def test_passes_have_photons_of_their_own_and_shrinking_radii():
     assert again is not first
     assert again.halves[0].position.tobytes() == first.halves[0].position.tobytes()
     # So slowly that noise and blur both go: radius squared as n to the power of -1/3.
-    assert radius_of_pass(999) ** 2 == pytest.approx(1000 ** (-1 / 3), rel=0.15)
+    assert shrink_radius(999) ** 2 == pytest.approx(1000 ** (-1 / 3), rel=0.15)
 
 
 @pytest.mark.long

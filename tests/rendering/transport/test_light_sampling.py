@@ -557,9 +557,9 @@ def test_weights_of_the_three_ways_add_up_to_one(a, b, c):
 def test_roulette_lets_faint_paths_go_on_by_the_root(throughput, eta, expected):
     import mitsuba as mi
 
-    from lippmann.rendering.transport.light_sampling import roulette_survival
+    from lippmann.rendering.transport.light_sampling import choose_survival
 
-    survival = np.array(roulette_survival(mi.Spectrum(*throughput), mi.Float(eta)))
+    survival = np.array(choose_survival(mi.Spectrum(*throughput), mi.Float(eta)))
     np.testing.assert_allclose(survival, expected, rtol=1e-5)
 
 
@@ -568,9 +568,9 @@ def test_emitter_samples_of_all_paths_are_one_stratified_sequence():
     import mitsuba as mi
 
     from lippmann.device.sobol import SampleStream
-    from lippmann.rendering.transport.light_sampling import first_emitter_samples
+    from lippmann.rendering.transport.light_sampling import count_first_samples
 
-    count, first = (np.array(part) for part in first_emitter_samples(dr.arange(mi.UInt32, 12)))
+    count, first = (np.array(part) for part in count_first_samples(dr.arange(mi.UInt32, 12)))
     assert count.tolist() == [4] * 4 + [2] * 8
     assert np.array_equal(first, np.cumsum(count) - count)
     stream = SampleStream.of_pixels(mi.UInt32(3), mi.UInt32(5), mi.UInt32(1))

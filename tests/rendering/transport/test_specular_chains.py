@@ -79,7 +79,7 @@ def prepared(scene, *, has_null):
     source = CameraRays(Camera("eye", pose, fov_y=0.6), SIDE, SIDE)
     request = RenderRequest(integrator="path", caustics="photons", spp=8)
     caustics = shoot_photons(integrator, request, source, trace_pilot(integrator, source), 1 << 30)
-    assert caustics.way == "photons"
+    assert caustics.technique == "photons"
     return integrator.lit_by(replace(integrator.light, photons=caustics.photons, photon_passes=caustics.passes)), source
 
 

@@ -112,7 +112,7 @@ class DenoisedPicture:
             common += of_samples.blur
         if self._samples.samples < REQUEST.fewest:
             # Too few batches to find outliers: part of the error is assumed to rest on them.
-            share = np.float32(TUNING.untold_outliers)
+            share = np.float32(TUNING.assumed_outliers)
             of_samples = replace(of_samples, outliers=share * np.maximum(of_samples.values, 0))
         return PixelErrors(common + halves_variance, None, of_samples, halves_variance, of_samples.blur)
 
@@ -140,7 +140,7 @@ class DenoisedPicture:
             with keep_filters():
                 first, second = (
                     self._samples.to_display(
-                        denoise_light(traced[k], specular[k], self._denoise, self._samples.samples, turned=k == 1)
+                        denoise_light(traced[k], specular[k], self._denoise, self._samples.samples, rotated=k == 1)
                     )
                     for k in (0, 1)
                 )
@@ -188,7 +188,7 @@ class DenoisedPicture:
 
 
 def denoise_light(
-    noisy: Floats, specular: Floats | None, denoise: Denoise, samples: int, turned: bool = False
+    noisy: Floats, specular: Floats | None, denoise: Denoise, samples: int, rotated: bool = False
 ) -> Floats:
     """The denoised picture; specular light and very bright light bypass the denoiser.
 
@@ -215,7 +215,7 @@ def denoise_light(
         np.float32(0) if specular is None else np.where(specular > limit, np.maximum(noisy - limit, specular), specular)
     )
     # Subtracted twice: beside the network each copy of the picture counts.
-    clean = denoise(np.minimum(noisy - past, limit), samples, turned) + past
+    clean = denoise(np.minimum(noisy - past, limit), samples, rotated) + past
     rest = noisy - past
     if (rest > limit).any():
         clean += np.where(clean - past >= limit / 2, np.maximum(rest - limit, 0), np.float32(0))

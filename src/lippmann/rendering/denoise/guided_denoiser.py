@@ -86,17 +86,17 @@ class GuidedDenoiser:
         self._lenses: NDArray[np.int32] | None = None
         self._progress = progress
         self._guides: Guides | None = None
-        self._is_open: NDArray[np.bool_] | None = None
+        self._mask: NDArray[np.bool_] | None = None
         #: The surfaces in every tile of the source, by the guides.
         self._surfaces: list[SurfacePart | None] = []
         self.seconds = 0.0
         self.used: Effort = "fast"
 
-    def __call__(self, pixels: Floats, samples: int, turned: bool = False) -> Floats:
+    def __call__(self, pixels: Floats, samples: int, rotated: bool = False) -> Floats:
         """The denoised picture, with its light shared where that is asked for.
 
         Views of a quilt share their light before denoising, micro-images after it. ``samples`` are those of each pixel;
-        ``turned`` is that of :func:`~lippmann.rendering.denoise.oidn.denoise`.
+        ``rotated`` is that of :func:`~lippmann.rendering.denoise.oidn.denoise`.
         """
         started = time.perf_counter()
         self._progress(Progress("denoise", 0, 1))
@@ -105,16 +105,16 @@ class GuidedDenoiser:
         if self._shares and isinstance(self._source, QuiltRays):
             pixels = share_views(pixels, self._source, guides)
         # The network overshoots below black beside bright edges.
-        clean = np.maximum(self._denoise_tiles(pixels, guides, turned), np.float32(0))
+        clean = np.maximum(self._denoise_tiles(pixels, guides, rotated), np.float32(0))
         if self._shares and not isinstance(self._source, QuiltRays):
             clean = self._share(clean)
         self._progress(Progress("denoise", 1, 1))
         self.seconds += time.perf_counter() - started
         return clean
 
-    def restrict_to(self, is_open: NDArray[np.bool_]) -> None:
-        """Denoise the pixels where ``is_open (H, W)``, with those around them; the values of others mean nothing."""
-        self._is_open, self._surfaces = is_open, []
+    def restrict_to(self, mask: NDArray[np.bool_]) -> None:
+        """Denoise the pixels where ``mask (H, W)``, with those around them; the values of others mean nothing."""
+        self._mask, self._surfaces = mask, []
 
     def _share(self, clean: Floats) -> Floats:
         """A denoised picture with the light shared between its micro-images."""
@@ -134,7 +134,7 @@ class GuidedDenoiser:
             stop=SHARING.stop,
             lenses=self._lenses,
             columns=columns,
-            is_open=self._is_open,
+            mask=self._mask,
         )
 
     def coverage(self) -> tuple[Coverage, Coverage] | None:
@@ -154,11 +154,11 @@ class GuidedDenoiser:
         denoise(small, small, small, clean_guides=True, effort=effort, threads=self._threads)
         return TUNING.runs * (time.perf_counter() - started) * self._source.width * self._source.height / side**2
 
-    def _denoise_tiles(self, pixels: Floats, guides: Guides, turned: bool) -> Floats:
+    def _denoise_tiles(self, pixels: Floats, guides: Guides, rotated: bool) -> Floats:
         source = self._source
         if not self._surfaces:
-            is_open = self._is_open
-            parts = [(guides.normal[tile], None if is_open is None else is_open[tile]) for tile in source.tiles()]
+            mask = self._mask
+            parts = [(guides.normal[tile], None if mask is None else mask[tile]) for tile in source.tiles()]
             self._surfaces = [SurfacePart.of(*part) for part in parts]
         result = np.empty_like(pixels)
         for tile, surfaces in zip(source.tiles(), self._surfaces, strict=True):
@@ -168,7 +168,7 @@ class GuidedDenoiser:
                 guides.normal[tile],
                 surfaces,
                 effort=self.used,
-                turned=turned,
+                rotated=rotated,
                 threads=self._threads,
             )
         return result
@@ -210,14 +210,14 @@ class SurfacePart:
     near: NDArray[np.bool_]
 
     @staticmethod
-    def of(normal: NDArray[np.generic], is_open: NDArray[np.bool_] | None = None) -> SurfacePart | None:
+    def of(normal: NDArray[np.generic], mask: NDArray[np.bool_] | None = None) -> SurfacePart | None:
         """The part with all surfaces of a picture, by its normals ``(H, W, 3)``, 0 off surfaces; None without any.
 
-        With ``is_open (H, W)``, the part with the pixels where it is true and that show surfaces or are close to one.
+        With ``mask (H, W)``, the part with the pixels where it is true and that show surfaces or are close to one.
         """
         is_surface = (normal[..., 0] != 0) | (normal[..., 1] != 0) | (normal[..., 2] != 0)
         near = _dilate(is_surface)
-        place = _bound_surfaces(is_surface if is_open is None else near & is_open)
+        place = _bound_surfaces(is_surface if mask is None else near & mask)
         return None if place is None else SurfacePart(place, near[place][..., None])
 
 
@@ -228,7 +228,7 @@ def denoise_surfaces(
     surfaces: SurfacePart | None,
     *,
     effort: Effort = "high",
-    turned: bool = False,
+    rotated: bool = False,
     threads: int | None = None,
 ) -> Floats:
     """The denoised picture; arguments as those of :func:`~lippmann.rendering.denoise.oidn.denoise`.
@@ -241,7 +241,7 @@ def denoise_surfaces(
     place = surfaces.place
     images = color[place], albedo[place], normal[place]
     # Guides follow mirrors and glass deterministically, so they are noisy along edges alone.
-    clean = denoise(*images, clean_guides=True, effort=effort, turned=turned, threads=threads)
+    clean = denoise(*images, clean_guides=True, effort=effort, rotated=rotated, threads=threads)
     # Copied after the network, whose memory is the largest.
     result = np.array(color, dtype=np.float32)
     np.copyto(result[place], clean, where=surfaces.near)

@@ -35,7 +35,7 @@ def denoise(
     *,
     clean_guides: bool = False,
     effort: Effort = "high",
-    turned: bool = False,
+    rotated: bool = False,
     threads: int | None = None,
 ) -> FloatArray:
     """The denoised picture.
@@ -86,12 +86,12 @@ def denoise(
     }
     load_denoiser()
     height, width = images["color"].shape[:2]
-    if turned:
+    if rotated:
         images = {name: _rotate(images.pop(name)) for name in list(images)}  # frees each unturned image
     # One device serves one filter at a time, and its threads do not survive a fork.
     with exclusive():
         result = _filter_images(images, options, threads or machine.usable_cores())
-    if not turned:
+    if not rotated:
         return result
     return np.ascontiguousarray(result[-height:, -width:][::-1, ::-1])
 

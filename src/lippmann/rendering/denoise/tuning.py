@@ -38,7 +38,7 @@ class DenoiseTuning:
     reaches: tuple[int, int] = (2, 8)
     far_above: float = 4.0
     hidden: float = 8.0
-    untold_outliers: float = 0.25
+    assumed_outliers: float = 0.25
 
 
 TUNING = DenoiseTuning()

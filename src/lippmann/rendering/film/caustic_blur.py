@@ -20,7 +20,7 @@ from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream, name
 from lippmann.display.panel import PixelWindow
 from lippmann.rendering.film.memory_model import PREFERRED_LANES
 from lippmann.rendering.film.wavefront import select_colors
-from lippmann.rendering.transport.caustic_photons import CausticPhotons, radius_of_pass
+from lippmann.rendering.transport.caustic_photons import CausticPhotons, shrink_radius
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.ray_source import RaySource
@@ -64,7 +64,7 @@ class SquaredBlur:
             self._pass = (samples - 1) // passes.pass_samples
             share = min(1.0, TUNING.probe_side**2 / (self._source.width * self._source.height))
             self._of_pass = self._measure(passes.of_pass(self._pass), share)
-        scaled = _mean_area(passes, samples) / radius_of_pass(self._pass) ** 2
+        scaled = _mean_area(passes, samples) / shrink_radius(self._pass) ** 2
         return (self._of_pass * np.float32(scaled**2)).reshape(*self._window.shape, 3)
 
     def _measure(self, photons: PhotonMap, share: float) -> Floats:
@@ -83,7 +83,7 @@ def _mean_area(passes: CausticPhotons, samples: int) -> float:
     """Mean squared radius over the passes of ``samples`` samples, relative to the first: bias is proportional to it."""
     size = passes.pass_samples
     served = (min(size, samples - first) for first in range(0, samples, size))
-    return sum(each * radius_of_pass(number) ** 2 for number, each in enumerate(served)) / samples
+    return sum(each * shrink_radius(number) ** 2 for number, each in enumerate(served)) / samples
 
 
 def _choose_pixels(source: RaySource, window: PixelWindow, seed: int, share: float) -> NDArray[np.intp]:

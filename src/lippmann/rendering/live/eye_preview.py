@@ -20,7 +20,7 @@ from lippmann.rendering.provenance import make_provenance
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.request.tuning import TUNING
-from lippmann.rendering.session import open_session
+from lippmann.rendering.session import open_session, read_choices
 from lippmann.runtime import machine
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.scene import Scene
@@ -69,7 +69,6 @@ def render_eye_preview(
     from lippmann.rendering.denoise.tuning import TUNING as DENOISE
     from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
     from lippmann.rendering.film.wavefront import trace_frame
-    from lippmann.rendering.transport.integrator import read_choices
     from lippmann.rendering.transport.ray_source import SinglePixelRays
 
     whole = session.rays(display, placement)

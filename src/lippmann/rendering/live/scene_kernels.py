@@ -64,7 +64,7 @@ class SceneKernels:
 
     def place(self, display: Display, request: RenderRequest) -> Placement:
         """The display's placement for a resolved request."""
-        return replace(self.session, request=request).find_place(display, self._bounds_in)
+        return replace(self.session, request=request).find_placement(display, self._bounds_in)
 
     def can_light(self, light: LightOptions) -> bool:
         """Whether ``light`` can be set without building the scene again."""

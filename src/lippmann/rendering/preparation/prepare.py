@@ -1,11 +1,12 @@
 """Prepares the light of a picture: emitter weights, photons, exposure, light vertices, and specular chains.
 
-A pilot comes first: a few paths through all pixels. Each emitter is sampled along the same paths, so that differences
-between contributions come from the emitters alone. Mitsuba samples all emitters uniformly unless a scene sets weights.
-Emitters that light nothing in the picture then take their share too: a sky outside a closed room takes half of all
-shadow rays. Here an emitter is sampled in proportion to the root of the second moment E[f^2] of its contribution f,
-which minimises the variance of f over its probability (importance sampling; Veach 1997, chapter 2.5.2). A uniform share
-remains for contributions that the pilot missed.
+A pilot comes first: a few paths through pixels all over the picture. Each emitter is sampled along the same paths, so
+that differences between contributions come from the emitters alone.
+
+Mitsuba samples all emitters uniformly unless a scene sets weights, also emitters that light nothing in the picture: a
+sky outside a closed room takes half of all shadow rays. Here the probability of an emitter is proportional to the root
+of the second moment E[f^2] of its contribution f. This minimises the variance (importance sampling; Veach 1997, chapter
+2.5.2). A uniform share remains for contributions that the pilot missed.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from lippmann.rendering.preparation.exposure import compute_gain, measure_exposu
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import find_casters, has_sharp_surfaces, hides_caustics
-from lippmann.rendering.transport.caustic_photons import CausticPhotons, emissions, no_photons
+from lippmann.rendering.transport.caustic_photons import CausticPhotons, emissions, make_empty_map
 from lippmann.rendering.transport.first_hits import NEAR_SHARE
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler, WeightedLightSampler
 from lippmann.rendering.transport.light_vertices import LightVertexPasses
@@ -40,6 +41,180 @@ from lippmann.rendering.transport.sharp_events import sharp_lobe
 from lippmann.rendering.transport.specular_chains import trace_specular_light
 from lippmann.rendering.transport.tuning import TUNING as TRANSPORT
 from lippmann.scene.values.description import Color
+
+
+def prepare_light(
+    paths: PathIntegrator,
+    request: RenderRequest,
+    source: RaySource,
+    memory: int,
+    background: Color | None = None,
+    own_exposure: float = 0.0,
+    stands_alone: bool = True,
+    weighs_emitters: bool = True,
+    pilot: Pilot | None = None,
+) -> PreparedLight:
+    """The prepared light of a picture, for :meth:`PathIntegrator.lit_by`.
+
+    Parameters
+    ----------
+    paths:
+        A path integrator of the scene; its own light is ignored.
+    request:
+        The resolved request.
+    source:
+        Rays of the whole picture, also where a part of it is rendered.
+    memory:
+        Bytes for photons.
+    background:
+        Colour of rays without a hit; see :func:`~lippmann.rendering.preparation.exposure.measure_exposure`.
+    own_exposure:
+        The camera's own exposure in stops, to which a fixed exposure is added.
+    stands_alone:
+        Whether the integrator's radiance is all that is seen: nothing, such as splats, is composited over it.
+    weighs_emitters:
+        Whether emitters are sampled by their contribution to the picture, not by the scene's weights.
+    pilot:
+        That of a frame a little earlier; None to trace one.
+
+    Raises
+    ------
+    MemoryLimitError
+        ``memory`` bytes do not hold the photons that were asked for.
+    """
+    choices = dict[str, object]()
+    if pilot is None or len(pilot.moments) != len(paths.scene.emitters()):
+        pilot = trace_pilot(paths.lit_by(PreparedLight()), source)
+    light = PreparedLight(pilot=pilot)
+    if weighs_emitters:
+        light = replace(light, sampler=make_light_sampler(paths.scene, pilot))
+    if own_exposure:
+        choices["camera_exposure"] = own_exposure
+    if request.exposure != "auto":
+        request = replace(request, exposure=request.exposure + own_exposure)
+
+    caustics = shoot_photons(paths.lit_by(light), request, source, pilot, memory)
+    light = replace(light, photons=caustics.photons, photon_passes=caustics.passes)
+    exposure = request.exposure
+    if exposure == "auto":
+        exposure = measure_exposure(paths.lit_by(light), source, background, memory, request.seed)
+    gain = compute_gain(exposure) if exposure else 1.0
+    if caustics.technique is not None:
+        choices["caustics"] = caustics.technique
+    if exposure:
+        light = replace(light, gain=mi.Float(gain))
+        choices["exposure"] = exposure
+
+    passes = trace_light_vertices(paths.lit_by(light), request, pilot, gain)
+    if passes is not None:
+        light = replace(light, light_vertices=passes.of_pass(0), vertex_passes=passes)
+        choices["light_vertices"] = TRANSPORT.light_vertices
+    if request.clamp_indirect is not None:
+        light = replace(light, most_indirect=mi.Float(request.clamp_indirect / gain))
+    chains = count_chains(paths.lit_by(light), request, source) if stands_alone else 0
+    if chains:
+        light = replace(light, chains=dr.opaque(mi.UInt32, chains))
+        choices["seen_chains"] = chains
+    return replace(light, choices=choices)
+
+
+def trace_light_vertices(
+    integrator: PathIntegrator, request: RenderRequest, pilot: Pilot, gain: float
+) -> LightVertexPasses | None:
+    """Light vertices for a picture whose indirect light is noisy without them; None for others.
+
+    Parameters
+    ----------
+    pilot:
+        The picture's pilot.
+    gain:
+        Factor on radiance of the picture's exposure.
+    """
+    if request.integrator != "path" or request.surfaces < 2 or gain * pilot.brightest_indirect <= 1:
+        return None
+    sampler, scene = integrator.light_sampler, integrator.scene
+    passes = LightVertexPasses(scene, sampler, TUNING.pass_samples, request.seed, pilot.region)
+    return None if passes.are_none else passes
+
+
+def count_chains(integrator: PathIntegrator, request: RenderRequest, source: RaySource) -> int:
+    """Specular chains per path (:mod:`~lippmann.rendering.transport.specular_chains`): a fixed number, or 0.
+
+    A denoiser takes highlights for noise. So a denoised picture has specular chains if one of the pilot's meets light
+    brighter than white. Pictures of one ray through each pixel's centre and reprojected ones have none.
+    """
+    is_denoised = request.denoise != "none" and request.box_filter and request.method not in REUSING
+    if not is_denoised or not has_sharp_surfaces(integrator.scene):
+        return 0
+    return TUNING.chains if find_brightest_specular_light(integrator, source) > 1 else 0
+
+
+@dataclass(frozen=True, eq=False)
+class Caustics:
+    """The technique that renders a picture's caustics, with its photons.
+
+    Attributes
+    ----------
+    technique:
+        ``photons``, ``paths`` or ``none`` (left out); None where the scene has no caustics.
+    photons, passes:
+        See :class:`~lippmann.rendering.transport.path.PreparedLight`.
+    """
+
+    technique: Literal["photons", "paths", "none"] | None
+    photons: PhotonMap | None = None
+    passes: CausticPhotons | None = None
+
+
+def shoot_photons(
+    integrator: PathIntegrator, request: RenderRequest, source: RaySource, pilot: Pilot, memory: int
+) -> Caustics:
+    """Choose the technique of caustics for the picture of ``source``, and shoot their photons.
+
+    Photons are used wherever an emitter and a caster form a pair, and some photons land within the visible region.
+
+    Raises
+    ------
+    MemoryLimitError
+        Photons were asked for, and ``memory`` bytes do not hold them. Where they were not, caustics are left to paths.
+    """
+    if request.integrator != "path" or request.surfaces < 2:
+        return Caustics(None)
+    if request.caustics == "paths":
+        return _leave_to_paths(integrator)
+    if request.caustics == "none":
+        return Caustics("none", make_empty_map())
+    casters = find_casters(integrator.scene)
+    if casters.pairs == 0:
+        return Caustics(None)
+    pixels = source.width * source.height * source.channels
+    # A pass serves no more samples than the picture has.
+    samples = pixels * (TUNING.pass_samples if request.is_open_ended else min(TUNING.pass_samples, request.samples))
+    passes = 2 if request.is_open_ended else -(-request.samples // TUNING.pass_samples)
+    # Memory that is short does not reduce the photons: a picture does not depend on it.
+    required = memory_model.photons(emissions(samples), passes)
+    if required > memory:
+        if request.caustics == "auto":
+            return _leave_to_paths(integrator)
+        raise memory_model.make_memory_error(memory, "photons of caustics", required)
+    photons = CausticPhotons(
+        integrator.scene,
+        integrator.features,
+        casters,
+        samples=samples,
+        pass_samples=TUNING.pass_samples,
+        seed=request.seed,
+        region=pilot.region,
+        kept=max(1, min(passes, int(TUNING.kept_share * memory) // memory_model.photons(emissions(samples), 1))),
+    )
+    return Caustics(None) if photons.are_none else Caustics("photons", photons.of_pass(0), photons)
+
+
+def _leave_to_paths(integrator: PathIntegrator) -> Caustics:
+    return Caustics("paths" if hides_caustics(integrator.scene) else None)
+
+
+# ---- Pilot: its paths, and the emitter weights that follow from them ----
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,174 +366,3 @@ def _sample_contributions(
         surface += 1
         active &= (dr.max(throughput) > 0) & (surface < min(integrator.depth, TRANSPORT.roulette_depth))
     return squares, indirect, hit, point
-
-
-def prepare_light(
-    paths: PathIntegrator,
-    request: RenderRequest,
-    source: RaySource,
-    memory: int,
-    background: Color | None = None,
-    own_exposure: float = 0.0,
-    stands_alone: bool = True,
-    weighs_emitters: bool = True,
-    pilot: Pilot | None = None,
-) -> PreparedLight:
-    """The prepared light of a picture, for :meth:`PathIntegrator.lit_by`.
-
-    Parameters
-    ----------
-    paths:
-        A path integrator of the scene; its own light is ignored.
-    request:
-        The resolved request.
-    source:
-        Rays of the whole picture, also where a part of it is rendered.
-    memory:
-        Bytes for photons.
-    background:
-        Colour of rays without a hit; see :func:`~lippmann.rendering.preparation.exposure.measure_exposure`.
-    own_exposure:
-        The camera's own exposure in stops, to which a fixed exposure is added.
-    stands_alone:
-        Whether the integrator's radiance is all that is seen: nothing, such as splats, is composited over it.
-    weighs_emitters:
-        Whether emitters are sampled by their contribution to the picture, not by the scene's weights.
-    pilot:
-        That of a frame a little earlier; None to trace one.
-
-    Raises
-    ------
-    MemoryLimitError
-        ``memory`` bytes do not hold the photons that were asked for.
-    """
-    choices = dict[str, object]()
-    if pilot is None or len(pilot.moments) != len(paths.scene.emitters()):
-        pilot = trace_pilot(paths.lit_by(PreparedLight()), source)
-    light = PreparedLight(pilot=pilot)
-    if weighs_emitters:
-        light = replace(light, sampler=make_light_sampler(paths.scene, pilot))
-    if own_exposure:
-        choices["camera_exposure"] = own_exposure
-    if request.exposure != "auto":
-        request = replace(request, exposure=request.exposure + own_exposure)
-
-    caustics = shoot_photons(paths.lit_by(light), request, source, pilot, memory)
-    light = replace(light, photons=caustics.photons, photon_passes=caustics.passes)
-    exposure = request.exposure
-    if exposure == "auto":
-        exposure = measure_exposure(paths.lit_by(light), source, background, memory, request.seed)
-    gain = compute_gain(exposure) if exposure else 1.0
-    if caustics.way is not None:
-        choices["caustics"] = caustics.way
-    if exposure:
-        light = replace(light, gain=mi.Float(gain))
-        choices["exposure"] = exposure
-
-    passes = trace_light_vertices(paths.lit_by(light), request, pilot, gain)
-    if passes is not None:
-        light = replace(light, light_vertices=passes.of_pass(0), vertex_passes=passes)
-        choices["light_vertices"] = TRANSPORT.light_vertices
-    if request.clamp_indirect is not None:
-        light = replace(light, most_indirect=mi.Float(request.clamp_indirect / gain))
-    chains = count_chains(paths.lit_by(light), request, source) if stands_alone else 0
-    if chains:
-        light = replace(light, chains=dr.opaque(mi.UInt32, chains))
-        choices["seen_chains"] = chains
-    return replace(light, choices=choices)
-
-
-def trace_light_vertices(
-    integrator: PathIntegrator, request: RenderRequest, pilot: Pilot, gain: float
-) -> LightVertexPasses | None:
-    """Light vertices for a picture whose indirect light is noisy without them; None for others.
-
-    Parameters
-    ----------
-    pilot:
-        The picture's pilot.
-    gain:
-        Factor on radiance of the picture's exposure.
-    """
-    if request.integrator != "path" or request.surfaces < 2 or gain * pilot.brightest_indirect <= 1:
-        return None
-    sampler, scene = integrator.light_sampler, integrator.scene
-    passes = LightVertexPasses(scene, sampler, TUNING.pass_samples, request.seed, pilot.region)
-    return None if passes.are_none else passes
-
-
-def count_chains(integrator: PathIntegrator, request: RenderRequest, source: RaySource) -> int:
-    """Specular chains per path (:mod:`~lippmann.rendering.transport.specular_chains`): a fixed number, or 0.
-
-    A denoiser takes highlights for noise. So a denoised picture has specular chains if one of the pilot's meets light
-    brighter than white. Pictures of one ray through each pixel's centre and reprojected ones have none.
-    """
-    is_denoised = request.denoise != "none" and request.box_filter and request.method not in REUSING
-    if not is_denoised or not has_sharp_surfaces(integrator.scene):
-        return 0
-    return TUNING.chains if find_brightest_specular_light(integrator, source) > 1 else 0
-
-
-@dataclass(frozen=True, eq=False)
-class Caustics:
-    """The technique that renders a picture's caustics, with its photons.
-
-    Attributes
-    ----------
-    way:
-        ``photons``, ``paths`` or ``none`` (left out); None where the scene has no caustics.
-    photons, passes:
-        See :class:`~lippmann.rendering.transport.path.PreparedLight`.
-    """
-
-    way: Literal["photons", "paths", "none"] | None
-    photons: PhotonMap | None = None
-    passes: CausticPhotons | None = None
-
-
-def shoot_photons(
-    integrator: PathIntegrator, request: RenderRequest, source: RaySource, pilot: Pilot, memory: int
-) -> Caustics:
-    """Choose the technique of caustics for the picture of ``source``, and shoot their photons.
-
-    Photons are used wherever an emitter and a caster form a pair, and some photons land within the visible region.
-
-    Raises
-    ------
-    MemoryLimitError
-        Photons were asked for, and ``memory`` bytes do not hold them. Where they were not, caustics are left to paths.
-    """
-    if request.integrator != "path" or request.surfaces < 2:
-        return Caustics(None)
-    if request.caustics == "paths":
-        return _left_to_paths(integrator)
-    if request.caustics == "none":
-        return Caustics("none", no_photons())
-    casters = find_casters(integrator.scene)
-    if casters.pairs == 0:
-        return Caustics(None)
-    pixels = source.width * source.height * source.channels
-    # A pass serves no more samples than the picture has.
-    samples = pixels * (TUNING.pass_samples if request.is_open_ended else min(TUNING.pass_samples, request.samples))
-    passes = 2 if request.is_open_ended else -(-request.samples // TUNING.pass_samples)
-    # Memory that is short does not reduce the photons: a picture does not depend on it.
-    required = memory_model.photons(emissions(samples), passes)
-    if required > memory:
-        if request.caustics == "auto":
-            return _left_to_paths(integrator)
-        raise memory_model.make_memory_error(memory, "photons of caustics", required)
-    photons = CausticPhotons(
-        integrator.scene,
-        integrator.features,
-        casters,
-        samples=samples,
-        pass_samples=TUNING.pass_samples,
-        seed=request.seed,
-        region=pilot.region,
-        kept=max(1, min(passes, int(TUNING.kept_share * memory) // memory_model.photons(emissions(samples), 1))),
-    )
-    return Caustics(None) if photons.are_none else Caustics("photons", photons.of_pass(0), photons)
-
-
-def _left_to_paths(integrator: PathIntegrator) -> Caustics:
-    return Caustics("paths" if hides_caustics(integrator.scene) else None)

@@ -45,7 +45,7 @@ def share_light(
     stop: float,
     lenses: NDArray[np.int32] | None = None,
     columns: int = 1,
-    is_open: NDArray[np.bool_] | None = None,
+    mask: NDArray[np.bool_] | None = None,
 ) -> Floats:
     """The denoised picture, filtered across its micro-images.
 
@@ -81,7 +81,7 @@ def share_light(
     if lenses is None:
         lenses = lens_numbers(display)
     groups = [slice(0, 3)] if len(lenses) == 1 else [slice(c, c + 1) for c in range(3)]
-    numbers = None if is_open is None else upload(np.flatnonzero(is_open).astype(np.uint32))
+    numbers = None if mask is None else upload(np.flatnonzero(mask).astype(np.uint32))
     for lens, group in zip(lenses, groups, strict=True):
         picture = _Picture(light[..., group], guides.normal, guides.height, lens, centers, display.gap, reach, stop)
         if numbers is None:
@@ -89,7 +89,7 @@ def share_light(
         else:
             shared[..., group] = light[..., group]
             shape = len(numbers), 1, group.stop - group.start
-            shared[is_open, group] = light_of_pixels(partial(picture.mean_light_of, numbers), shape)[:, 0]
+            shared[mask, group] = light_of_pixels(partial(picture.mean_light_of, numbers), shape)[:, 0]
     return np.asarray(shared * albedo, dtype=np.float32)
 
 

@@ -32,7 +32,7 @@ OF_POWER = 6
 NEIGHBOURS_OF_ROOT = 0.12
 
 
-def no_photons() -> PhotonMap:
+def make_empty_map() -> PhotonMap:
     """An empty photon map: caustics are left out."""
     return PhotonMap((Photons.dark(0), Photons.dark(0)), 1.0)
 
@@ -94,7 +94,7 @@ class CausticPhotons:
     def of_pass(self, number: int) -> PhotonMap:
         """The photons of pass ``number``, from 0 on; a map without any where there are none."""
         if self._chances is None:
-            return no_photons()
+            return make_empty_map()
         if not self._radius and number > 0:
             self.of_pass(0)  # the first pass sets the radius
         if number not in self._maps:
@@ -107,7 +107,7 @@ class CausticPhotons:
             if not self._radius:
                 neighbours = NEIGHBOURS_OF_ROOT * math.sqrt(self._emissions)
                 self._radius = _radius(first.inside(self._region), neighbours)
-            self._maps[number] = PhotonMap((first, second), self._radius * radius_of_pass(number))
+            self._maps[number] = PhotonMap((first, second), self._radius * shrink_radius(number))
         return self._maps[number]
 
     def _pilot(self, casters: Casters) -> NDArray[np.float64] | None:
@@ -125,7 +125,7 @@ class CausticPhotons:
         return np.asarray(TUNING.uniform_share * even + (1 - TUNING.uniform_share) * roots / roots.sum())
 
 
-def radius_of_pass(number: int) -> float:
+def shrink_radius(number: int) -> float:
     """Radius in a pass over that in the first, of as many photons: Knaus and Zwicker 2011, eq. 20."""
     squares = [(k + 2 / 3) / (k + 1) for k in range(1, number + 1)]
     return math.sqrt(math.prod(squares))

@@ -7,6 +7,7 @@ them, and do not appear in mirrors.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import drjit as dr
@@ -18,7 +19,7 @@ from lippmann.device.kernel_ops import linear_to_srgb, srgb_to_linear, to_numpy,
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, Color3f, Float, Ray3f, Spectrum
 from lippmann.rendering.transport.first_surface import PhysicalSurfaces
-from lippmann.rendering.transport.integrator import Integrator, RayCounts, read_choices
+from lippmann.rendering.transport.integrator import Integrator, RayCounts
 
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
@@ -44,7 +45,8 @@ class _InFront:
     """
 
     def __init__(self, behind: Integrator, built: BuiltScene) -> None:
-        self.depth, self.name, self.choices = behind.depth, behind.name, read_choices(behind)
+        self.depth, self.name = behind.depth, behind.name
+        self.choices: Mapping[str, object] = getattr(behind, "choices", {})
         self._behind = behind
         self._surfaces = PhysicalSurfaces(built) if len(built.mitsuba.shapes()) else None
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -68,12 +67,6 @@ class Integrator(Protocol):
     def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Spectrum, RayCounts]:
         """One sample of the radiance along ``ray`` (world space) per lane, and the rays traced for it."""
         ...
-
-
-def read_choices(integrator: Integrator) -> Mapping[str, object]:
-    """Choices and measured values of the integrator's prepared light, by option name; empty where none is prepared."""
-    choices: Mapping[str, object] = getattr(integrator, "choices", {})
-    return choices
 
 
 class ReusableIntegrator(Integrator, Protocol):

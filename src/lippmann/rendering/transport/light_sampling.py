@@ -248,7 +248,7 @@ def mis_weight(pdf: Float, *others: Float) -> Float:
     return dr.select(dr.isfinite(weight), weight, 0)
 
 
-def roulette_survival(throughput: Spectrum, eta: Float) -> Float:
+def choose_survival(throughput: Spectrum, eta: Float) -> Float:
     """Survival probability of a path in Russian roulette, from its throughput and the product of relative indices.
 
     The root of the unitless throughput, at most 0.95. With the throughput itself hardly any path survives in a room
@@ -258,7 +258,7 @@ def roulette_survival(throughput: Spectrum, eta: Float) -> Float:
     return survival
 
 
-def first_emitter_samples(sample: UInt32) -> tuple[UInt32, UInt32]:
+def count_first_samples(sample: UInt32) -> tuple[UInt32, UInt32]:
     """Count of emitter samples at the first non-specular surface of a pixel's path number ``sample``, and their start.
 
     The start is the index of the first emitter sample in the pixel's sequence of points. The paths of a pixel use this

@@ -89,7 +89,7 @@ class Arrival:
         self.half = half
 
     def joint(self, si: SurfaceInteraction3f, scattered: Color3f, wo: Vector3f, direction: Vector3f) -> JointLight:
-        """State after scattering to ``wo``, in world space ``direction``; ``scattered`` is the BSDF times the cosine."""
+        """State after scattering to ``wo``, in the world ``direction``; ``scattered`` is the BSDF times the cosine."""
         share = lambertian_share(si, self.albedo, scattered, wo)
         return JointLight(share, self.reach * dr.abs(dr.dot(si.n, direction)), dr.abs(wo.z))
 

@@ -39,9 +39,9 @@ from lippmann.rendering.transport.light_sampling import (
     DeltaEmitters,
     SceneLightSampler,
     ShadowRays,
-    first_emitter_samples,
+    choose_survival,
+    count_first_samples,
     mis_weight,
-    roulette_survival,
 )
 from lippmann.rendering.transport.light_vertices import Arrival
 from lippmann.rendering.transport.path_techniques import (
@@ -224,7 +224,7 @@ class PathIntegrator:
             states, throughput, continues, passes, radiance, shadow, eta, trail = self._leave(vertex, techniques, state)
 
             # ---- Russian roulette ----
-            survival = roulette_survival(throughput, eta)
+            survival = choose_survival(throughput, eta)
             at_risk = continues & (trail.depth >= TUNING.roulette_depth) & ~passes
             throughput = dr.select(at_risk, throughput * dr.rcp(survival), throughput)
             continues &= ~at_risk | (stream.next_1d(vertex.dimension + 3) < survival)
@@ -246,7 +246,7 @@ class PathIntegrator:
         radiance, shadow, eta, trail = state
         context, passes = mi.BSDFContext(), mi.Bool(False)
         if continues:
-            radiance, shadow = techniques.arrive(vertex, radiance, shadow)
+            radiance, shadow = techniques.add_light(vertex, radiance, shadow)
             samples, number = self._count_emitter_samples(stream.index, trail.all_specular)
             count, last_number = mi.Float(samples), number + samples - 1
             sampling = vertex.smooth & (number != last_number)
@@ -285,7 +285,7 @@ class PathIntegrator:
         samples, number = mi.UInt32(1), mi.UInt32(sample)
         if self._single_delta:
             return samples, number
-        at_start, start = first_emitter_samples(sample)
+        at_start, start = count_first_samples(sample)
         return dr.select(all_specular, at_start, samples), dr.select(all_specular, start, number)
 
     def emission(
@@ -345,9 +345,9 @@ class PathIntegrator:
         """A path's contribution after ``depth`` surfaces, clamped where it is indirect."""
         return self._clamp.apply(light, depth > 1)
 
-    def first_emitter_samples(self, sample: UInt32) -> UInt32:
+    def count_first_samples(self, sample: UInt32) -> UInt32:
         """Emitter samples at the first surface that is not purely specular, of a pixel's path number ``sample``."""
-        return mi.UInt32(1) if self._single_delta else first_emitter_samples(sample)[0]
+        return mi.UInt32(1) if self._single_delta else count_first_samples(sample)[0]
 
     def _reflect_emitter(
         self,
@@ -362,7 +362,7 @@ class PathIntegrator:
     ) -> tuple[Spectrum, UInt32]:
         """A path's contribution by one of ``samples`` emitter samples at a vertex, and the shadow rays traced."""
         light, tests = self.reflect(vertex.si, ds, emitted, value, pdf, active, samples, vertex.arrival)
-        light = techniques.sample_emitter(vertex, ds, light)
+        light = techniques.keep_emitter_sample(vertex, ds, light)
         return self._clamp.apply(vertex.throughput * light, vertex.depth > 0) / samples, tests
 
     def reflect(

@@ -63,11 +63,11 @@ class Technique:
         """The part of the ``emission`` at ``si`` that the technique leaves to the path."""
         return emission
 
-    def arrive(self, state: Any, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
+    def add_light(self, state: Any, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
         """Radiance and shadow rays of a path with the technique's contribution at a vertex added."""
         return radiance, shadow
 
-    def sample_emitter(self, state: Any, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
+    def keep_emitter_sample(self, state: Any, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
         """The part of an emitter sample's ``light`` that the technique leaves to the path."""
         return light
 
@@ -88,7 +88,7 @@ class Absorption(Technique):
     def attenuate(self, state: Color3f, si: SurfaceInteraction3f, throughput: Spectrum) -> Spectrum:
         return throughput * dr.exp(-state * dr.select(si.is_valid(), si.t, 0))
 
-    def arrive(self, state: Color3f, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
+    def add_light(self, state: Color3f, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
         vertex.is_in_clear = dr.max(state) == 0
         return radiance, shadow
 
@@ -137,7 +137,9 @@ class PhotonGathering(Technique):
         is_caustic = ~state.all_sharp & (state.sharp > 0) & (state.sharp <= MOST_EVENTS) & si.is_valid()
         return dr.select(is_caustic, emission * (1 - state.by_photons), emission)
 
-    def arrive(self, state: _Caustics, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
+    def add_light(
+        self, state: _Caustics, vertex: Vertex, radiance: Spectrum, shadow: UInt32
+    ) -> tuple[Spectrum, UInt32]:
         """Adds the photons around the vertex.
 
         The Lambertian part of the BSDF scatters all of them. The rest of the BSDF scatters one chosen photon that
@@ -164,7 +166,7 @@ class PhotonGathering(Technique):
         light = dr.select(lands, light, 0) + dr.select(wide, rest * gathered.flux, 0)
         return radiance + vertex.throughput * light, shadow
 
-    def sample_emitter(self, state: _Caustics, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
+    def keep_emitter_sample(self, state: _Caustics, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
         is_caustic = ~state.all_sharp & (state.sharp < MOST_EVENTS)
         is_caustic &= is_sharp(vertex.si.wi, vertex.si.to_local(ds.d), vertex.lobe)
         if self._environment is not None:
@@ -199,7 +201,7 @@ class WithoutSpecularLight(Technique):
     def keep_emission(self, state: Bool, depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
         return dr.select(state & ((depth > 0) | si.is_valid()), 0, emission)
 
-    def sample_emitter(self, state: Bool, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
+    def keep_emitter_sample(self, state: Bool, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
         if not self._has_delta_emitters:
             return light
         is_specular = state & ds.delta & is_sharp(vertex.si.wi, vertex.si.to_local(ds.d), vertex.lobe)
@@ -249,7 +251,7 @@ class LightVertexJoins(Technique):
         scattered_pdf = state.light.cosine * dr.inv_pi
         return self._vertices.weight(state.light, ds, weight, scattered_pdf, emitter_pdf, half, active)
 
-    def arrive(self, state: _Joint, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
+    def add_light(self, state: _Joint, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
         vertex.arrival = self._arrival(state, vertex)
         choice = vertex.stream.next_1d(vertex.dimension + 5)
         half = mi.UInt32(vertex.stream.half)
@@ -303,16 +305,16 @@ class Techniques:
             emission = each.keep_emission(state, depth, si, emission)
         return emission
 
-    def arrive(self, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
+    def add_light(self, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
         for name in dict.fromkeys(name for each in self._each for name in each.reads):
             getattr(vertex, name)
         for each, state in zip(self._each, vertex.states, strict=True):
-            radiance, shadow = each.arrive(state, vertex, radiance, shadow)
+            radiance, shadow = each.add_light(state, vertex, radiance, shadow)
         return radiance, shadow
 
-    def sample_emitter(self, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
+    def keep_emitter_sample(self, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
         for each, state in zip(self._each, vertex.states, strict=True):
-            light = each.sample_emitter(state, vertex, ds, light)
+            light = each.keep_emitter_sample(state, vertex, ds, light)
         return light
 
     def scatter(self, vertex: Vertex, scattering: Scattering) -> list[Any]:

@@ -138,7 +138,7 @@ def _trace_chain(
     light, throughput = mi.Spectrum(0), mi.Spectrum(1)
     rays = dr.select(active, mi.UInt32(1), mi.UInt32(0))
     shadow = mi.UInt32(0) if len(integrator.delta_emitters) > 0 else None
-    at_first = integrator.first_emitter_samples(path)
+    at_first = integrator.count_first_samples(path)
     states = techniques.begin()
 
     pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)

@@ -34,8 +34,8 @@ from lippmann.rendering.transport.light_sampling import (
     MAX_CROSSINGS,
     LightSampler,
     SceneLightSampler,
+    choose_survival,
     mis_weight,
-    roulette_survival,
 )
 from lippmann.rendering.transport.path_vertex import DIMENSIONS
 from lippmann.rendering.transport.tuning import TUNING
@@ -196,7 +196,7 @@ class VolumePathIntegrator:
             continues &= (crossings < MAX_CROSSINGS) & (event < MAX_COLLISIONS)
 
             # ---- Russian roulette ----
-            survival = roulette_survival(throughput, eta)
+            survival = choose_survival(throughput, eta)
             at_risk = continues & bounces & (depth >= TUNING.roulette_depth)
             throughput = dr.select(at_risk, throughput * dr.rcp(survival), throughput)
             continues &= ~at_risk | (stream.next_1d(dimension + 6) < survival)
