@@ -29,10 +29,10 @@ def gpu(monkeypatch):
 
 
 @pytest.mark.parametrize("effort", ["fast", "high"])
-@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("rotated", [False, True])
 def test_buffers_hold_what_arrays_hold(gpu, effort, rotated):
     color, albedo, normal = pictures()
-    options = {"clean_guides": True, "effort": effort, "turned": rotated, "threads": 1}
+    options = {"clean_guides": True, "effort": effort, "rotated": rotated, "threads": 1}
     by_arrays = denoise(color, albedo, normal, **options)
     gpu(open_image_denoise.DEVICE_TYPE_CPU)
     by_buffers = denoise(color, albedo, normal, **options)
