@@ -45,7 +45,7 @@ def test_the_rectangle_of_all_surfaces_is_shown_and_they_are_cleaned(calls):
     for part, whole in zip(shown, (color, albedo, normal), strict=True):
         # It begins where the network's steps do.
         np.testing.assert_array_equal(part, whole[48 : 91 + MARGIN, 16 : 101 + MARGIN])
-    assert options == {"effort": "fast", "turned": True, "threads": 1, "clean_guides": True}
+    assert options == {"effort": "fast", "rotated": True, "threads": 1, "clean_guides": True}
 
 
 def test_the_network_is_shown_what_is_open_and_what_stands_around_it(calls):

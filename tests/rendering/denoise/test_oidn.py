@@ -106,7 +106,7 @@ def test_a_turned_window_is_what_the_whole_shows_there(width):
     """Windows begin with a step of the network; where the picture ends must not matter."""
     color, albedo, normal = known(64, width)
     layers = noisy(color), albedo, normal
-    options = {"clean_guides": True, "effort": "fast", "turned": True}
+    options = {"clean_guides": True, "effort": "fast", "rotated": True}
     whole = denoise(*layers, **options)
     window = denoise(*(layer[:, :192] for layer in layers), **options)
     # What lies 87 pixels beyond is seen by none.
