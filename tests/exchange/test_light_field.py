@@ -15,10 +15,9 @@ from lippmann.exchange.light_field import (
     decode_weights,
     encode_weights,
     light_field_of,
-    view_shape,
 )
 from lippmann.image import IntegralImage
-from lippmann.image.views import view_grid
+from lippmann.image.views import view_grid, view_shape
 from lippmann.viewing.replay import eye_of_offset
 
 TYPES = st.sampled_from(["uint8", "uint16", "float16", "float32"])

@@ -24,10 +24,10 @@ from lippmann.exchange.light_field import (
     check_shape,
     decode_weights,
     encode_weights,
-    view_shape,
 )
 from lippmann.exchange.metadata_text import TEXT_KEY, from_note, to_note
 from lippmann.image.read import open_file
+from lippmann.image.views import view_shape
 from lippmann.runtime.atomic_write import replacing
 
 LAYOUT = "eslf"

@@ -12,11 +12,12 @@ from typing import cast
 from lippmann.display import Display
 from lippmann.errors import OutputError, PictureError, UsageError
 from lippmann.exchange.hci_parameters import NAME as HCI_PARAMETERS
-from lippmann.exchange.light_field import DEPTH, LightField, light_field_of, view_shape
+from lippmann.exchange.light_field import DEPTH, LightField, light_field_of
 from lippmann.exchange.registry import EXPORTS, LAYOUTS, Export, Layout
 from lippmann.exchange.view_folder import is_composable
 from lippmann.image import IntegralImage, compose
 from lippmann.image.stored_values import Stored
+from lippmann.image.views import view_shape
 from lippmann.options.option import checked
 from lippmann.progress import ProgressCallback, silent
 from lippmann.runtime.plugins import Plugin, function_of

@@ -25,7 +25,7 @@ from lippmann.exchange.cameras import Cameras
 from lippmann.image import IntegralImage, Metadata, Provenance
 from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.stored_values import Stored, Values
-from lippmann.image.views import view_grid
+from lippmann.image.views import view_grid, view_shape
 from lippmann.runtime.machine import check_input
 
 #: Cameras down and across, rows and columns of a view.
@@ -223,12 +223,6 @@ def check_rectangular(display: Display, layout: str) -> None:
     if not view_grid(display).exact:
         what = f"the lenses of the display {display.name} cover parts of pixels"
         raise PictureError(what, rule=f"{layout} takes lenses that cover whole pixels", fix=fix)
-
-
-def view_shape(display: Display) -> Shape:
-    """Shape ``(t, s, v, u)`` of the light field of a display's pictures."""
-    rows, columns, ny, nx = Permutation(display).shape
-    return (1, nx, ny, columns) if display.lens_array.layout == "lenticular" else (ny, nx, rows, columns)
 
 
 def _check_fit(shape: Shape, display: Display, where: str) -> None:

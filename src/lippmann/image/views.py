@@ -97,6 +97,11 @@ def exact_view_shape(display: Display) -> tuple[int, int, int, int]:
             rule="its views are resampled and cannot be put together again",
             fix="use micro-images",
         )
+    return view_shape(display)
+
+
+def view_shape(display: Display) -> tuple[int, int, int, int]:
+    """Shape ``(t, s, v, u)`` of the light field of a display's pictures, whose lenses cover whole pixels."""
     rows, columns, ny, nx = Permutation(display).shape
     return (1, nx, ny, columns) if display.lens_array.layout == "lenticular" else (ny, nx, rows, columns)
 

@@ -67,6 +67,12 @@ def stored_as(name: FormatName, path: Path, bits: int | None, source: Stored) ->
     return depths[bits]
 
 
+def check_finite(pixels: FloatArray, path: Path) -> None:
+    """Raise :class:`PictureError` if a value of a picture for the file ``path`` is not finite."""
+    if not np.isfinite(pixels).all():
+        raise PictureError("the picture holds values that are not finite", where=str(path))
+
+
 def can_be_banded(name: FormatName) -> bool:
     """Whether files of this format can be written without the whole picture in memory."""
     return name in ("tiff", "zarr")
@@ -157,8 +163,7 @@ def write_plain_picture(
         If a value is not finite.
     """
     target, (height, width) = format_for(path, bits), pixels.shape[:2]
-    if not np.isfinite(pixels).all():
-        raise PictureError("the picture holds values that are not finite", where=str(path))
+    check_finite(pixels, path)
     _write(path, target, lambda first, last: pixels[first:last], (width, height), transfer)
 
 

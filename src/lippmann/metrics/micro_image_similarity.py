@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.metrics.structural_similarity import K1, K2
+from lippmann.metrics.structural_similarity import similarity_of_moments
 
 Real = NDArray[np.float64]
 
@@ -61,11 +61,7 @@ class MicroImageSimilarity:
     def values(self) -> Real:
         """``(lens_rows, lens_cols)``: SSIM in [-1, 1], NaN where a lens has no pixel."""
         counts = np.maximum(self._counts, 1.0)[:, None]
-        mean_a, mean_b, squares, products = self._sums / counts
-        both, alike = mean_a * mean_a + mean_b * mean_b, 2 * mean_a * mean_b
-        similarity = ((alike + K1 * K1) * (2 * products - alike + K2 * K2)) / (
-            (both + K1 * K1) * (squares - both + K2 * K2)
-        )
+        similarity = similarity_of_moments(*(self._sums / counts))
         weighted = (similarity.mean(axis=1) * self._counts).reshape(-1, self._lenses).sum(axis=0)
         pixels = self._counts.reshape(-1, self._lenses).sum(axis=0)
         by_lens = np.full(self._lenses, np.nan)

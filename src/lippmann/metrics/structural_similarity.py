@@ -68,13 +68,19 @@ def similarity_sum(
         centred = mask[_centres(mask, windows)]
         weights = np.where(centred, _average_windows(mask.astype(np.float64), windows), 1.0)[..., None]
         mean_a, mean_b, squares, products = (each / weights for each in (mean_a, mean_b, squares, products))
-    # Both variances are needed as a sum only.
-    both, alike = mean_a * mean_a + mean_b * mean_b, 2 * mean_a * mean_b
-    similarity = ((alike + K1 * K1) * (2 * products - alike + K2 * K2)) / (
-        (both + K1 * K1) * (squares - both + K2 * K2)
-    )
+    similarity = similarity_of_moments(mean_a, mean_b, squares, products)
     values = similarity if centred is None else similarity[centred]
     return float(values.sum()), values.size
+
+
+def similarity_of_moments(mean_a: Real, mean_b: Real, squares: Real, products: Real) -> Real:
+    """SSIM from the means of a and b, of a^2 + b^2 and of a b over a window; Wang et al. 2004, eq. 13."""
+    # Both variances are needed as a sum only.
+    both, alike = mean_a * mean_a + mean_b * mean_b, 2 * mean_a * mean_b
+    similarity: Real = ((alike + K1 * K1) * (2 * products - alike + K2 * K2)) / (
+        (both + K1 * K1) * (squares - both + K2 * K2)
+    )
+    return similarity
 
 
 def _average_windows(values: Real, windows: tuple[Real, Real]) -> Real:

@@ -9,12 +9,12 @@ import numpy as np
 
 from lippmann.codecs.tiff import write_tiff_pages
 from lippmann.color.transfer import Transfer
-from lippmann.errors import OutputError, PictureError
+from lippmann.errors import OutputError
 from lippmann.image.encoding import converted_values
 from lippmann.image.integral_image import IntegralImage
 from lippmann.image.stored_values import FloatArray
 from lippmann.image.streamed import LargePicture
-from lippmann.image.write import format_for, write_plain_picture
+from lippmann.image.write import check_finite, format_for, write_plain_picture
 from lippmann.options.option import checked
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.atomic_write import check_folder_writable, check_writable, replacing, replacing_folder
@@ -134,8 +134,7 @@ def _write_folder(
 
 def _finite(pictures: Iterable[FloatArray], path: Path) -> Iterator[FloatArray]:
     for picture in pictures:
-        if not np.isfinite(picture).all():
-            raise PictureError("the picture holds values that are not finite", where=str(path))
+        check_finite(picture, path)
         yield picture
 
 

@@ -86,9 +86,7 @@ def preview(
     size = check_size(parse.size(pixels or "512x512", "--pixels"), "pixels")
     at = eye_before(target, None if eye is None else triple(eye, "--eye"))
     with console.progress() as progress:
-        started = time.perf_counter()
-        loaded = source.load()
-        load_seconds = time.perf_counter() - started
+        loaded, load_seconds = source.load_timed()
         if plain:
             from lippmann.rendering.preview import render_preview
 

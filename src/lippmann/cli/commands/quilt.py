@@ -138,9 +138,7 @@ def render(
         render_frames(source, target, request, moving, files, console, form=QuiltForm(quilt))
         return
     with console.progress() as progress:
-        started = time.perf_counter()
-        loaded = source.load()
-        load_seconds = time.perf_counter() - started
+        loaded, load_seconds = source.load_timed()
         layout = quilt.layout
         frame = render_quilt(
             loaded, target, (layout.columns, layout.rows), (quilt.width, quilt.height), request, progress

@@ -168,9 +168,7 @@ def _render_whole(
     if maps is not None:
         check_folder_writable(maps)
     with console.progress() as progress:
-        started = time.perf_counter()
-        scene = source.load()
-        load_seconds = time.perf_counter() - started
+        scene, load_seconds = source.load_timed()
         image = render_one(scene, display, request, progress)
         progress(Progress("write", 0, 1))
         writing = time.perf_counter()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -44,6 +45,11 @@ class SceneSource:
         from lippmann.scene.readers.load import read_scene
 
         return read_scene(self.name, self.asked, self.light, allow_outside=self.access.allow_outside)
+
+    def load_timed(self) -> tuple[Scene, float]:
+        """The scene, and the seconds that loading it took; errors as :meth:`load`."""
+        started = time.perf_counter()
+        return self.load(), time.perf_counter() - started
 
 
 def print_of(printed: PrintOptions) -> Print:

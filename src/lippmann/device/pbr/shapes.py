@@ -31,6 +31,7 @@ from lippmann.device.pbr.textures import (
 from lippmann.device.types import Float, Shape
 from lippmann.errors import SceneError
 from lippmann.runtime.machine import amount_in_words
+from lippmann.scene.parsing.normals import sum_face_normals
 from lippmann.scene.values.description import FloatArray, IndexArray, Matrix, Mesh, Round
 
 Number = TypeVar("Number", bound=np.generic)
@@ -338,11 +339,7 @@ def _unit_normals(piece: Piece) -> NDArray[np.float64]:
 
 def _face_normals(positions: FloatArray, faces: IndexArray) -> NDArray[np.float64]:
     """Area-weighted normal per vertex; +z where a vertex has no face of area."""
-    corners = positions[faces].astype(np.float64)
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sums = np.zeros((len(positions), 3))
-    for corner in range(3):
-        np.add.at(sums, faces[:, corner], cross)
+    sums = sum_face_normals(positions, faces)
     sums[np.linalg.norm(sums, axis=1) == 0] = (0, 0, 1)
     return sums
 

@@ -19,6 +19,7 @@ from lippmann.device.whitted.clip_planes import Clipping
 from lippmann.device.whitted.embree_tracer import EngineTracer, triangle_order
 from lippmann.device.whitted.intersections import Row, fetch, xyz
 from lippmann.device.whitted.shape_table import Column, Kind, make_shape_table
+from lippmann.scene.parsing.normals import unit_face_normals
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.values.whitted_shapes import Numbers
 
@@ -88,9 +89,7 @@ class Geometry:
             return
         batch, order = scene.triangles, self._order.order
         corners = batch.positions[order]
-        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        length = np.linalg.norm(cross, axis=1, keepdims=True)
-        normal = np.divide(cross, length, out=np.zeros_like(cross), where=length > 0)
+        normal = unit_face_normals(corners)
         offset = (normal * corners[:, 0]).sum(axis=1)
         rows = np.zeros((len(order), 8))
         rows[:, :3], rows[:, 3] = normal, offset

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide, to_numpy
-from lippmann.device.types import Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.memory_model import LAYERS as BYTES
 from lippmann.rendering.film.memory_model import Plan, Tile, cut_wavefronts
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.rendering.transport.surface_property import transform_vector
 from lippmann.scene.matrices import normal_matrix
 
 if TYPE_CHECKING:
@@ -98,20 +98,15 @@ def _trace_tile(
     row += dr.opaque(mi.UInt32, tile.first_row)
     ray = source.rays(column, row, mi.UInt32(1), mi.Point2f(0.5))  # the sub-pixel in the middle
     surface = surfaces.first_hit(ray)
-    position = to_frame(display_from_world, surface.p) + mi.Vector3f(*display_from_world[:3, 3].tolist())
+    position = transform_vector(display_from_world, surface.p) + mi.Vector3f(*display_from_world[:3, 3].tolist())
     position = dr.select(surface.hit, position, dr.nan)
+    normal = transform_vector(normal_matrix(display_from_world), surface.n)
     values = {
         "depth": dr.select(surface.hit, position.z, -dr.inf),
-        "normal": dr.select(surface.hit, dr.normalize(to_frame(normal_matrix(display_from_world), surface.n)), 0),
+        "normal": dr.select(surface.hit, dr.normalize(normal), 0),
         "albedo": surface.albedo,
         "shape": dr.select(surface.hit, mi.Float(surface.shape), -1),
         "position": position,
     }
     dr.eval(values)
     return {name: to_numpy(value, lanes) for name, value in values.items()}
-
-
-def to_frame(matrix: NDArray[np.float64], vector: Vector3f) -> Vector3f:
-    """Rotate and scale a vector on the device by the linear part ``(3, 3)`` of ``matrix``."""
-    rows = matrix[:3, :3].tolist()
-    return mi.Vector3f(*(row[0] * vector.x + row[1] * vector.y + row[2] * vector.z for row in rows))

@@ -42,14 +42,15 @@ class SurfaceIntegrator:
         if self.name == "albedo":
             value = mi.Color3f(si.bsdf(ray).eval_diffuse_reflectance(si, hit))
         elif self.name == "normal":
-            value = mi.Color3f(dr.normalize(_linear(normal_matrix(self._matrix), si.sh_frame.n)))
+            value = mi.Color3f(dr.normalize(transform_vector(normal_matrix(self._matrix), si.sh_frame.n)))
         else:
-            point = _linear(self._matrix, si.p) + mi.Vector3f(self._matrix[:3, 3].tolist())
+            point = transform_vector(self._matrix, si.p) + mi.Vector3f(self._matrix[:3, 3].tolist())
             value = mi.Color3f(point) if self.name == "position" else mi.Color3f(point.z)
         none = dr.zeros(mi.UInt32, dr.width(si.t))
         return dr.select(hit, value, mi.Color3f(0)), RayCounts(none, none)
 
 
-def _linear(matrix: NDArray[np.float64], vector: Vector3f) -> Vector3f:
+def transform_vector(matrix: NDArray[np.float64], vector: Vector3f) -> Vector3f:
+    """Transform a vector on the device by the linear part ``(3, 3)`` of ``matrix``."""
     rows = matrix[:3, :3].tolist()
     return mi.Vector3f(*(row[0] * vector.x + row[1] * vector.y + row[2] * vector.z for row in rows))

@@ -29,6 +29,4 @@ def make() -> ClassicScene:
     pot, matrix = tessellate(LAYOUT.subdivisions), pot_from_newell()[:3, :3]
     normals = pot.normals @ matrix.T / LAYOUT.unit
     builder.mesh(pot.positions @ matrix.T, pot.faces, builder.material(GLAZE), normals=normals)
-    for light in LIGHTS:
-        builder.light(light)
-    return builder.build(background=SKY, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))
+    return builder.build(LIGHTS, background=SKY, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.scene.bundled.stage import Stage
+from lippmann.scene.bundled.stage import Stage, level_rectangle
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.values.whitted_surfaces import Background, ClassicLight, ClassicMaterial
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
@@ -120,9 +120,7 @@ def wheel(layout: Layout = LAYOUT) -> tuple[Points, Faces]:
 def make() -> ClassicScene:
     """Return the gears scene."""
     builder = ClassicSceneBuilder(NAME, handedness="right")
-    (x0, z0), (x1, z1) = LAYOUT.floor
-    floor = [(x0, 0, z0), (x0, 0, z1), (x1, 0, z1), (x1, 0, z0)]
-    builder.mesh(floor, [(0, 1, 2), (0, 2, 3)], builder.material(FLOOR))
+    builder.mesh(*level_rectangle(*LAYOUT.floor), builder.material(FLOOR))
 
     positions, faces = wheel()
     c, s = np.cos(np.pi / LAYOUT.teeth), np.sin(np.pi / LAYOUT.teeth)
@@ -136,9 +134,7 @@ def make() -> ClassicScene:
         # Neighbours in a layer mesh tooth to gap; the clear wheels form a chequered lattice in depth as well.
         shape = positions if (row + column) % 2 == 0 else half_a_tooth_on
         builder.mesh(shape + center, faces, builder.material(_paint(layer, row, column)))
-    for light in LIGHTS:
-        builder.light(light)
-    return builder.build(background=SKY, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))
+    return builder.build(LIGHTS, background=SKY, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))
 
 
 def _paint(layer: int, row: int, column: int) -> ClassicMaterial:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.scene.bundled import textures
-from lippmann.scene.bundled.stage import Stage
+from lippmann.scene.bundled.stage import Stage, level_rectangle
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.values.whitted_surfaces import (
     Background,
@@ -82,16 +82,14 @@ def make() -> ClassicScene:
     toward_viewer = STAGE.rotation[:, 2]
     behind = np.array(STAGE.target) - LAYOUT.wall * toward_viewer
     builder.planes(behind, toward_viewer, builder.material(WALL))
-    (x0, z0), (x1, z1) = LAYOUT.shelf
+    (x0, _), (x1, z1) = LAYOUT.shelf
     shelf = builder.material(SHELF)
-    builder.mesh([(x0, 0, z0), (x0, 0, z1), (x1, 0, z1), (x1, 0, z0)], [(0, 1, 2), (0, 2, 3)], shelf)
+    builder.mesh(*level_rectangle(*LAYOUT.shelf), shelf)
     # A little below the top: where two surfaces touch along a line, rounding would choose between their colours.
     builder.tubes((x0, -0.081, z1), (x1, -0.081, z1), 0.08, shelf)
     _add_back_row(builder)
     _add_front_row(builder)
-    for light in LIGHTS:
-        builder.light(light)
-    return builder.build(background=BACK_COLOR, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))
+    return builder.build(LIGHTS, background=BACK_COLOR, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))
 
 
 def _add_back_row(builder: ClassicSceneBuilder) -> None:

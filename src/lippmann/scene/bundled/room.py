@@ -91,9 +91,7 @@ def make() -> ClassicScene:
     _add_pictures(builder)
     _add_table(builder)
     _add_stools(builder)
-    for light in LIGHTS:
-        builder.light(light)
-    return builder.build(camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))
+    return builder.build(LIGHTS, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))
 
 
 def _add_shell(builder: ClassicSceneBuilder) -> None:

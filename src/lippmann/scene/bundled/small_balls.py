@@ -90,6 +90,4 @@ def make() -> ClassicScene:
     centers, radii = flake()
     builder.planes((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), builder.material(GROUND))
     builder.spheres(centers, radii, builder.material(MIRROR))
-    for light in LIGHTS:
-        builder.light(light)
-    return builder.build(background=SKY, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))
+    return builder.build(LIGHTS, background=SKY, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))

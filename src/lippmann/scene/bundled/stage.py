@@ -97,3 +97,11 @@ class Stage:
 def _vector(numbers: NDArray[np.float64]) -> Point:
     x, y, z = (float(number) for number in numbers)
     return x, y, z
+
+
+def level_rectangle(
+    first: tuple[float, float], last: tuple[float, float]
+) -> tuple[list[tuple[float, float, float]], list[tuple[int, int, int]]]:
+    """Corners and triangles, facing up, of a rectangle at y = 0 between two opposite corners (x, z)."""
+    (x0, z0), (x1, z1) = first, last
+    return [(x0, 0, z0), (x0, 0, z1), (x1, 0, z1), (x1, 0, z0)], [(0, 1, 2), (0, 2, 3)]

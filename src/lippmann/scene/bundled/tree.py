@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.scene.bundled.stage import Stage
+from lippmann.scene.bundled.stage import Stage, level_rectangle
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.values.whitted_surfaces import Background, ClassicLight, ClassicMaterial
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
@@ -106,13 +106,9 @@ def grow(layout: Layout = LAYOUT) -> Branches:
 def make() -> ClassicScene:
     """Return the tree on its lawn."""
     builder = ClassicSceneBuilder(NAME, handedness="right")
-    (x0, z0), (x1, z1) = LAYOUT.lawn
-    lawn = [(x0, 0, z0), (x0, 0, z1), (x1, 0, z1), (x1, 0, z0)]
-    builder.mesh(lawn, [(0, 1, 2), (0, 2, 3)], builder.material(LAWN))
+    builder.mesh(*level_rectangle(*LAYOUT.lawn), builder.material(LAWN))
     bark = builder.material(BARK)
     tree = grow()
     builder.tubes(tree.base, tree.apex, tree.base_radius, bark, apex_radius=tree.apex_radius)
     builder.spheres(tree.apex, tree.apex_radius, bark)
-    for light in LIGHTS:
-        builder.light(light)
-    return builder.build(background=SKY, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))
+    return builder.build(LIGHTS, background=SKY, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))

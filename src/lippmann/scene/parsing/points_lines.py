@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.scene.parsing.round_meshes import join_rings, repeat_triangles, subdivide_sphere
 from lippmann.scene.values.description import FloatArray, IndexArray, Material, Mesh
 
 #: Radii of points and of lines over the diagonal of the scene's box: of 64 lenses, one shows the width of a line.
@@ -162,15 +163,10 @@ def rods(points: Points, elements: Integers, width: float | FloatArray) -> Solid
     around = np.cos(angles)[:, None] * first[:, None] + np.sin(angles)[:, None] * second[:, None]
     normals: FloatArray = np.concatenate([around, around], axis=1).reshape(-1, 3).astype(np.float32)
     sources = np.repeat(elements.ravel(), sides)
-    here = np.arange(sides)
-    ahead = (here + 1) % sides
-    triangles = np.concatenate(
-        [np.stack([here, ahead, ahead + sides], axis=1), np.stack([here, ahead + sides, here + sides], axis=1)]
-    )
     return Solids(
         points.astype(np.float32)[sources] + _radii(width, sources) * normals,
         normals,
-        _repeat(triangles, len(elements), 2 * sides),
+        _repeat(join_rings(sides), len(elements), 2 * sides),
         sources,
     )
 
@@ -181,23 +177,11 @@ def _radii(width: float | FloatArray, sources: Integers) -> FloatArray:
 
 
 def _repeat(triangles: Integers, count: int, step: int) -> IndexArray:
-    """``triangles`` of ``step`` vertices, ``count`` times one after the other."""
-    faces: IndexArray = (triangles + step * np.arange(count)[:, None, None]).reshape(-1, 3).astype(np.uint32)
-    return faces
+    return repeat_triangles(triangles, count, step).astype(np.uint32)
 
 
 def _ball(detail: int) -> tuple[Points, Integers]:
     """Unit vectors and counter-clockwise triangles of an octahedron, cut into four ``detail`` - 1 times."""
     corners = np.concatenate([np.eye(3), -np.eye(3)])
     triangles = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
-    for _ in range(detail - 1):
-        ends = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        edges, place = np.unique(ends, axis=0, return_inverse=True)
-        middles = corners[edges].sum(axis=1)
-        ab, bc, ca = (len(corners) + place.reshape(-1, 3)).T
-        a, b, c = triangles.T
-        corners = np.concatenate([corners, middles / np.linalg.norm(middles, axis=1, keepdims=True)])
-        triangles = np.concatenate(
-            [np.stack(three, axis=1) for three in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
-        )
-    return corners, triangles
+    return subdivide_sphere(corners, triangles, detail - 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from typing import TypeVar
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.normals import unit_face_normals
 from lippmann.scene.values.whitted_scene import ClassicCamera, ClassicScene, Handedness, Rules
 from lippmann.scene.values.whitted_shapes import (
     Batch,
@@ -196,6 +197,7 @@ class ClassicSceneBuilder:
 
     def build(
         self,
+        lights: Iterable[ClassicLight] = (),
         *,
         camera: ClassicCamera | None = None,
         resolution: tuple[int, int] = (512, 512),
@@ -204,7 +206,7 @@ class ClassicSceneBuilder:
         ambient_occlusion: AmbientOcclusion | None = None,
         shading: Shading | None = None,
     ) -> ClassicScene:
-        """The scene, with these fields of :class:`ClassicScene`; None takes the field's default."""
+        """The scene, with further ``lights`` and fields of :class:`ClassicScene`; None takes the field's default."""
         return ClassicScene(
             name=self.name,
             rules=self.rules,
@@ -219,7 +221,7 @@ class ClassicSceneBuilder:
             clip_groups=tuple(self._clip_groups),
             materials=tuple(self._materials),
             images=tuple(self._images),
-            lights=tuple(self.lights),
+            lights=(*self.lights, *lights),
             notes=tuple(self.notes),
             camera=camera or ClassicCamera(),
             resolution=resolution,
@@ -261,7 +263,4 @@ class ClassicSceneBuilder:
 
 def _geometric_normals(corners: Numbers) -> Numbers:
     """Unit normals ``(n, 3, 3)``, the same at all corners; zero for triangles without an area."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
-    return np.repeat(normals[:, None, :], 3, axis=1)
+    return np.repeat(unit_face_normals(corners)[:, None, :], 3, axis=1)

@@ -12,6 +12,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.scene.parsing.round_meshes import join_rings, repeat_triangles, subdivide_sphere
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.values.whitted_shapes import Batch, Numbers, Spheres, Tubes
 from lippmann.scene.values.whitted_surfaces import ClassicTexture
@@ -107,8 +108,7 @@ def _uvs(texture: ClassicTexture, positions: Numbers) -> Numbers | None:
 def _merge_copies(positions: Numbers, faces: Indices) -> tuple[Numbers, Indices]:
     """One mesh of ``n`` copies ``(n, k, 3)`` of a shape with the same faces."""
     count, corners = positions.shape[:2]
-    all_faces = faces[None] + (np.arange(count) * corners)[:, None, None]
-    return positions.reshape(-1, 3), all_faces.reshape(-1, 3)
+    return positions.reshape(-1, 3), repeat_triangles(faces, count, corners)
 
 
 def _spheres(scene: ClassicScene, rows: Indices) -> Arrays:
@@ -140,16 +140,7 @@ def icosphere(level: int) -> tuple[Numbers, Indices]:
     ).sum(axis=1)
     faces[outward < 0] = faces[outward < 0][:, ::-1]
     points /= np.linalg.norm(points, axis=1, keepdims=True)
-    for _ in range(level):
-        edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        unique, number = np.unique(edges, axis=0, return_inverse=True)
-        middles = points[unique].sum(axis=1)
-        middle = number.reshape(-1, 3) + len(points)
-        points = np.concatenate([points, middles / np.linalg.norm(middles, axis=1, keepdims=True)])
-        a, b, c = faces.T
-        ab, bc, ca = middle.T
-        faces = np.concatenate([np.stack(f, axis=1) for f in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
-    return points, faces
+    return subdivide_sphere(points, faces, level)
 
 
 def _sides(count: int) -> int:
@@ -171,13 +162,6 @@ def _circle(axes: Numbers, sides: int) -> Numbers:
     return u[:, None] * np.cos(angle)[:, None] + v[:, None] * np.sin(angle)[:, None]
 
 
-def _band(sides: int) -> Indices:
-    """Faces between two circles of points, the first ones first."""
-    i = np.arange(sides)
-    j = (i + 1) % sides
-    return np.concatenate([np.stack([i, j, j + sides], axis=1), np.stack([i, j + sides, i + sides], axis=1)])
-
-
 def _tubes(batch: Tubes, rows: Indices, sides: int) -> Arrays:
     base, apex = batch.base[rows], batch.apex[rows]
     low, high = batch.base_radius[rows], batch.apex_radius[rows]
@@ -186,7 +170,7 @@ def _tubes(batch: Tubes, rows: Indices, sides: int) -> Arrays:
     axes = axes / length[:, None]
     around = _circle(axes, sides)
     rings = [base[:, None] + around * low[:, None, None], apex[:, None] + around * high[:, None, None]]
-    positions, faces = _merge_copies(np.concatenate(rings, axis=1), _band(sides))
+    positions, faces = _merge_copies(np.concatenate(rings, axis=1), join_rings(sides))
     slope = ((high - low) / length)[:, None, None]
     normal = around - axes[:, None] * slope
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
@@ -215,7 +199,7 @@ def _rings(scene: ClassicScene, rows: Indices) -> Arrays:
     around = _circle(batch.normals[rows], sides)
     center = batch.centers[rows, None]
     circles = [center + around * radius[rows, None, None] for radius in (batch.outer, batch.inner)]
-    positions, faces = _merge_copies(np.concatenate(circles, axis=1), _band(sides))
+    positions, faces = _merge_copies(np.concatenate(circles, axis=1), join_rings(sides))
     return positions, faces, None
 
 

@@ -15,6 +15,7 @@ from lippmann.errors import SceneError
 from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import read_bytes
+from lippmann.scene.parsing.round_meshes import join_rings
 from lippmann.scene.values.description import Instance, Material, Matrix, Mesh, SceneDescription
 
 #: Radii of balls over van der Waals radii, and of sticks in angstroms.
@@ -154,11 +155,7 @@ def _ball(name: str, detail: int, material: int) -> Mesh:
 def _stick(name: str, material: int) -> Mesh:
     angles = np.arange(_SIDES) * (2.0 * np.pi / _SIDES)
     ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(_SIDES)], axis=1)
-    here = np.arange(_SIDES)
-    after = (here + 1) % _SIDES
-    lower = np.stack([here, after, after + _SIDES], axis=1)
-    upper = np.stack([here, after + _SIDES, here + _SIDES], axis=1)
     points = np.concatenate([ring, ring + np.array([0.0, 0.0, 1.0])]).astype(np.float32)
-    faces = np.concatenate([lower, upper]).astype(np.uint32)
+    faces = join_rings(_SIDES).astype(np.uint32)
     normals = np.concatenate([ring, ring]).astype(np.float32)
     return Mesh(name, points, faces, material, normals=normals, stands_for="rod")
