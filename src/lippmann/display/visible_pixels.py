@@ -20,6 +20,7 @@ from lippmann.display.panel import PixelWindow
 Vector = tuple[float, float, float]
 Indices = NDArray[np.uint32]
 Floats = NDArray[np.float32]
+Reals = NDArray[np.float64]
 
 #: Lenses wider than this many pixels of the picture are seen as blocks, each of one colour.
 _BLOCK_WIDTH = 1.5
@@ -71,9 +72,21 @@ class PixelSet:
 
     def arrange_denoised(self, picture: Floats) -> Floats:
         """The picture ``(height, width, 3)`` from a denoised one of :meth:`arrange_for_denoiser`."""
-        values, is_seen = np.zeros((len(self.column), 3), np.float32), self.places >= 0
-        values[self.places[is_seen]] = picture[is_seen]
+        values, is_visible = np.zeros((len(self.column), 3), np.float32), self.places >= 0
+        values[self.places[is_visible]] = picture[is_visible]
         return self.arrange(values)
+
+
+def lens_plane_places(display: Display, size: tuple[int, int]) -> tuple[Reals, Reals, Reals, Reals]:
+    """Points (x, y) of the lens plane (mm) at the pixels of a picture of this width and height, and their lenses (i, j).
+
+    All ``(height, width)``; the picture is the panel's rectangle.
+    """
+    width, height = size
+    u = (np.arange(width) + 0.5) * (display.panel.width / width)
+    v = (np.arange(height) + 0.5) * (display.panel.height / height)
+    x, y = display.panel_point(*np.meshgrid(u, v))
+    return x, y, *display.lattice.lens_at(x, y, NUMPY)
 
 
 class EyeMap:
@@ -91,12 +104,8 @@ class EyeMap:
 
     def __init__(self, display: Display, size: tuple[int, int], *, subpixels: bool) -> None:
         self.display, self.size, self.subpixels = display, size, subpixels
-        width, height = size
         panel = display.panel
-        u = (np.arange(width) + 0.5) * (panel.width / width)
-        v = (np.arange(height) + 0.5) * (panel.height / height)
-        x, y = display.panel_point(*np.meshgrid(u, v))
-        i, j = display.lattice.lens_at(x, y, NUMPY)
+        x, y, i, j = lens_plane_places(display, size)
         self._center_x, self._center_y = display.lattice.center(i, j, x, y, NUMPY)
         self._lens = (np.rint(j - j.min()).astype(np.int64), np.rint(i - i.min()).astype(np.int64))
         channels = 3 if subpixels else 1

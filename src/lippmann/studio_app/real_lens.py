@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import NUMPY, Display
-from lippmann.display.visible_pixels import EyeMap, Floats, PixelSet, Vector
+from lippmann.display.visible_pixels import EyeMap, Floats, PixelSet, Vector, lens_plane_places
 from lippmann.optics.eye_light import EyeLight, panel_frame
 from lippmann.runtime.machine import usable_cores
 from lippmann.runtime.row_threads import Bands
@@ -92,11 +92,8 @@ class RealEyeMap(EyeMap):
 
     def __init__(self, display: Display, size: tuple[int, int], *, subpixels: bool) -> None:
         self.display, self.size, self.subpixels = display, size, subpixels
-        (width, height), panel, lattice = size, display.panel, display.lattice
-        u = (np.arange(width) + 0.5) * (panel.width / width)
-        v = (np.arange(height) + 0.5) * (panel.height / height)
-        x, y = display.panel_point(*np.meshgrid(u, v))
-        i, j = lattice.lens_at(x, y, NUMPY)
+        (width, height), lattice = size, display.lattice
+        x, y, i, j = lens_plane_places(display, size)
         self._is_line = lattice.layout == "lenticular"
         column = np.rint(i - i.min()).astype(np.int64)
         row = np.broadcast_to(np.arange(height)[:, None], x.shape) if self._is_line else np.rint(j - j.min())

@@ -94,8 +94,8 @@ def describe_polygons(
     if _UV_FACES in columns:
         columns = _with_corner_uvs(columns)
     outline = _outline(columns, where)
-    shown = _ELEMENTS if len(outline.sizes) else (*_ELEMENTS, "edge")
-    stepped_over = [each.name[:40] for each in header.elements if each.count and each.name not in shown]
+    read = _ELEMENTS if len(outline.sizes) else (*_ELEMENTS, "edge")
+    stepped_over = [each.name[:40] for each in header.elements if each.count and each.name not in read]
     if stepped_over:
         notes.append(f"elements not shown: {', '.join(stepped_over[:20])}")
     if not len(outline.sizes):

@@ -44,7 +44,7 @@ class _Reader:
         self._meshes: list[Mesh] = []
         self._materials: list[Material] = []
         self._images: dict[str, Image] = {}
-        self._shown: dict[tuple[str, str, int], list[int]] = {}
+        self._meshes_of_part: dict[tuple[str, str, int], list[int]] = {}
         self._places: dict[int, list[NDArray[np.float64]]] = {}
         self._copies = 0
 
@@ -84,11 +84,11 @@ class _Reader:
             else:
                 self._notes[_NOT_PRINTED] = None
         key = placed.part, placed.number, piece.filament
-        if key not in self._shown:
+        if key not in self._meshes_of_part:
             filaments = self._filaments(placed.number, len(shape.triangles), piece)
-            self._shown[key] = self._meshes_of(part, shape, filaments) if (filaments >= 0).any() else []
-            self._shown[key] += self._lattice_of(part, shape) if shape.beams else []
-        for mesh in self._shown[key]:
+            self._meshes_of_part[key] = self._meshes_of(part, shape, filaments) if (filaments >= 0).any() else []
+            self._meshes_of_part[key] += self._lattice_of(part, shape) if shape.beams else []
+        for mesh in self._meshes_of_part[key]:
             self._places.setdefault(mesh, []).append(world)
 
     def _filaments(self, number: str, count: int, piece: Piece) -> NDArray[np.int64]:
