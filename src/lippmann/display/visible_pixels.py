@@ -78,7 +78,7 @@ class PixelSet:
 
 
 def lens_plane_places(display: Display, size: tuple[int, int]) -> tuple[Reals, Reals, Reals, Reals]:
-    """Points (x, y) of the lens plane (mm) at the pixels of a picture of this width and height, and their lenses (i, j).
+    """Points (x, y) of the lens plane (mm) at the pixels of a picture of this size, and their lenses (i, j).
 
     All ``(height, width)``; the picture is the panel's rectangle.
     """
