@@ -213,7 +213,7 @@ class SurfacePart:
     def of(normal: NDArray[np.generic], mask: NDArray[np.bool_] | None = None) -> SurfacePart | None:
         """The part with all surfaces of a picture, by its normals ``(H, W, 3)``, 0 off surfaces; None without any.
 
-        With ``mask (H, W)``, the part with the pixels where it is true and that show surfaces or are close to one.
+        With ``mask (H, W)``, the part with those pixels of the mask that show a surface or are close to one.
         """
         is_surface = (normal[..., 0] != 0) | (normal[..., 1] != 0) | (normal[..., 2] != 0)
         near = _dilate(is_surface)

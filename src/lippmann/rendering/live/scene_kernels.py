@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 #: Kernels that are cached: pages of a studio may show a scene on several displays.
 _MOST_KERNELS = 8
 
-#: The display of a tracer and all that its kernel depends on.
+#: Key of a cached tracer: its display, and all else that its kernel depends on.
 _Key: TypeAlias = tuple[object, ...]
 Kernel = TypeVar("Kernel", LiveTracer, FeatureTracer)
 

@@ -117,7 +117,7 @@ class PixelTracer:
         p = ray(dr.select(hit, distance, 0))
         a, b, c, d = self._height_row
         z = a * p.x + b * p.y + c * p.z + d
-        z = dr.copysign(dr.maximum(dr.abs(z), 1e-6), z)  # nothing is nearer to the lens plane than a nanometre
+        z = dr.copysign(dr.maximum(dr.abs(z), 1e-6), z)  # heights of at least a nanometre keep disparities finite
         return dr.select(hit, self._source.display.gap / z, BACKGROUND)
 
 
