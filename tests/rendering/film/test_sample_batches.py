@@ -249,9 +249,9 @@ def test_wavefronts_of_any_size_share_a_kernel(engine):
 def test_batches_leave_room_for_what_else_a_pixel_takes():
     from lippmann.display.panel import PixelWindow
     from lippmann.rendering.film import memory_model
-    from lippmann.rendering.film.sample_batches import _sizes
+    from lippmann.rendering.film.sample_batches import _fit_batches
 
     most, further = memory_model.MOST_BATCHES, memory_model.FOR_DENOISER
     enough = SIZE * SIZE * (memory_model.batches(most) + further) + SIZE * memory_model.BYTES_PER_LANE
     window = PixelWindow(0, 0, SIZE, SIZE)
-    assert [_sizes(window, 1, memory, further)[0] for memory in (enough, enough - 1)] == [most, most // 2]
+    assert [_fit_batches(window, 1, memory, further)[0] for memory in (enough, enough - 1)] == [most, most // 2]
