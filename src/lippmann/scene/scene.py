@@ -16,7 +16,7 @@ from lippmann.options.light import LightOptions
 from lippmann.options.option import checked
 from lippmann.runtime.engine_lock import cached_property
 from lippmann.scene.extent import bounds_of, box, box_corners, extreme_points_of, thin_axis
-from lippmann.scene.matrices import rotation, rotation_of
+from lippmann.scene.matrices import rotation, rotation_of, transform_points
 from lippmann.scene.reflectance import emitted_luminance
 from lippmann.scene.splat_clouds import check_splats
 from lippmann.scene.values.description import (
@@ -133,7 +133,7 @@ class Scene:
             return self._classic_bounds(frame)
         if isinstance(self.description, SceneDescription):
             return bounds_of(self.description, frame)
-        corners = box_corners(self.bounds) @ frame[:3, :3].T + frame[:3, 3]
+        corners = transform_points(frame, box_corners(self.bounds))
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
     def _classic_bounds(self, frame: Matrix | None = None) -> Bounds:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.scene.values.description import Matrix, SceneDescription
+from lippmann.scene.values.description import FloatArray, Matrix, SceneDescription
 
 #: So many times its extent from the origin, a scene is moved there: single precision tells 6e-5 of the extent.
 FAR = 1000.0
@@ -52,6 +52,14 @@ def make_traceable(description: SceneDescription) -> SceneDescription:
     return move_and_scale(description, traceable_from_world(description))
 
 
+def box_of_copies(positions: FloatArray, worlds: Matrix) -> tuple[Matrix, Matrix]:
+    """Corners ``(3,)`` of a box about the boxes of ``positions (n, 3)`` at all places ``worlds (k, 4, 4)``."""
+    least, most = (np.asarray(ends, np.float64) for ends in (positions.min(axis=0), positions.max(axis=0)))
+    middles = worlds[:, :3, :3] @ ((least + most) / 2.0) + worlds[:, :3, 3]
+    halves = np.abs(worlds[:, :3, :3]) @ ((most - least) / 2.0)
+    return (middles - halves).min(axis=0), (middles + halves).max(axis=0)
+
+
 def traceable_from_world(description: SceneDescription) -> Matrix | None:
     """The similarity (4x4) of a scene of meshes that is far from the origin, tiny or huge; None of others."""
     if description.splats is not None or description.volume is not None:
@@ -60,11 +68,8 @@ def traceable_from_world(description: SceneDescription) -> Matrix | None:
     for number, worlds in description.fitted_placements.items():
         positions = description.meshes[number].positions
         if len(positions) and len(worlds):
-            least, most = (np.asarray(ends, np.float64) for ends in (positions.min(axis=0), positions.max(axis=0)))
-            middles = worlds[:, :3, :3] @ ((least + most) / 2.0) + worlds[:, :3, 3]
-            halves = np.abs(worlds[:, :3, :3]) @ ((most - least) / 2.0)
-            low = np.minimum(low, (middles - halves).min(axis=0))
-            high = np.maximum(high, (middles + halves).max(axis=0))
+            least, most = box_of_copies(positions, worlds)
+            low, high = np.minimum(low, least), np.maximum(high, most)
     extent = float((high - low).max() / 2)
     offset = _far_offset((low + high) / 2, extent)
     is_sound = not 0 < extent < np.inf or _SMALLEST <= extent <= _LARGEST

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lippmann.scene.parsing.far_origin import box_of_copies
 from lippmann.scene.parsing.points_lines import MOST, as_mesh, thin_out, width_of
 from lippmann.scene.readers.gltf.document import Document
 from lippmann.scene.values.description import Matrix, Mesh
@@ -88,9 +89,6 @@ def _diagonal(meshes: Sequence[Mesh], placements: Sequence[tuple[int, Matrix]]) 
     """Length of the diagonal of a box about all copies of all meshes."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for mesh, worlds in placements:
-        positions = meshes[mesh].positions
-        least, most = positions.min(axis=0).astype(np.float64), positions.max(axis=0).astype(np.float64)
-        middles = worlds[:, :3, :3] @ ((least + most) / 2.0) + worlds[:, :3, 3]
-        halves = np.abs(worlds[:, :3, :3]) @ ((most - least) / 2.0)
-        low, high = np.minimum(low, (middles - halves).min(axis=0)), np.maximum(high, (middles + halves).max(axis=0))
+        least, most = box_of_copies(meshes[mesh].positions, worlds)
+        low, high = np.minimum(low, least), np.maximum(high, most)
     return float(np.linalg.norm(high - low))
