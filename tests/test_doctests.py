@@ -34,7 +34,10 @@ def test_the_page_has_all_that_the_package_offers():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_examples_of_a_public_name(name, tmp_path, monkeypatch, engine):
+    from lippmann.rendering import forecast
+
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(forecast, "PROBE_SECONDS", 0.05)
     module, _, attribute = f"lippmann.{name}".rpartition(".")
     finder = doctest.DocTestFinder(recurse=False)
     [found] = finder.find(getattr(importlib.import_module(module), attribute), name, globs={"lippmann": lippmann})

@@ -44,6 +44,14 @@ def lippmann(capfd):
     return call
 
 
+@pytest.fixture
+def short_probe(monkeypatch):
+    """Plans trace for the twentieth of a second, not for two: less exactly, but the rest of a plan is the same."""
+    from lippmann.rendering import forecast
+
+    monkeypatch.setattr(forecast, "PROBE_SECONDS", 0.05)
+
+
 @pytest.fixture(scope="session")
 def picture(engine, tmp_path_factory):
     """A small picture with all its metadata, rendered once."""

@@ -165,6 +165,7 @@ def test_a_film_holds_both_eyes(lippmann, balls, tmp_path):
     assert abs(places(frames[0][:, :240], "red")[0] - places(frames[0][:, 240:], "red")[0]) > 0.2
 
 
+@pytest.mark.usefixtures("short_probe")
 def test_a_plan_is_of_the_pair_that_is_asked_for(lippmann, balls):
     words = ("plan", balls, "--target", "odyssey-3d", "--integrator", "albedo", "--spp", 2, "--threads", 1, "--json")
     own, wide = (lippmann(*words, *size).json for size in ((), ("--size", "7680x2160")))

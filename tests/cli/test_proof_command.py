@@ -54,8 +54,8 @@ def test_bad_input_is_refused_in_one_line(lippmann, tmp_path, monkeypatch, argum
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
-def test_a_plan_tells_of_the_lens(lippmann, engine):
+@pytest.mark.usefixtures("engine", "short_probe")
+def test_a_plan_tells_of_the_lens(lippmann):
     done = lippmann("plan", "teapot", "--display", SHEET, "--json")
     found = json.loads(done.out)
     assert found["proof"]["tolerances"]["best_strips"] == 23

@@ -9,7 +9,6 @@ from PIL import Image
 
 from lippmann.image import read_picture
 from lippmann.quilts.files import read_quilt
-from lippmann.rendering import forecast
 
 ENDING = "_qs8x6a0.75.png"
 SMALL = ("--size", "384x384", "--spp", "2", "--integrator", "direct")
@@ -63,10 +62,8 @@ def test_a_calibration_names_its_quilt_and_takes_it_back(lippmann, calibration, 
     assert read_picture(native).pixels.shape == (200, 150, 3)
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("engine")
-def test_plan_says_what_to_expect(lippmann, calibration, monkeypatch):
-    monkeypatch.setattr(forecast, "PROBE_SECONDS", 0.1)
+@pytest.mark.usefixtures("engine", "short_probe")
+def test_plan_says_what_to_expect(lippmann, calibration):
     words = (
         "plan",
         "teapot",
@@ -97,9 +94,8 @@ def test_plan_says_what_to_expect(lippmann, calibration, monkeypatch):
     assert found["memory"]["expected"] > 0
 
 
-@pytest.mark.usefixtures("engine")
-def test_plan_foresees_a_turn(lippmann, monkeypatch):
-    monkeypatch.setattr(forecast, "PROBE_SECONDS", 0.05)
+@pytest.mark.usefixtures("engine", "short_probe")
+def test_plan_foresees_a_turn(lippmann):
     words = ("plan", "teapot", "--integrator", "direct", "--method", "full", "--spp", "2", "--json")
     still, turn = lippmann(*words).json, lippmann(*words, "--turntable", "12").json
     assert (still["frames"], turn["frames"]) == (1, 12)
