@@ -103,6 +103,8 @@ def test_what_is_not_meant_is_refused(display, picture, tmp_path):
     (tmp_path / "lf.h5").write_bytes(b"\x89HDF\r\n\x1a\n")
     with pytest.raises(PictureError, match=r"HDF5 files are not read; save its views as pictures named by row"):
         import_image(tmp_path / "lf.h5")
+    (tmp_path / "input_Cam000.png").write_bytes(b"")
+    assert recognize(tmp_path) == "views"  # of the benchmark, without its parameters
 
 
 @pytest.mark.parametrize(("layout", "library"), [("lftoolbox", "h5py"), ("zarr", "zarr")])

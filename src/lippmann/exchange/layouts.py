@@ -232,7 +232,7 @@ def recognize(path: Path) -> str:
     if path.is_dir():
         if any((path / name).exists() for name in (".zgroup", ".zattrs", "zarr.json")):
             return "zarr"
-        if (path / HCI_PARAMETERS).exists() or any(path.glob("input_Cam*.png")):
+        if (path / HCI_PARAMETERS).exists():
             return "hci"
         return "views"
     if not path.exists():
