@@ -8,6 +8,7 @@ import av
 import numpy as np
 import pytest
 
+from lippmann.cli.shared.scene_source import output_of
 from lippmann.image import read_picture
 from lippmann.quilts.quilt_metadata import metadata_of_text
 from lippmann.runtime.atomic_write import temporary_file
@@ -150,16 +151,18 @@ def test_a_part_of_a_swing(engine, lippmann, cut_display, tmp_path):
         ("all_qs3x2a0.75.png", (), None),
     ],
 )
-def test_quilts_of_a_turn_and_their_film(engine, lippmann, tmp_path, film, eye, shape):
+def test_quilts_of_a_turn_and_their_film(engine, lippmann, tmp_path, monkeypatch, film, eye, shape):
     from lippmann.color.transfer import quantize
     from lippmann.quilts.files import read_quilt
     from lippmann.viewing.video_frames import view_of_quilt
 
     call = ("quilt", "render", "teapot", "--turntable", "3", *SMALL_QUILT, *eye, "--video", tmp_path / film)
-    # In a folder, or named with a number, to which the ending of their kind is added.
-    done = lippmann(*call, "-o", tmp_path / ("out" if eye else "q_%d.png"), "--json")
+    # In a folder named after the scene, or named with a number, to which the ending of their kind is added.
+    monkeypatch.chdir(tmp_path)
+    done = lippmann(*call, *(() if eye else ("-o", "q_%d.png")), "--json")
     assert done.code == 0, done.err
     paths = [Path(frame["output"]) for frame in done.json["frames"]]
+    assert {str(path.parent) for path in paths} == {"teapot-frames" if eye else "."}
     name = "frame_{:04}_qs3x2a0.75.png" if eye else "q_{}_qs3x2a0.75.png"
     assert [path.name for path in paths] == [name.format(number) for number in range(3)]
     _, shown = frames_of(tmp_path / film)
@@ -173,6 +176,11 @@ def test_quilts_of_a_turn_and_their_film(engine, lippmann, tmp_path, film, eye, 
         assert 10 * np.log10(255**2 / max(np.mean((expected.astype(float) - even) ** 2), 1e-9)) > 30
     assert not np.array_equal(first.view(0), first.view(5))
     assert shape is None or shown[0].shape[:2] == shape
+
+
+def test_a_dot_in_a_models_name_is_no_ending_of_the_folder_of_its_frames():
+    assert output_of(None, "chair.v2.glb", "-frames") == Path("chair-v2-frames")
+    assert output_of(None, "chair.v2.glb", "-native.png") == Path("chair.v2-native.png")
 
 
 @pytest.mark.parametrize(("eye", "film"), [((), "turn_qs3x2a0.75.mp4"), (("--eye", "sweep"), "turn.mp4")])

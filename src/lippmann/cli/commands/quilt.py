@@ -117,7 +117,7 @@ def render(
     target = load_display(display)
     grid = None if views is None else parse.size(views, "--views", rule="columns x rows, such as 8x6")
     quilt = quilt_of_display(target, grid, None if size is None else parse.size(size, "--size"))
-    path = output or Path(f"{Path(scene).stem}{'' if moving else '.png'}")
+    path = output_of(output, scene, "-frames") if moving else output or Path(f"{Path(scene).stem}.png")
     moving, file = moving.with_film(path)
     shows_all = moving.eye is None and moving.shows == "eye"
     if moving.video is not None and shows_all and (file != path or quilt.pair):

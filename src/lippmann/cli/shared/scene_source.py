@@ -154,7 +154,9 @@ def output_of(given: Path | None, source: str | Path, ending: str) -> Path:
     """
     if given is not None:
         return given
-    path = Path(f"{Path(source).stem or 'picture'}{ending}")
+    stem = Path(source).stem or "picture"
+    # A dot would make the folder's name that of a file.
+    path = Path(f"{stem.replace('.', '-') if ending == '-frames' else stem}{ending}")
     # With a word in its name the file is this program's; a model's plain name may be that of its texture.
     if ending.startswith(".") and path.exists() and not _is_ours(path):
         if os.path.exists(source) and path.samefile(source):
