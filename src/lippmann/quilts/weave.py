@@ -364,7 +364,7 @@ def _check_fit(quilt: Quilt, display: Display) -> None:
     if aspect is not None and abs(aspect / shape - 1) > ASPECT_TOLERANCE:
         rule = f"the display {display.name} has {shape:.6g}"
         raise PictureError(
-            f"the quilt has the aspect {aspect:.6g}", rule=rule, fix='use its display, or say fit="cover"'
+            f"the quilt has the aspect {aspect:.6g}", rule=rule, fix='use its display, or weave it with fit="cover"'
         )
 
 
