@@ -137,11 +137,12 @@ def read_depth_map(path: Path) -> DepthMap:
     is_stretched = is_wide and _is_stretched(values, 1.0 if is_float else 65535.0)
     farther = "larger values are farther; say disparity in its name if they are nearer"
     if is_wide and not is_stretched:
-        return replace(of_depth(levels), note=f"{path.name} is taken for distances: {farther}" if is_float else "")
+        return replace(of_depth(levels), note=f"{path.name} is taken for distances: {farther}")
     if is_float or _DARK_NEAR.search(path.stem):
         return DepthMap(-levels, f"{path.name} is taken for depth without a unit: {farther}")
-    note = f"{path.name} spans all of its 16 bits, as maps without a unit do: brighter is taken as nearer"
-    return DepthMap(levels, f"{note}; if dark is near, end its name with -far" if is_wide else "")
+    span = " spans all of its 16 bits, as maps without a unit do" if is_wide else ""
+    note = f"{path.name}{span}: brighter is taken as nearer; if dark is near, end its name with -far"
+    return DepthMap(levels, note)
 
 
 def _values(path: Path, data: bytes) -> NDArray[Any]:
