@@ -21,7 +21,7 @@ _UPRIGHT = 1e-9
 _TOLERANCE = 1e-6
 
 
-def transform_points(matrix: Matrix, points: Bounds) -> Bounds:
+def transform_points(matrix: Matrix, points: NDArray[np.floating]) -> Bounds:
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], np.float64)
 
 

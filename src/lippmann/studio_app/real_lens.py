@@ -107,7 +107,7 @@ class RealEyeMap(EyeMap):
         self._x, self._y = x.ravel()[first], y.ravel()[first]
         center = lattice.center(i.ravel()[first], j.ravel()[first], self._x, self._y, NUMPY)
         self._center_x, self._center_y = center
-        self._places = self._lenses
+        self._places: NDArray[np.int32] = self._lenses
         if not lattice.slant and lattice.pitch * width / display.size_mm[0] >= _BLOCK_WIDTH:
             grid = np.full(shape, -1, np.int32)
             grid.ravel()[keys] = np.arange(len(keys))

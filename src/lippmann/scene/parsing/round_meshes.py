@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Numbers = NDArray[np.float64]
-Indices = NDArray[np.integer]
+Indices = NDArray[np.int64]
 
 
 def subdivide_sphere(points: Numbers, triangles: Indices, times: int) -> tuple[Numbers, Indices]:
@@ -33,4 +33,4 @@ def join_rings(sides: int) -> Indices:
 
 def repeat_triangles(triangles: Indices, count: int, step: int) -> Indices:
     """``(count m, 3)``: the ``triangles (m, 3)`` of ``count`` copies of a mesh of ``step`` vertices each."""
-    return np.asarray((triangles + step * np.arange(count)[:, None, None]).reshape(-1, 3))
+    return np.asarray((triangles + step * np.arange(count)[:, None, None]).reshape(-1, 3), np.int64)
