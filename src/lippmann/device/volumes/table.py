@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lippmann.errors import MemoryLimitError
 from lippmann.runtime.machine import amount_in_words
 from lippmann.runtime.numba_jit import compiled, inlined
-from lippmann.scene.matrices import transform_points
+from lippmann.scene.matrices import inverse, transform_points
 from lippmann.scene.values.volume import TransferFunction, Volume
 
 #: Cells along a side of a brick, as a power of two.
@@ -63,7 +63,7 @@ class VolumeTable:
         """``(2, 3)``: a box in the world that holds all of the grid."""
         depth, height, width = self.grid.shape
         steps = np.array([[x, y, z] for x in (0, width) for y in (0, height) for z in (0, depth)]) - 0.5
-        world_from_voxel = np.linalg.inv(self.voxel_from_world)
+        world_from_voxel = inverse(self.voxel_from_world)
         corners = transform_points(world_from_voxel, steps)
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
