@@ -471,7 +471,7 @@ def test_sheen_formula(build, parts):
     tint = np.array([0.8, 0.6, 0.4])
     cloth = Material(base_color=(0.5, 0.5, 0.5), specular=0.0, sheen_color=tuple(tint), sheen_roughness=0.6)
     wi, wo = directions(60, 8), directions(60, 9)
-    z, phi = np.meshgrid((np.arange(400) + 0.5) / 400, (np.arange(200) + 0.5) / 200 * 2 * np.pi, indexing="ij")
+    z, phi = np.meshgrid((np.arange(200) + 0.5) / 200, (np.arange(100) + 0.5) / 100 * 2 * np.pi, indexing="ij")
     r = np.sqrt(1 - z**2)
     sky = np.stack([r * np.cos(phi), r * np.sin(phi), z], -1).reshape(-1, 3)
 

@@ -42,7 +42,7 @@ def test_points_of_a_mesh_are_spread_evenly(flip):
         (is_small, (0, 0, sign), (1 / 3, 1 / 3, 0)),
         (~is_small, (sign, 0, 0), (5, 1, 1 / 3)),
     ):
-        assert n[chosen] == pytest.approx(np.tile(np.array(direction, float), (chosen.sum(), 1)), abs=1e-6)
+        np.testing.assert_allclose(n[chosen], np.tile(direction, (chosen.sum(), 1)), atol=1e-6)
         assert p[chosen].mean(axis=0) == pytest.approx(middle, abs=5e-3)
     assert np.all(p[is_small, :2].sum(axis=1) <= 1 + 1e-5)
     assert np.all(p[~is_small, 1] / 3 + p[~is_small, 2] <= 1 + 1e-5)

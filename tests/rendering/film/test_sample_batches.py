@@ -180,7 +180,8 @@ def test_few_samples_say_something(integrator):
 
 
 def test_fewer_batches_are_kept_where_memory_is_short_and_none_where_it_is_too_short(integrator):
-    small = batches(integrator, memory=SIZE * SIZE * (2 * 12 + 36) + SIZE * 96)
+    small = batches(integrator, memory=SIZE * SIZE * (2 * 12 + 36) + 7 * SIZE * 96)  # short of four batches
+    assert len(small._taken) == 2
     small.add(16)
     plenty = batches(integrator)
     plenty.add(16)

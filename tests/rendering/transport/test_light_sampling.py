@@ -472,7 +472,10 @@ def transmittance(shadow_rays, x, y, end=4.0):
     import drjit as dr
     import mitsuba as mi
 
-    origin, target = mi.Point3f(mi.Float(x), mi.Float(y), 0), mi.Point3f(mi.Float(x), mi.Float(y), end)
+    from lippmann.device.kernel_ops import upload
+
+    x, y = upload(x), upload(y)
+    origin, target = mi.Point3f(x, y, 0), mi.Point3f(x, y, end)
     ray = mi.Ray3f(origin, mi.Vector3f(0, 0, 1), mi.Float(end * (1 - 1e-4)), 0.0, [])
     ray.maxt = mi.Float(end * (1 - 1e-4))
     light, tests = shadow_rays.transmittance(ray, target, dr.full(mi.Bool, True, len(x)))
