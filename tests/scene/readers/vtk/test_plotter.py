@@ -8,7 +8,12 @@ from lippmann.color.transfer import decode_srgb
 from lippmann.errors import LippmannError, SceneError
 from lippmann.scene.readers.load import load_scene
 
-pyvista = pytest.importorskip("pyvista", reason="PyVista is not installed")
+
+@pytest.fixture(scope="module", autouse=True)
+def library():
+    """PyVista, when the first test runs: as pytest asks every name of a module for marks, all of it would be loaded."""
+    global pyvista
+    pyvista = pytest.importorskip("pyvista", reason="PyVista is not installed")
 
 
 @pytest.fixture
