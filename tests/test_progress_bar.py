@@ -43,7 +43,7 @@ def test_stages_that_come_back_do_not_turn_it_back():
 def test_real_work_runs_forwards_to_the_end(engine, options):
     reports = []
     lippmann.render(
-        "teapot", lippmann.load_display("seed-lenticular").resized(64, 48), progress=reports.append, **options
+        "teapot", lippmann.load_display("seed-lenticular").resized(32, 24), progress=reports.append, **options
     )
     found = shares(reports)
     assert len(found) > 3

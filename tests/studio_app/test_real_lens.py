@@ -72,15 +72,15 @@ def test_mixed_pixels_are_those_of_replay(name, subpixels):
 @pytest.mark.parametrize(("name", "subpixels"), [("print", False), ("slanted", True)])
 def test_denoisers_get_mean_light_of_all_colors_and_the_sheets_pattern_returns(name, subpixels):
     display = DISPLAYS[name]
-    found = RealEyeMap(display, (400, 250), subpixels=subpixels).pixels_for_eye(default_eye(display))
+    found = RealEyeMap(display, (240, 150), subpixels=subpixels).pixels_for_eye(default_eye(display))
     values = np.random.default_rng(5).random((len(found.row), 3), dtype=np.float32)
     picture = found.arrange_for_denoiser(values)
-    assert picture.shape[1] == (3 * 400 if subpixels else display.lens_grid.columns)
+    assert picture.shape[1] == (3 * 240 if subpixels else display.lens_grid.columns)
     assert found.arrange_denoised(picture) == pytest.approx(found.arrange(values), abs=1e-6)
     white = np.ones_like(values)
     even = found.arrange_for_denoiser(white)
     assert even[even > 0.5] == pytest.approx(1.0, abs=1e-5)
-    assert (np.ptp(found.arrange(white)[125]) > 0.1) == subpixels
+    assert (np.ptp(found.arrange(white)[75]) > 0.1) == subpixels
 
 
 @pytest.mark.slow
