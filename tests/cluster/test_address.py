@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lippmann.cluster.address import Target, TlsFiles, is_loopback, parse_target
+from lippmann.cluster.address import Target, TlsFiles, is_on_this_machine, parse_target
 from lippmann.cluster.worker import WorkerOptions
 from lippmann.errors import ClusterError, UsageError
 
@@ -42,7 +42,7 @@ def test_what_is_no_target(text):
     ],
 )
 def test_loopback(address, own):
-    assert is_loopback(address) == own
+    assert is_on_this_machine(address) == own
 
 
 def test_a_worker_of_another_machine_opens_nothing_unasked():

@@ -18,7 +18,7 @@ def machine(monkeypatch):
     """Sets what the machine has free, and what the process has."""
     state = {"free": 10 << 30, "has": 1 << 30}
     monkeypatch.setattr(process, "available_memory", lambda: state["free"])
-    monkeypatch.setattr(process, "_resident", lambda: state["has"])
+    monkeypatch.setattr(process, "resident_memory", lambda: state["has"])
     return state
 
 

@@ -11,8 +11,8 @@ from http import HTTPStatus
 import pytest
 
 from lippmann.errors import PictureError, UsageError
+from lippmann.runtime.machine import is_loopback
 from lippmann.viewer.http_server import WebServer
-from lippmann.viewer.request_guard import is_loopback
 from lippmann.viewer.responses import RefusedError, Response, json_response
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from lippmann.errors import ClusterError, UsageError
+from lippmann.runtime.machine import is_loopback
 
 if TYPE_CHECKING:
     from distributed import Security
@@ -133,7 +133,7 @@ def warn_of_exposure(address: str, security: Security, remark: Callable[[str], N
     """
     if security.require_encryption or urlsplit(address).scheme in _AUTHENTICATED:
         return  # Dask then connects with certificates at both ends or not at all
-    who = "every account of this machine" if is_loopback(address) else "everyone who can reach that port"
+    who = "every account of this machine" if is_on_this_machine(address) else "everyone who can reach that port"
     remark(
         f"WARNING: {address} asks nobody for a certificate: {who} can run code as you, on the workers and here "
         "(use tls:// with tls_ca=..., tls_cert=... and tls_key=...)"
@@ -182,13 +182,9 @@ def checked_address(text: str, parameter: str, rule: str) -> str:
     return text
 
 
-def is_loopback(address: str) -> bool:
+def is_on_this_machine(address: str) -> bool:
     """Whether a scheduler's address is a loopback address, reachable from this machine only."""
-    host = urlsplit(address).hostname or ""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
+    return is_loopback(urlsplit(address).hostname or "")
 
 
 def import_distributed() -> ModuleType:

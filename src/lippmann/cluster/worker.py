@@ -14,7 +14,7 @@ from lippmann.cluster.address import (
     TlsFiles,
     checked_address,
     import_distributed,
-    is_loopback,
+    is_on_this_machine,
     warn_of_exposure,
 )
 from lippmann.cluster.log_lines import drop_tracebacks
@@ -65,7 +65,7 @@ class WorkerOptions:
         checked_address(self.address, "scheduler", "tcp://HOST:8786 or tls://HOST:8786")
         if self.threads is not None and self.threads < 1:
             raise UsageError(f"{self.threads} is out of range", parameter="threads", rule="it must be at least 1")
-        if self.host is None and not is_loopback(self.address):
+        if self.host is None and not is_on_this_machine(self.address):
             raise UsageError(
                 "is missing",
                 parameter="host",

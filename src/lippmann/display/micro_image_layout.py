@@ -117,13 +117,14 @@ def covers_whole_pixels(display: Display) -> bool:
     across, down = display.pixels_per_lens
     grid, panel = display.lens_grid, display.panel
     if display.lens_array.layout == "hexagonal":
-        return _is_whole(across) and down is not None and _is_whole(down)
-    if display.lens_array.slant != 0.0 or not _is_whole(across) or round(across) * grid.columns != panel.width:
+        return is_whole(across) and down is not None and is_whole(down)
+    if display.lens_array.slant != 0.0 or not is_whole(across) or round(across) * grid.columns != panel.width:
         return False
-    return down is None or (_is_whole(down) and round(down) * grid.rows == panel.height)
+    return down is None or (is_whole(down) and round(down) * grid.rows == panel.height)
 
 
-def _is_whole(count: float) -> bool:
+def is_whole(count: float) -> bool:
+    """Whether a number of pixels is whole, up to rounding."""
     return abs(count - round(count)) <= WHOLE_TOLERANCE
 
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import NUMPY, Display, micro_image_extent, micro_image_shape
 from lippmann.display.lens_array import BOUNDARY_TOLERANCE, WHOLE_TOLERANCE
-from lippmann.display.micro_image_layout import lens_indices, row_blocks
+from lippmann.display.micro_image_layout import is_whole, lens_indices, row_blocks
 from lippmann.errors import PictureError
 from lippmann.image.micro_images import Permutation
 from lippmann.image.stored_values import FloatArray, Indices
@@ -76,7 +76,7 @@ class ViewGrid:
 def view_grid(display: Display) -> ViewGrid:
     """Views of a display: their places, and whether they are exact."""
     across, down = display.pixels_per_lens
-    if _is_whole(across) and (down is None or _is_whole(down)):
+    if is_whole(across) and (down is None or is_whole(down)):
         return _pixel_views(display)
     width, height = micro_image_extent(display)
     places_down = (0.0,) if down is None else _evenly(height)
@@ -273,10 +273,6 @@ def _evenly(size: float) -> tuple[float, ...]:
     """Centres of equal parts of ``size`` pixels about 0, one part for each whole pixel."""
     count = max(1, math.floor(size + WHOLE_TOLERANCE))
     return tuple((k + 0.5) * size / count - 0.5 * size for k in range(count))
-
-
-def _is_whole(count: float) -> bool:
-    return abs(count - round(count)) <= WHOLE_TOLERANCE
 
 
 def _is_lenticular(display: Display) -> bool:

@@ -25,7 +25,7 @@ from lippmann.rendering.request.preconditions import explain_missing_estimate
 from lippmann.rendering.request.render_request import RenderRequest, format_value
 from lippmann.rendering.session import Session, open_session, read_choices
 from lippmann.runtime.engine_lock import exclusive
-from lippmann.runtime.machine import amount_in_words
+from lippmann.runtime.machine import amount_in_words, resident_memory
 from lippmann.scene.placement import Placement, comfort_in_words
 from lippmann.scene.scene import Scene
 from lippmann.wording import depths_in_words, duration_in_words, html_table, samples_in_words
@@ -209,7 +209,7 @@ def forecast(
             **{kind: round(frames * samples * share) for kind, share in probed.rays.items()},
         },
         memory={
-            "expected": _resident() + size[0] * size[1] * memory_model.PICTURE + _working_bytes(source, session),
+            "expected": resident_memory() + size[0] * size[1] * memory_model.PICTURE + _working_bytes(source, session),
             "limit": session.memory,
         },
         seconds=seconds,
@@ -343,10 +343,3 @@ def _working_bytes(source: DisplayRays | WindowRays, session: Session) -> int:
     if request.denoises:
         kept += min(pixels * memory_model.DENOISER, memory_model.NETWORK_MOST + pixels * 2 * memory_model.LAYERS)
     return min(kept + wave, limit)
-
-
-def _resident() -> int:
-    """Bytes of memory that this process holds now."""
-    import psutil
-
-    return int(psutil.Process().memory_info().rss)

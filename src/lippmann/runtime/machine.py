@@ -194,7 +194,7 @@ class _Limit:
     @property
     def taken(self) -> int:
         """Bytes that are certainly taken for what files hold."""
-        return min(self.granted, max(0, _resident() - self.start))
+        return min(self.granted, max(0, resident_memory() - self.start))
 
 
 _input_limit: ContextVar[_Limit] = ContextVar("input memory")
@@ -203,7 +203,7 @@ _input_limit: ContextVar[_Limit] = ContextVar("input memory")
 @contextmanager
 def limit_inputs(most: int | None) -> Iterator[None]:
     """Let what is read from files meanwhile take ``most`` bytes in all; None for all that is free."""
-    before = _input_limit.set(_Limit(most, _resident() if most is not None else 0))
+    before = _input_limit.set(_Limit(most, resident_memory() if most is not None else 0))
     try:
         yield
     finally:
@@ -261,7 +261,8 @@ def _left(limit: _Limit) -> tuple[int, str]:
     return free, "close other programs, or use a machine with more memory"
 
 
-def _resident() -> int:
+def resident_memory() -> int:
+    """Bytes of memory that this process holds now."""
     import psutil
 
     return int(psutil.Process().memory_info().rss)
@@ -274,3 +275,13 @@ def amount_in_words(size: int) -> str:
     if size >= 1 << 20:
         return f"{size / 2**20:.{1 if size < 10 << 20 else 0}f} MiB"
     return f"{max(1, size >> 10)} KiB"
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach a server on this address."""
+    import ipaddress
+
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"

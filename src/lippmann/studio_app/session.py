@@ -204,7 +204,7 @@ class StudioSession:
             from lippmann.quilts.quilt import quilt_of_display
 
             ending = f"{quilt_of_display(self.display(state), None, None).ending}{ENDINGS[kind]}"
-        elif kind == "print" and not _is_print(self.display(state)):
+        elif kind == "print" and not self.display(state).name.startswith("print"):
             raise UsageError(f"{self.display(state).name} is no print", fix="choose a print, or render a picture")
         display = state.display if state.display in self._presets else self.display(state).name
         self.jobs.start(kind, words, f"{Path(self.title(state)).stem}-{display}", ending)
@@ -241,10 +241,6 @@ class StudioSession:
         self.thread.gather(job.phase != "running")
         for listener in tuple(self.job_listeners):
             listener(job)
-
-
-def _is_print(display: Display) -> bool:
-    return display.name.startswith("print")
 
 
 def open_state(text: str, current: StudioState) -> StudioState:

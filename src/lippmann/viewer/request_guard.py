@@ -18,6 +18,7 @@ from urllib.parse import urlsplit
 
 from lippmann.errors import LippmannError
 from lippmann.printable import one_line
+from lippmann.runtime.machine import is_loopback
 from lippmann.viewer.responses import NO_FRAMING, RefusedError, Response, content_security_policy, error_response
 
 Scope = MutableMapping[str, Any]
@@ -141,14 +142,6 @@ async def _send_response(send: Send, response: Response, kind: str) -> None:
 def header_values(scope: Scope, name: bytes) -> list[str]:
     """Values of the headers ``name``, which is in lower case."""
     return [value.decode("latin-1") for key, value in scope["headers"] if key == name]
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach a server on this address."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 def is_allowed_host(named: str, listening_on: str) -> bool:

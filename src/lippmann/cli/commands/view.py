@@ -178,8 +178,8 @@ def serve(
     """
     import webbrowser  # as socket below: not for --help
 
+    from lippmann.runtime.machine import is_loopback
     from lippmann.viewer.http_server import WebServer
-    from lippmann.viewer.request_guard import is_loopback
 
     with WebServer(content, host, port, folder=folder) as server:
         # The address is printed last: its reader may send Ctrl-C at once.

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lippmann.scene.bundled import textures
-from lippmann.scene.bundled.stage import Stage
+from lippmann.scene.bundled.stage import Stage, vector_of
 from lippmann.scene.values.whitted_scene import ClassicScene
-from lippmann.scene.values.whitted_surfaces import ClassicImage, ClassicLight, ClassicMaterial, ClassicTexture, Vector
+from lippmann.scene.values.whitted_surfaces import ClassicImage, ClassicLight, ClassicMaterial, ClassicTexture
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
 
 NAME = "room"
@@ -199,15 +199,10 @@ def _image_material(
     """A picture whose top left corner lies at ``corner`` and whose sides are the vectors ``along`` and ``down``."""
     texture = ClassicTexture(
         "planar-image",
-        center=_vector(corner),
+        center=vector_of(corner),
         scale=(_SCALE, _SCALE, _SCALE),
-        u_axis=_vector(along / (along @ along) / _SCALE),
-        v_axis=_vector(down / (down @ down) / _SCALE),
+        u_axis=vector_of(along / (along @ along) / _SCALE),
+        v_axis=vector_of(down / (down @ down) / _SCALE),
         image=builder.image(ClassicImage(name, pixels[None])),
     )
     return builder.material(ClassicMaterial(ambient=ambient, diffuse=diffuse, texture=texture))
-
-
-def _vector(numbers: ArrayLike) -> Vector:
-    x, y, z = (float(number) for number in np.asarray(numbers))
-    return x, y, z

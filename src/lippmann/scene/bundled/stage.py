@@ -17,7 +17,7 @@ from math import atan, cos, radians, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from lippmann.scene.values.description import Camera, Matrix
 
@@ -85,8 +85,8 @@ class Stage:
         right_up_back = self.rotation
         return ClassicCamera(
             center=self.eye,
-            view=_vector(-right_up_back[:, 2]),
-            up=_vector(right_up_back[:, 1]),
+            view=vector_of(-right_up_back[:, 2]),
+            up=vector_of(right_up_back[:, 1]),
             zoom=self.eye_distance / PICTURE_HEIGHT,
             ray_depth=ray_depth,
             handedness="right",
@@ -94,8 +94,9 @@ class Stage:
         )
 
 
-def _vector(numbers: NDArray[np.float64]) -> Point:
-    x, y, z = (float(number) for number in numbers)
+def vector_of(numbers: ArrayLike) -> Point:
+    """Three numbers as a tuple."""
+    x, y, z = (float(number) for number in np.asarray(numbers))
     return x, y, z
 
 
