@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 
 # C0 and C1 controls, line and paragraph separators, and characters that change the direction of what follows.
 _UNSAFE = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff]")
@@ -32,3 +33,9 @@ def json_text(text: str) -> str:
 
 def _spelt(match: re.Match[str]) -> str:
     return ascii(match[0])[1:-1]
+
+
+def print_fault(error: Exception, doing: str) -> None:
+    """Print one line on a fault of the program, met while ``doing`` something, to standard error."""
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    print(one_line(f"lippmann: internal error while {doing}: {what}; report it"), file=sys.stderr)

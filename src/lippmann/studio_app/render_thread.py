@@ -7,7 +7,6 @@ which then takes several turns. The watcher whose last turn is longest ago goes 
 from __future__ import annotations
 
 import math
-import sys
 import threading
 import time
 from collections.abc import Callable, Hashable, Iterator
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import LippmannError
-from lippmann.printable import one_line
+from lippmann.printable import print_fault
 from lippmann.runtime.machine import return_freed_memory
 
 if TYPE_CHECKING:
@@ -222,8 +221,7 @@ class RenderThread:
             except MemoryError:
                 watcher.on_error(LippmannError("out of memory; close other programs"))
             except Exception as error:  # noqa: BLE001  a fault in one picture does not end the studio
-                what = " ".join(f"{type(error).__name__}: {error}".split())
-                print(one_line(f"lippmann: internal error while rendering: {what}; report it"), file=sys.stderr)
+                print_fault(error, "rendering")
                 watcher.on_error(LippmannError("internal error; the terminal says which"))
 
     def _next(self) -> tuple[Watcher, Callable[[], None]] | None:

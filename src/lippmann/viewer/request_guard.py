@@ -10,14 +10,13 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 import socket
-import sys
 from collections.abc import Awaitable, Callable, MutableMapping
 from http import HTTPStatus
 from typing import Any
 from urllib.parse import urlsplit
 
 from lippmann.errors import LippmannError
-from lippmann.printable import one_line
+from lippmann.printable import print_fault
 from lippmann.runtime.machine import is_loopback
 from lippmann.viewer.responses import NO_FRAMING, RefusedError, Response, content_security_policy, error_response
 
@@ -180,6 +179,5 @@ def _answer_to(error: Exception) -> Response:
         return error_response("out of memory; close other programs", HTTPStatus.INSUFFICIENT_STORAGE)
     # A page that is closed or reloaded aborts its requests.
     if not isinstance(error, (ConnectionError, TimeoutError, asyncio.TimeoutError)):
-        what = " ".join(f"{type(error).__name__}: {error}".split())
-        print(one_line(f"lippmann: internal error while answering a request: {what}; report it"), file=sys.stderr)
+        print_fault(error, "answering a request")
     return error_response("internal error; the terminal says which", HTTPStatus.INTERNAL_SERVER_ERROR)

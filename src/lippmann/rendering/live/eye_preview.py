@@ -7,23 +7,28 @@ whole picture, and put where the eye sees them, as :mod:`lippmann.viewing.replay
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from lippmann.display import Display
-from lippmann.display.visible_pixels import EyeMap, Floats, Vector, mean_of_points, points_of_pixel
+from lippmann.display.visible_pixels import EyeMap, Floats, PixelSet, Vector, mean_of_points, points_of_pixel
 from lippmann.image.preview import Preview
 from lippmann.options.choices import POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
-from lippmann.rendering.denoise.oidn import load_denoiser
+from lippmann.rendering.denoise.oidn import Effort, load_denoiser
 from lippmann.rendering.film.memory_model import cut_wavefronts
 from lippmann.rendering.picture import describe_placement
 from lippmann.rendering.provenance import make_provenance
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.request.tuning import TUNING
-from lippmann.rendering.session import open_session, read_choices
+from lippmann.rendering.session import Session, open_session, read_choices
 from lippmann.runtime import machine
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.scene import Scene
+from lippmann.scene.values.description import Matrix
+
+if TYPE_CHECKING:
+    from lippmann.rendering.transport.ray_source import SinglePixelRays
 
 
 @exclusive()
@@ -64,10 +69,7 @@ def render_eye_preview(
     placement = session.place(display)
 
     # Mitsuba may be loaded now that the engine has chosen its libraries.
-    from lippmann.rendering.denoise.dual_buffer import denoise_light
-    from lippmann.rendering.denoise.guided_denoiser import SurfacePart, choose_effort, denoise_surfaces
-    from lippmann.rendering.denoise.tuning import TUNING as DENOISE
-    from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
+    from lippmann.rendering.denoise.guided_denoiser import choose_effort
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.transport.ray_source import SinglePixelRays
 
@@ -75,25 +77,11 @@ def render_eye_preview(
     source = SinglePixelRays(whole, visible.column, visible.row, visible.channel)
     integrator = session.integrator(whole, placement.display_from_world, placement.exposure)
     plan = cut_wavefronts(source.width, source.height, samples, channels=source.channels, memory=session.memory)
-    box_filter = plain.box_filter
-    frame = trace_frame(integrator, source, plan, seed=plain.seed, box_filter=box_filter, progress=progress)
-    picture = visible.arrange(frame.pixels[0])
-    options: dict[str, object] = {}
+    frame = trace_frame(integrator, source, plan, seed=plain.seed, box_filter=plain.box_filter, progress=progress)
+    picture, options = visible.arrange(frame.pixels[0]), dict[str, object]()
     if denoises:
-        plan = plan_guides(source, DENOISE.guide_samples, session.memory)
-        guides = trace_guides(
-            session.built, source, plan, placement.display_from_world, box_filter=box_filter, progress=progress
-        )
         effort = choose_effort(request.denoise, samples)
-        buffers = frame.pixels, guides.albedo, guides.normal
-        noisy, albedo, normal = (visible.arrange_for_denoiser(values[0]) for values in buffers)
-        surfaces = SurfacePart.of(normal)
-
-        def take_noise_out(light: Floats, *_: object) -> Floats:
-            return denoise_surfaces(light, albedo, normal, surfaces, effort=effort)
-
-        clean = session.watch.stage("denoise", lambda: denoise_light(noisy, None, take_noise_out, samples))
-        picture = visible.arrange_denoised(clean)
+        picture = _denoise_view(session, source, placement.display_from_world, visible, frame.pixels, effort)
         options = {"denoise": "oidn", "denoise_effort": effort}
     frame.pixels = picture = mean_of_points(picture, across)
     provenance = make_provenance(
@@ -119,3 +107,34 @@ def _denoises(asked: RenderRequest, resolved: RenderRequest, scene: Scene) -> bo
         return True
     is_noisy = asked.denoise == "auto" and resolved.integrator in POOLED_LIGHT
     return is_noisy and not (scene.lies_off_surfaces or scene.is_unlit) and machine.has_denoiser()
+
+
+def _denoise_view(
+    session: Session,
+    source: SinglePixelRays,
+    display_from_world: Matrix,
+    visible: PixelSet,
+    pixels: Floats,
+    effort: Effort,
+) -> Floats:
+    """The eye's denoised picture, from its noisy ``pixels (1, n, 3)`` and the feature buffers of the same pixels."""
+    from lippmann.rendering.denoise.dual_buffer import denoise_light
+    from lippmann.rendering.denoise.guided_denoiser import SurfacePart, denoise_surfaces
+    from lippmann.rendering.denoise.tuning import TUNING as DENOISE
+    from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
+
+    request, plan = session.request, plan_guides(source, DENOISE.guide_samples, session.memory)
+    progress = session.watch.progress
+    guides = trace_guides(
+        session.built, source, plan, display_from_world, box_filter=request.box_filter, progress=progress
+    )
+    noisy, albedo, normal = (
+        visible.arrange_for_denoiser(values[0]) for values in (pixels, guides.albedo, guides.normal)
+    )
+    surfaces = SurfacePart.of(normal)
+
+    def denoise(light: Floats, *_: object) -> Floats:
+        return denoise_surfaces(light, albedo, normal, surfaces, effort=effort)
+
+    clean = session.watch.stage("denoise", lambda: denoise_light(noisy, None, denoise, request.samples))
+    return visible.arrange_denoised(clean)
