@@ -20,7 +20,7 @@ from lippmann.device.syntax import syntax
 from lippmann.device.types import Color3f, Float, UInt32, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.memory_model import LAYERS, Plan, SampleRange, cut_wavefronts
-from lippmann.rendering.film.wavefront import Coverage, lay_out_wavefront, reorder_to_rows
+from lippmann.rendering.film.wavefront import Coverage, lay_out_wavefront, reorder_to_rows, select_colors
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource
 from lippmann.scene.matrices import inverse, rotation_of
@@ -99,9 +99,7 @@ def trace_guides(
         shape = (tile.rows, plan.width, plan.channels)
         colors, normals, heights, *halves = (_in_rows(part, shape) for part in sums)
         height[rows] = heights.mean(axis=2) / plan.samples
-        if plan.channels == 3:
-            colors = np.diagonal(colors, axis1=2, axis2=3)[:, :, None]
-        albedo[rows] = colors[:, :, 0] / plan.samples
+        albedo[rows] = select_colors(colors) / plan.samples
         normal[rows] = normals.mean(axis=2) @ rotation.T / plan.samples
         for half, hits, number in zip(covered, halves, samples, strict=True):
             half[rows] = hits / max(1, number)

@@ -107,7 +107,6 @@ def make_memory_error(memory: int, what: str, required: int, fix: str = "raise t
 class Tile:
     """Rows ``first_row`` to ``first_row + rows`` of the picture."""
 
-    index: int
     first_row: int
     rows: int
 
@@ -124,8 +123,8 @@ class SampleRange:
 class BatchWavefront:
     """One wavefront of batches: ``count`` samples in each of ``batches`` for the pixels ``first`` to ``last``.
 
-    ``starts``: the number of the first sample of each batch in its stream. ``step``: from pixel to pixel.
-    ``in_strips``: whether pixels are counted as places in whole strips, see :mod:`.wavefront`, else in rows.
+    ``starts``: the number of the first sample of each batch in its stream. ``in_strips``: whether pixels are counted as
+    places in whole strips, see :mod:`.wavefront`, else in rows.
     """
 
     first: int
@@ -133,7 +132,6 @@ class BatchWavefront:
     batches: tuple[int, ...]
     starts: tuple[int, ...]
     count: int
-    step: int = 1
     in_strips: bool = False
 
 
@@ -151,7 +149,7 @@ class Plan:
     @property
     def tiles(self) -> list[Tile]:
         starts = range(0, self.height, self.rows_per_tile)
-        return [Tile(i, row, min(self.rows_per_tile, self.height - row)) for i, row in enumerate(starts)]
+        return [Tile(row, min(self.rows_per_tile, self.height - row)) for row in starts]
 
     @property
     def passes(self) -> list[SampleRange]:

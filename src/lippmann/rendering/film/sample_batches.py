@@ -166,7 +166,7 @@ class BatchedRender(BatchedPicture):
         rest, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
         rest, place = divide(rest, dr.opaque(mi.UInt32, number))
         pixel, channel = divide(rest, channels)
-        pixel = dr.opaque(mi.UInt32, run.first) + pixel * dr.opaque(mi.UInt32, run.step)
+        pixel += dr.opaque(mi.UInt32, run.first)
         strips = in_strips(self._sums.shape[1], window.width) if run.in_strips else 0
         row, column = locate_pixel(pixel, window.width, dr.opaque(mi.UInt32, strips))
         row += dr.opaque(mi.UInt32, window.top)

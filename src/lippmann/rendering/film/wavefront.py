@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from typing import TypeVar
 
 import drjit as dr
@@ -67,12 +67,7 @@ class RayTotals:
     discarded: int = 0
 
     def __add__(self, other: RayTotals) -> RayTotals:
-        return RayTotals(
-            self.primary + other.primary,
-            self.shadow + other.shadow,
-            self.secondary + other.secondary,
-            self.discarded + other.discarded,
-        )
+        return RayTotals(*(sum(pair) for pair in zip(astuple(self), astuple(other), strict=True)))
 
 
 @dataclass
@@ -241,13 +236,8 @@ def add_samples(
 
 
 def select_colors(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """``(pixels, ..., 3)`` from ``(pixels, channels, ..., 3)``: of each sub-pixel's samples, the colour that it shows.
-
-    The rays of a sub-pixel carry all three colours.
-    """
-    if values.shape[1] == 1:
-        return values[:, 0]
-    return np.stack([values[:, c, ..., c] for c in range(3)], axis=-1)
+    """``(..., 3)`` from ``(..., channels, 3)``: of the colours that its rays carry a sub-pixel keeps its own."""
+    return values[..., 0, :] if values.shape[-2] == 1 else np.diagonal(values, axis1=-2, axis2=-1)
 
 
 def sum_counts(counts: UInt32) -> int:

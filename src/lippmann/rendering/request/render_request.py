@@ -215,14 +215,9 @@ class RenderRequest(MachineOptions, QualityOptions):
         return self.pixel_filter == "box"
 
     @property
-    def has_quality(self) -> bool:
-        """Whether a PSNR is to be reached."""
-        return self.quality is not None or self.quality_worst is not None
-
-    @property
     def is_open_ended(self) -> bool:
         """Whether rendering stops by a quality or a time instead of a number of samples."""
-        return self.has_quality or self.max_time is not None
+        return any(goal is not None for goal in (self.quality, self.quality_worst, self.max_time))
 
     def keeps_colors(self, display: Display) -> bool:
         """Whether rays of sub-pixels keep all three colours for the denoiser, though each sub-pixel shows one.
