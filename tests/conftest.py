@@ -84,6 +84,7 @@ def pytest_runtest_protocol(item, nextitem):
     result = yield
     if "mitsuba" in sys.modules and (nextitem is None or nextitem.path != item.path):
         gc.collect()
+        gc.freeze()  # what lives on is not looked at again
     return result
 
 
