@@ -82,6 +82,7 @@ def test_diffuse_pixels_take_the_light_of_the_key_frame_which_is_what_would_be_t
     assert key.provenance.pixel_shares == {}
     made = after.provenance
     assert made.pixel_shares["reprojected"] > 0.55
+    assert made.spp == key.provenance.spp
     if form == "pixels":
         assert made.rays["primary"] == pytest.approx(made.pixel_shares["traced"] * 96 * 64 * made.spp, rel=1e-6)
         assert np.mean(after.maps[SAMPLES_LAYER] == 0) == pytest.approx(made.pixel_shares["reprojected"])

@@ -204,8 +204,8 @@ def trace_others(job: Job, pixels: Floats, is_known: Mask) -> Traced:
     colors = source.own_colors(pixels) if isinstance(source, SubpixelRays) else pixels
     share = float(is_known.mean())
     shares = {"traced": 1 - share, "reprojected": share, "interpolated": 0.0}
-    # Few noisy pixels among clean ones keep more of their noise in the denoiser: up to twice as many samples.
-    request = replace(job.request, spp=round((1 + share) * job.request.samples))
+    # Few noisy pixels among clean ones keep more of their noise in the denoiser: up to the key frame's samples.
+    request = replace(job.request, spp=round(min(1 + share, 1 / TUNING.samples_kept) * job.request.samples))
     note = f"{100 * share:.0f} % of the pixels have the key frame's light, the others {request.samples} samples"
     if is_known.all():
         frame = Frame(colors, shares=shares)
