@@ -12,6 +12,7 @@ from PIL import Image as Pillow
 from lippmann.codecs.exr import write_exr
 from lippmann.codecs.icc import rgb_profile
 from lippmann.codecs.pfm import write_pfm
+from lippmann.codecs.png import encode_png
 from lippmann.color.primaries import REC709
 from lippmann.display import load_display
 from lippmann.errors import SceneError, UsageError
@@ -253,13 +254,17 @@ def test_pictures_in_colours_are_no_depth(tmp_path):
     tifffile.imwrite(tmp_path / "d.tif", np.stack([ramp, 255 - ramp, ramp // 2], axis=2), photometric="rgb")
     colors = {name: np.full((2, 2), 1 + number, np.float32) for number, name in enumerate("RGB")}
     write_exr(tmp_path / "d.exr", colors, text={})
-    for name in ("d.png", "d.tif", "d.exr"):
+    wide = np.stack([256 * ramp.astype(np.uint16), ramp, ramp], axis=2)
+    (tmp_path / "wide.png").write_bytes(encode_png(wide, text={}))
+    for name in ("d.png", "d.tif", "d.exr", "wide.png"):
         with pytest.raises(SceneError, match=f"^{name}: is a picture in colours; depth is grey"):
             read_depth_map(tmp_path / name)
     Pillow.fromarray(np.stack([ramp] * 3, axis=2)).save(tmp_path / "d.jpg", quality=60)
     assert read_depth_map(tmp_path / "d.jpg").inverse.shape == (8, 64)
     write_exr(tmp_path / "d.exr", dict.fromkeys("RGB", np.full((2, 2), 2, np.float32)), text={})
     assert read_depth_map(tmp_path / "d.exr").inverse[0, 0] == 0.5
+    (tmp_path / "wide.png").write_bytes(encode_png(np.full((2, 2, 3), 2001, np.uint16), text={}))
+    assert read_depth_map(tmp_path / "wide.png").inverse[0, 0] == np.float32(1 / 2001)  # mm, in all of their 16 bits
 
 
 def test_portraits_that_mean_nothing_are_refused():

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from PIL import UnidentifiedImageError
 from scipy import ndimage
 
-from lippmann.codecs import tiff
+from lippmann.codecs import png, tiff
 from lippmann.codecs.exr import read_exr, read_exr_header
 from lippmann.codecs.orientation import of_picture, upright
 from lippmann.codecs.pfm import read_pfm
+from lippmann.codecs.photograph import open_photograph
 from lippmann.codecs.pillow_formats import RULE, open_picture
 from lippmann.codecs.rgbd_names import White
 from lippmann.errors import LippmannError, MemoryLimitError, PictureError, SceneError
@@ -36,6 +37,9 @@ _DISPARITY = re.compile(r"disparity|(?<![a-z])(disp\d*(gt)?|dpt|midas)(?![a-z])"
 _DARK_NEAR = re.compile(r"-far$|marigold|depth_16bit", re.IGNORECASE)
 #: Mean difference of the channels of a grey picture, in codes of 8 bits, which JPEG's greys stay below.
 _MOST_TINT = 8.0
+
+#: Depth and type of RGB and RGBA of 16 bits in the header of a PNG, of which Pillow reads the upper 8.
+_WIDE_COLORS = (b"\x10\x02", b"\x10\x06")
 
 _XMP = b"http://ns.adobe.com/xap/1.0/\0"
 _XMP_EXTENSION = b"http://ns.adobe.com/xmp/extension/\0"
@@ -217,6 +221,9 @@ def _gray(data: bytes, where: str, turn: int | None = None) -> NDArray[Any]:
         # Pillow does not read floats of 16 bits in a TIFF, nor greys whose 0 is white.
         if data.startswith(tiff.SIGNATURES):
             return _luminance(tiff.TiffPicture(io.BytesIO(data), Path(where)).read(), where)
+        if data.startswith(png.SIGNATURE) and data[24:26] in _WIDE_COLORS:
+            with open_photograph(io.BytesIO(data), Path(where), ("PNG",)) as photograph:
+                return _luminance(photograph.codes(), where)
         with open_picture(io.BytesIO(data)) as picture:
             turn = of_picture(picture) if turn is None else turn
             if picture.mode == "F":
@@ -243,8 +250,9 @@ def _check_grey(codes: NDArray[np.uint8], where: str) -> None:
 
 def _luminance(values: NDArray[Any], where: str) -> NDArray[Any]:
     """Grey of ``(h, w, 1 to 4)`` values, of colours of 8 bits by the weights of Rec. 601."""
+    if values.shape[2] >= 3 and values.dtype.kind == "u":
+        _check_grey(np.asarray(values[..., :3] >> (8 * values.itemsize - 8), np.uint8), where)
     if values.shape[2] >= 3 and values.dtype == np.uint8:
-        _check_grey(np.asarray(values[..., :3], np.uint8), where)
         return np.asarray(np.rint(values[..., :3] @ np.array([0.299, 0.587, 0.114])), np.uint8)
     return values[..., 0]
 
