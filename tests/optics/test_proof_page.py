@@ -12,14 +12,13 @@ from lippmann.optics.proof_page import check_proof_page, write_proof_page
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["print-60lpi", "panel-4k"])
-def test_a_page_shows_the_proof_and_its_plots(tmp_path, name):
-    display = load_display(name)
+def test_a_page_shows_the_proof_and_its_plots(tmp_path):
+    display = load_display("print-60lpi")
     proof = prove(display)
     page = tmp_path / "proof.html"
     write_proof_page(proof, display, page)
     text = page.read_text(encoding="utf-8")
-    assert f"Proof of {name}" in text
+    assert "Proof of print-60lpi" in text
     for value in (proof.in_words()["crosstalk"], proof.in_words()["zone"]):
         assert value in text
     assert "where an eye sees the whole picture" in text
@@ -29,10 +28,9 @@ def test_a_page_shows_the_proof_and_its_plots(tmp_path, name):
 
 @pytest.mark.slow
 def test_pictures_and_documents(tmp_path):
-    display = load_display("print-60lpi")
-    proof = prove(display)
-    write_proof_page(proof, display, tmp_path / "proof.png")
-    write_proof_page(proof, display, tmp_path / "proof.pdf")
+    for name, ending in (("print-60lpi", "png"), ("panel-4k", "pdf")):
+        display = load_display(name)
+        write_proof_page(prove(display), display, tmp_path / f"proof.{ending}")
     assert (tmp_path / "proof.pdf").read_bytes().startswith(b"%PDF")
     with Image.open(tmp_path / "proof.png") as picture:
         assert picture.height > picture.width > 1000
