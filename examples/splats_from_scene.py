@@ -153,9 +153,9 @@ def _spacing(points: Numbers) -> Numbers:
 
 def write_ply(splats: Splats, path: Path) -> None:
     """Write splats as trainers do, whose y points down."""
-    from lippmann.scene.splat_clouds import moved
+    from lippmann.scene.splat_clouds import move
 
-    splats = moved(splats, np.diag([1.0, -1.0, -1.0, 1.0]))
+    splats = move(splats, np.diag([1.0, -1.0, -1.0, 1.0]))
     rest = splats.harmonics[:, 1:].transpose(0, 2, 1).reshape(splats.count, -1)
     logits = np.log(splats.opacities / (1 - splats.opacities))
     columns = {name: splats.centers[:, place] for place, name in enumerate("xyz")}
