@@ -47,7 +47,8 @@ def cheaper(words: list[str]) -> list[str]:
     if "--target" in words and words[1] == "quilt":
         return [*words, "--size", "960x270" if "displayxr" in words else "480x270", "--spp", "2"]
     if words[1:3] == ["quilt", "render"]:
-        return [*words, "--size", "384x384", "--spp", "2"]
+        plain = [] if {"--method", "--denoise"} & set(words) else ["--method", "full", "--denoise", "none"]
+        return [*words, "--size", "384x384", "--spp", "2", *plain]
     if "--sweep" in words:
         return [*words, "--frames", "2"]
     if words[1] not in ("render", "preview") or any(

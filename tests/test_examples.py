@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -28,11 +29,13 @@ def test_the_guide_shows_the_plugins_as_they_are():
 @pytest.mark.slow
 def test_installed_plugins_render_their_own_files(engine, tmp_path):
     target = tmp_path / "installed"
-    words = ["install", "-q", "--no-deps", "--no-build-isolation", "--disable-pip-version-check", "--no-compile"]
+    build = [sys.executable, "-c", f"from setuptools import build_meta; build_meta.build_wheel({str(target)!r})"]
     for folder in PLUGINS:
         shutil.copytree(EXAMPLES / folder, tmp_path / folder)  # building leaves files beside the sources
-        words.append(str(tmp_path / folder))
-    subprocess.run([sys.executable, "-m", "pip", *words, "--target", str(target)], check=True)
+        subprocess.run(build, cwd=tmp_path / folder, capture_output=True, check=True)
+    for wheel in target.glob("*.whl"):
+        # All that installing a wheel of Python's alone does that the program sees; pip takes three times as long.
+        zipfile.ZipFile(wheel).extractall(target)
     gem = str(tmp_path / "smf_reader" / "gem.smf")
     quick = ["--spp", "2", "--method", "full", "--threads", "2"]
     commands = [
