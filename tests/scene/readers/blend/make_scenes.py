@@ -186,6 +186,30 @@ def pictures():
     save("pictures.blend")
 
 
+def surfaces():
+    """Materials of one node that is no Principled BSDF, with a colour or a picture."""
+    scene = fresh()
+    picture = bpy.data.images.new("picture", 4, 4)
+    picture.pack()
+    for place, kind in enumerate(("Diffuse", "Glossy", "Glass")):
+        material = bpy.data.materials.new(kind)
+        shader_of(material)
+        tree = material.node_tree
+        node = tree.nodes.new(f"ShaderNodeBsdf{'Anisotropic' if kind == 'Glossy' else kind}")
+        node.inputs["Color"].default_value = (0.8, 0.2, 0.1, 1.0)
+        node.inputs["Roughness"].default_value = 0.25
+        if kind == "Diffuse":
+            texture = tree.nodes.new("ShaderNodeTexImage")
+            texture.image = picture
+            tree.links.new(texture.outputs["Color"], node.inputs["Color"])
+        tree.links.new(node.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+        mesh = cube(kind)
+        mesh.uv_layers.new()
+        mesh.materials.append(material)
+        put(scene, kind, mesh, (2.0 * place, 0.0, 0.0))
+    save("surfaces.blend")
+
+
 def lights():
     scene = fresh()
     put(scene, "Cube", cube())
@@ -280,5 +304,18 @@ def working_spaces():
         save(f"{space.split()[-1]}.blend")
 
 
-for make in (everything, moving, outside, empty, aside, pictures, lights, shifted, otherwise, flat, working_spaces):
+for make in (
+    everything,
+    moving,
+    outside,
+    empty,
+    aside,
+    pictures,
+    surfaces,
+    lights,
+    shifted,
+    otherwise,
+    flat,
+    working_spaces,
+):
     make()

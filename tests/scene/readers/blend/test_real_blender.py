@@ -173,6 +173,19 @@ def test_pictures_are_codes_for_colours_and_numbers_for_the_rest(read_real):
         assert green / 255 == pytest.approx(0.5, abs=0.01), name
 
 
+def test_surfaces_of_one_node(read_real):
+    scene = read_real("surfaces.blend")
+    diffuse, glossy, glass = (
+        next(each for each in scene.materials if each.name == name) for name in ("Diffuse", "Glossy", "Glass")
+    )
+    assert diffuse.base_color_texture is not None
+    assert (diffuse.metallic, diffuse.roughness, diffuse.specular) == (0.0, 1.0, 0.0)
+    assert (glossy.metallic, glossy.roughness) == (1.0, pytest.approx(0.25))
+    assert (glass.transmission, glass.roughness) == (1.0, pytest.approx(0.25))
+    assert glossy.base_color == glass.base_color == pytest.approx((0.8, 0.2, 0.1))
+    assert not any("glTF has no word" in note for note in scene.notes)
+
+
 def test_lights_with_a_temperature_or_the_strength_of_their_surface(read_real):
     scene = read_real("lights.blend")
     warm, sized = lamp(scene, "warm"), lamp(scene, "sized")

@@ -22,6 +22,7 @@ from .lights import camera_frames, describe_lights, focus_distances
 from .plain_values import plain_values
 from .remarks import remark_lights, remark_materials, remark_objects, remark_scene, unseen_objects
 from .render_view import as_rendered
+from .surfaces import as_principled
 from .working_space import materials_to_rec709, vertex_colors_to_rec709
 from .world import write_world
 
@@ -67,7 +68,7 @@ def export_scene(folder: Path, *, is_animated: bool = False) -> Exported:
 
     path = folder / SCENE
     unit = float(scene.unit_settings.scale_length) if scene.unit_settings.system != "NONE" else 1.0
-    with as_rendered(scene, view_layer):
+    with as_rendered(scene, view_layer), as_principled():
         depsgraph = bpy.context.evaluated_depsgraph_get()
         for remark_on in (remark_objects, remark_materials, remark_lights):
             remark_on(depsgraph, remark)
