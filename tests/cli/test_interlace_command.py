@@ -10,6 +10,7 @@ import tifffile
 from PIL import Image, ImageCms
 
 LPI, PPI, DISTANCE, FIELD, COUNT = 20.0, 400.0, 300.0, 50.0, 4
+MONITOR = "monitor:dpi=282,size=400x300,pitch=45.5,slope=-6,center=0"
 SHEET = ("--lpi", LPI, "--ppi", PPI, "--viewing-distance", f"{DISTANCE}mm", "--field", FIELD)
 LEVELS = (30, 90, 160, 230)
 
@@ -240,6 +241,7 @@ def test_outputs_are_named_after_the_input(lippmann, tmp_path, monkeypatch):
     Image.new("RGB", (512, 256)).save(tmp_path / "a_qs2x1a1.png")
     for command, made in (
         (("interlace", "shots", *SHEET, "--size", "30x20mm"), "shots-native.tif"),
+        (("interlace", "shots", "-d", MONITOR), "shots-native.png"),
         (("quilt", "unpack", "a_qs2x1a1.png"), "a_qs2x1a1-views"),
         (("quilt", "pack", "shots"), "shots_qs1x2a1.33333.png"),
     ):

@@ -160,6 +160,7 @@ def test_bad_input_is_one_line_and_code_2(lippmann, views, calibration, tmp_path
     assert "of 8 columns and 6 rows: native_qs8x6a0.75.png" in unnamed
     assert "it holds 48 views; 5x9 views are 45" in refused("quilt", "pack", views, "-o", tmp_path / "x_qs5x9a1.6.png")
     assert "no such file" in refused("quilt", "pack", tmp_path / "no", "-o", tmp_path / NAME)
+    assert "no such file" in refused("quilt", "pack", tmp_path / "no")
     assert "no such file" in refused("quilt", "unpack", tmp_path / NAME, "-o", tmp_path / "out")
     assert "--display" in refused("weave", views, "-o", native)
     assert "unknown display" in refused("weave", views, "-d", "lkg", "-o", native)

@@ -88,10 +88,10 @@ def interlace(
     from lippmann.quilts.view_names import line_of_grid
     from lippmann.quilts.weave import check_weavable, usual_choice
 
-    console, output = Console(quiet, as_json), output_of(output, photos[0], "-native.tif")
-    check_interlaced_path(output)
-    across = lenses == "across"
+    console, across = Console(quiet, as_json), lenses == "across"
     target, asked_finish = sheet_of(_display(display, printed, turned=across), replace(finishing, icc=icc))
+    output = output_of(output, photos[0], "-native.tif" if target.sheet else "-native.png")
+    check_interlaced_path(output)
     check_weavable(target)  # before the photographs are read
     finish = asked_finish or NO_FINISH
     paths, of_grid = line_of_grid(natural_order(_pictures(photos)), down=across)

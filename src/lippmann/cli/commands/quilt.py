@@ -188,7 +188,6 @@ def pack(
 
     console = Console(quiet, as_json)
     if output is None:
-        folder.stat()
         output = output_of(None, folder, ("_2x1" if folder.is_file() else ending_of_views(folder)) + ".png")
     layout, half = layout_of_name(output, to_write=True), names_half_pair(output)
     check_output(output, bits)
