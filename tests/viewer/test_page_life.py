@@ -49,8 +49,12 @@ def words(tab, selector):
 
 
 @pytest.mark.slow
-def test_pointer_leads_the_eye(open_tab, page):
+def test_pointer_leads_the_eye_and_nothing_moves_by_itself(open_tab, page):
     tab = opened(open_tab, page)
+    before = state(tab, "eye")
+    tab.page.wait_for_timeout(300)
+    assert state(tab, "eye") == before
+    assert tab.evaluate(f"{VIEWER}.requested") == 0
     x, y, right, up = middle(tab)
     tab.page.mouse.move(x + 0.5 * right, y - 0.5 * up)
     settle(tab)
@@ -277,15 +281,6 @@ def test_page_fits_a_phone(open_tab, page_of_two):
     tab.assert_clean()
 
 
-@pytest.mark.slow
-def test_nothing_moves_by_itself(open_tab, page):
-    tab = opened(open_tab, page)
-    before = state(tab, "eye")
-    tab.page.wait_for_timeout(300)
-    assert state(tab, "eye") == before
-    assert tab.evaluate(f"{VIEWER}.requested") == 0
-
-
 # ---- What goes wrong -----------------------------------------------------------------------------------------------
 
 
@@ -330,14 +325,13 @@ def grow_version(data):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("change", "said"), [(cut_tile, "damaged"), (lose_tile, "missing"), (grow_version, "another version")]
-)
-def test_damage_is_said_on_the_page(open_tab, page, tmp_path, change, said):
-    tab = open_tab(offline=True).open(changed(page, tmp_path, change))
-    tab.wait_for("!document.querySelector('.message').hidden")
-    assert said in words(tab, ".message")
-    tab.assert_clean()
+def test_damage_is_said_on_the_page(open_tab, page, tmp_path):
+    tab = open_tab(offline=True)
+    for change, said in ((cut_tile, "damaged"), (lose_tile, "missing"), (grow_version, "another version")):
+        tab.open(changed(page, tmp_path, change))
+        tab.wait_for("!document.querySelector('.message').hidden")
+        assert said in words(tab, ".message")
+        tab.assert_clean()
 
 
 @pytest.mark.slow
