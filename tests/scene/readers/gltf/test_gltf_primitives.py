@@ -188,13 +188,15 @@ def test_sets_of_texture_coordinates(writer, read):
     np.testing.assert_array_equal(np.array(mesh.uvs), np.array(sets, np.float32))
 
 
-def test_a_texture_without_its_coordinates_gets_one_texel(writer, read):
-    info = {"index": writer.texture([[[1, 2, 3]]]), "texCoord": 1}
+@pytest.mark.parametrize(("named", "given"), [(1, 1), (-1, 0)])
+def test_a_texture_without_its_coordinates_gets_one_texel(writer, read, named, given):
+    """The set -1 is Blender's word for there being none."""
+    info = {"index": writer.texture([[[1, 2, 3]]]), "texCoord": named}
     writer.add("materials", normalTexture=info)
     uvs = writer.accessor([[0, 0], [1, 0], [0, 1]])
-    scene = read(writer.triangle(material=0, attributes={"TEXCOORD_0": uvs}))
-    assert len(scene.meshes[0].uvs) == 2
-    assert not scene.meshes[0].uvs[1].any()
+    scene = read(writer.triangle(material=0, attributes={f"TEXCOORD_{index}": uvs for index in range(given)}))
+    assert len(scene.meshes[0].uvs) == given + 1
+    assert not scene.meshes[0].uvs[given].any()
     assert "lacks" in scene.notes[0]
 
 

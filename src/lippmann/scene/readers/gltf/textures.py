@@ -60,7 +60,8 @@ class Textures:
             return None
         wrap_u, wrap_v, texel_filter = self._sampler(fields)
         transform = info.extension("KHR_texture_transform")
-        uv_set = info.optional_integer("texCoord") or 0
+        # Blender 5.3 writes -1 where a mesh has no coordinates.
+        uv_set = 0 if info.values.get("texCoord") == -1 else info.optional_integer("texCoord") or 0
         if transform is not None and transform.has("texCoord"):
             uv_set = transform.integer("texCoord")
         if uv_set >= _MOST_UV_SETS:
