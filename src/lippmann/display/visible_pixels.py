@@ -43,6 +43,9 @@ class PixelSet:
     places:
         ``(rows, columns)`` int32: the picture for denoisers as numbers of pixels; -1 where none is seen. Lenses that
         are blocks have one value each (and panel row); else it is ``number``, sub-pixels side by side.
+    across:
+        Each pixel of the picture is the mean of ``across`` x ``across`` points, which ``number`` and ``places`` have in
+        its place; each value for denoisers too, where lenses are no blocks.
     """
 
     column: Indices
@@ -50,6 +53,7 @@ class PixelSet:
     channel: Indices
     number: NDArray[np.int32]
     places: NDArray[np.int32]
+    across: int = 1
 
     #: Whether values of the picture are sums over several pixels, of which ``number`` is the brightest.
     is_mixed: ClassVar[bool] = False
@@ -62,16 +66,29 @@ class PixelSet:
     def arrange(self, values: Floats) -> Floats:
         """The picture ``(height, width, 3)`` of the pixels' values ``(n, 3)``; 0 where none is seen."""
         with_black = _with_black(values)
-        return with_black[self.number[..., 0]] if self.channels == 1 else with_black[self.number, np.arange(3)]
+        points = with_black[self.number[..., 0]] if self.channels == 1 else with_black[self.number, np.arange(3)]
+        return mean_of_points(points, self.across)
+
+    @property
+    def points(self) -> int:
+        """Of how many points a value for denoisers is the mean."""
+        return self.across**2 if self.places.size == self.number.size else 1
 
     def arrange_for_denoiser(self, values: Floats) -> Floats:
         """The picture ``(rows, columns, 3)`` for denoisers, of ``places``: with all colours of each sub-pixel, as noise
         that differs from colour to colour looks like texture.
         """
-        return _with_black(values)[self.places]
+        picture = _with_black(values)[self.places]
+        if self.points == 1:
+            return picture
+        points = picture.reshape(*self.number.shape[:2], -1)
+        return mean_of_points(points, self.across).reshape(len(points) // self.across, -1, 3)
 
     def arrange_denoised(self, picture: Floats) -> Floats:
         """The picture ``(height, width, 3)`` from a denoised one of :meth:`arrange_for_denoiser`."""
+        if self.points > 1:
+            colors = picture.reshape(len(picture), -1, self.channels, 3)
+            return colors[..., 0, :] if self.channels == 1 else colors[..., np.arange(3), np.arange(3)]
         values, is_visible = np.zeros((len(self.column), 3), np.float32), self.places >= 0
         values[self.places[is_visible]] = picture[is_visible]
         return self.arrange(values)
@@ -187,11 +204,11 @@ def points_of_pixel(display: Display, size: tuple[int, int]) -> int:
 
 
 def mean_of_points(picture: Floats, across: int) -> Floats:
-    """The picture ``(height, width, 3)`` of one with ``across`` x ``across`` points in place of each pixel."""
+    """The picture ``(height, width, n)`` of one with ``across`` x ``across`` points in place of each pixel."""
     if across == 1:
         return picture
     height, width = (side // across for side in picture.shape[:2])
-    means: Floats = picture.reshape(height, across, width, across, 3).mean(axis=(1, 3), dtype=np.float32)
+    means: Floats = picture.reshape(height, across, width, across, -1).mean(axis=(1, 3), dtype=np.float32)
     return means
 
 

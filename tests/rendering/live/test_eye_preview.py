@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -137,6 +138,17 @@ def test_denoisers_get_all_colors_of_each_value_and_pictures_come_back(display, 
     assert picture.shape[1] == (3 * 150 if subpixels else display.lens_grid.columns)
     assert (picture == values[visible.places]).all(axis=2)[visible.places >= 0].all()
     assert np.array_equal(visible.arrange_denoised(picture), visible.arrange(values))
+
+
+@pytest.mark.parametrize(("display", "subpixels"), [(FINE, True), (FINE, False), (BLOCKS, False)])
+def test_denoisers_get_means_of_points_as_the_picture_does_but_where_lenses_are_blocks(display, subpixels):
+    visible = replace(EyeMap(display, (150, 100), subpixels=subpixels).pixels_for_eye(EYES[0]), across=2)
+    values = np.random.default_rng(5).random((len(visible.column), 3), dtype=np.float32)
+    picture = visible.arrange_for_denoiser(values)
+    assert picture.shape[1] == (display.lens_grid.columns if display is BLOCKS else 75 * visible.channels)
+    assert visible.points == (1 if display is BLOCKS else 4)
+    assert visible.arrange(values).shape == (50, 75, 3)
+    assert visible.arrange_denoised(picture) == pytest.approx(visible.arrange(values), abs=1e-6)
 
 
 def test_a_photograph_fills_picture_and_preview_with_its_own_colours(tmp_path):

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from lippmann.display import Display
-from lippmann.display.visible_pixels import EyeMap, Floats, PixelSet, Vector, mean_of_points, points_of_pixel
+from lippmann.display.visible_pixels import EyeMap, Floats, PixelSet, Vector, points_of_pixel
 from lippmann.image.preview import Preview
 from lippmann.options.choices import POOLED_LIGHT
 from lippmann.progress import ProgressCallback, silent
@@ -60,7 +60,8 @@ def render_eye_preview(
     resolved = resolve(replace(request, method="full"), scene, display)
     width, height = display.panel.size_inside(*size)
     across = points_of_pixel(display, (width, height))
-    visible = EyeMap(display, (width * across, height * across), subpixels=bool(resolved.subpixels)).pixels_for_eye(eye)
+    points = EyeMap(display, (width * across, height * across), subpixels=bool(resolved.subpixels))
+    visible = replace(points.pixels_for_eye(eye), across=across)
     samples = _choose_samples(request, resolved, len(visible.column) // visible.channels)
     denoises = _denoises(request, resolved, scene)
     # The eye's view is denoised, not the traced pixels.
@@ -83,7 +84,7 @@ def render_eye_preview(
         effort = choose_effort(request.denoise, samples)
         picture = _denoise_view(session, source, placement.display_from_world, visible, frame.pixels, effort)
         options = {"denoise": "oidn", "denoise_effort": effort}
-    frame.pixels = picture = mean_of_points(picture, across)
+    frame.pixels = picture
     provenance = make_provenance(
         session,
         frame,
@@ -123,7 +124,7 @@ def _denoise_view(
     from lippmann.rendering.denoise.tuning import TUNING as DENOISE
     from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
 
-    request, plan = session.request, plan_guides(source, DENOISE.guide_samples, session.memory)
+    request, plan = session.request, plan_guides(source, DENOISE.guide_samples // visible.points, session.memory)
     progress = session.watch.progress
     guides = trace_guides(
         session.built, source, plan, display_from_world, box_filter=request.box_filter, progress=progress
