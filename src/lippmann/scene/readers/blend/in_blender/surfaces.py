@@ -20,10 +20,10 @@ _OWN = ("Roughness", "IOR", "Normal")
 @contextmanager
 def as_principled() -> Iterator[None]:
     """Let such materials have a Principled BSDF; all is as it was at the end."""
-    made = []
+    made: list[tuple[Any, Any, Any, Any]] = []
     try:
         for material in bpy.data.materials:
-            tree = material.node_tree if material.use_nodes and material.library is None else None
+            tree: Any = material.node_tree if material.use_nodes and material.library is None else None
             for output in [] if tree is None else [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL"]:
                 links = output.inputs["Surface"].links
                 if links and links[0].from_node.type in _SURFACES:
