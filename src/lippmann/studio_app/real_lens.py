@@ -163,8 +163,13 @@ class RealEyeMap(EyeMap):
         parts = (part.astype(np.uint32) for part in (pixel % panel.width, pixel // panel.width, traced % channels))
         column, row, channel_of = parts
         brightest_of = brightest[self._lenses]
-        mixture = {"starts": starts, "members": members, "weights": weights}
-        return MixedPixels(column, row, channel_of, brightest_of, self._places, lenses=self._lenses, **mixture)
+        return MixedPixels(
+            *(column, row, channel_of, brightest_of, self._places),
+            starts=starts,
+            members=members,
+            weights=weights,
+            lenses=self._lenses,
+        )
 
 
 @lru_cache(2)
