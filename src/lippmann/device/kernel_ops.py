@@ -33,8 +33,8 @@ def upload(values: NDArray[Any]) -> Array:
 
     On the CPU Dr.Jit would read a NumPy array where it lies. It is not aligned there as packets of loads need it, so
     every look-up of a row would become one slow gather a column, or not, by chance: kernels would be compiled for both.
-    And the last packet reads on beyond its end, which
-    crashes where that is the end of a page. So the values are copied to memory that Dr.Jit allocates.
+    And the last packet reads on beyond its end, which crashes where that is the end of a page. So the values are copied
+    to memory that Dr.Jit allocates.
     """
     kinds = {"f": (mi.Float, np.float32), "i": (mi.Int32, np.int32), "u": (mi.UInt32, np.uint32)}
     device_type, dtype = (mi.UInt8, np.uint8) if values.dtype == np.uint8 else kinds[values.dtype.kind]
