@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.codecs.types import Pixels
-from lippmann.color.primaries import REC709, xyz_from_rgb
+from lippmann.color.primaries import P3_D65, REC709, REC2020, xyz_from_rgb
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import PictureError
 from lippmann.runtime.regular_file import check_kind, unreadable
@@ -37,15 +37,14 @@ _ALIKE = 0.002
 #: white of cinemas and with D65.
 _D65 = REC709[6:]
 _REC601 = (0.630, 0.340, 0.310, 0.595, 0.155, 0.070, *_D65)
-_P3 = (0.680, 0.320, 0.265, 0.690, 0.150, 0.060)
 _PRIMARIES = {
     1: REC709,
     5: (0.640, 0.330, 0.290, 0.600, 0.150, 0.060, *_D65),
     6: _REC601,
     7: _REC601,
-    9: (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, *_D65),
-    11: (*_P3, 0.314, 0.351),
-    12: (*_P3, *_D65),
+    9: REC2020,
+    11: (*P3_D65[:6], 0.314, 0.351),
+    12: P3_D65,
 }
 
 

@@ -11,6 +11,9 @@ Matrix = NDArray[np.float64]
 
 #: Chromaticities x, y of red, green, blue and white.
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+P3_D65 = (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, *REC709[6:])
+REC2020 = (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, *REC709[6:])
+ACES_AP1 = (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767)
 
 #: Cone responses of XYZ (Lam 1985, "Bradford"), in which whites are adapted.
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pxr import Usd, UsdShade
 
+from lippmann.color.primaries import ACES_AP1, P3_D65, REC2020
 from lippmann.scene.readers.usd.records import Record
 
 PREVIEW = "UsdPreviewSurface"
@@ -362,11 +363,7 @@ _CODED = re.compile(r"(?!.*lin).*(?:srgb|g\d\d|gamma|rec709_display)", re.IGNORE
 
 
 #: Chromaticities of red, green, blue and white of colour spaces, by what their names hold.
-_PRIMARIES = {
-    "ap1|acescg": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
-    "p3": (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
-    "2020": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
-}
+_PRIMARIES = {"ap1|acescg": ACES_AP1, "p3": P3_D65, "2020": REC2020}
 
 
 def primaries_of(space: str) -> Sequence[float] | None:
