@@ -79,11 +79,13 @@ def render_eye_preview(
     integrator = session.integrator(whole, placement.display_from_world, placement.exposure)
     plan = cut_wavefronts(source.width, source.height, samples, channels=source.channels, memory=session.memory)
     frame = trace_frame(integrator, source, plan, seed=plain.seed, box_filter=plain.box_filter, progress=progress)
-    picture, options = visible.arrange(frame.pixels[0]), dict[str, object]()
+    options: dict[str, object] = {}
     if denoises:
         effort = choose_effort(request.denoise, samples)
         picture = _denoise_view(session, source, placement.display_from_world, visible, frame.pixels, effort)
         options = {"denoise": "oidn", "denoise_effort": effort}
+    else:
+        picture = visible.arrange(frame.pixels[0])
     frame.pixels = picture
     provenance = make_provenance(
         session,
