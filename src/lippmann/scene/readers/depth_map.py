@@ -112,8 +112,9 @@ def read_depth_map(path: Path) -> DepthMap:
     """Read a depth map.
 
     Floats (``.pfm``, ``.npy``, OpenEXR, TIFF) are metres, pictures of 16 bits millimetres, but disparities where the
-    name says so. A picture of 8 bits, or one whose 16 bits are stretched to their whole range, is brighter where
-    something is nearer, as programs that estimate depth write it, unless the name says that dark is near.
+    name says so. Floats that reach from 0 to 1 are depth without a unit. A picture of 8 bits, or one whose 16 bits are
+    stretched to their whole range, is brighter where something is nearer, as programs that estimate depth write it,
+    unless the name says that dark is near.
 
     Raises
     ------
