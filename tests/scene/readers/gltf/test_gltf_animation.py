@@ -195,6 +195,18 @@ def test_keys_are_followed_in_the_order_of_their_times(writer, moving, world_poi
     assert any("do not rise" in note for note in scene.at(0).notes) == (sorted(set(times)) != times)
 
 
+def test_pointers_to_nodes_move_them(writer, moving, world_points):
+    animated(writer, "translation", [0, 1], [[0, 0, 0], [4, 0, 0]])
+    channel = writer.json["animations"][0]["channels"][0]
+    pointer = f"/nodes/{channel['target']['node']}/translation"
+    channel["target"] = {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}}
+    scene = moving(writer)
+    assert world_points(scene.at(0.5))[0, 0] - world_points(scene.at(0))[0, 0] == pytest.approx(2)
+    channel["target"]["extensions"]["KHR_animation_pointer"]["pointer"] = "/nodes/9/translation"
+    with pytest.raises(SceneError, match="there are 2 nodes"):
+        moving(writer)
+
+
 def test_what_cannot_be_followed_is_said(writer, moving):
     animated(writer, "translation", [0, 1], [[0, 0, 0], [1, 0, 0]])
     pointer = {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": "/materials/0/alphaCutoff"}}}

@@ -290,7 +290,7 @@ def test_a_missing_buffer_is_not_answered_with_the_file_itself(writer, tmp_path)
 
 def test_pointers_of_animations_are_named(writer, read):
     writer.triangle().json["extensionsUsed"] = ["KHR_animation_pointer"]
-    expected = "animations of materials, lights and cameras (KHR_animation_pointer) are not followed"
+    expected = "animations of materials, lights, cameras and visibility (KHR_animation_pointer) are not followed"
     assert read(writer).notes == (expected,)
 
 
@@ -304,7 +304,7 @@ def test_where_a_tile_lies_on_the_globe_does_not_matter(writer, read):
 
 
 def test_used_extension_that_is_not_understood_is_noted(writer, read):
-    writer.triangle().json["extensionsUsed"] = ["KHR_materials_dispersion", "KHR_materials_ior", "KHR_xmp_json_ld"]
+    writer.triangle().json["extensionsUsed"] = ["KHR_materials_dispersion", "KHR_materials_ior", "EXT_mesh_manifold"]
     assert read(writer).notes == (
         "the glTF extension KHR_materials_dispersion is not understood; what it adds is left out",
     )

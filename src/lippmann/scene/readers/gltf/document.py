@@ -79,6 +79,9 @@ _SILENT = frozenset({"KHR_xmp", "KHR_xmp_json_ld", "KHR_node_selectability", "KH
 # They say where on the globe a tile lies, and what its parts stand for.
 _SILENT |= {"CESIUM_RTC", "EXT_instance_features", "EXT_mesh_features", "EXT_structural_metadata"}
 
+# They say which triangles were one face, that a mesh is closed, and how an editor shows the root.
+_SILENT |= {"EXT_mesh_manifold", "FB_ngon_encoding", "GODOT_single_root"}
+
 # It moves what stands still in a scene at rest.
 _POINTER = "KHR_animation_pointer"
 
@@ -88,10 +91,10 @@ _FORMER_MATERIALS = frozenset({"KHR_blend", "KHR_materials_common", "KHR_techniq
 # Tools that write the same scene without an extension.
 _UPGRADE = "convert it with 'gltf-pipeline -i in.gltf -o out.glb'"
 DECOMPRESS = "decompress it with 'gltfpack -noq -i in.glb -o out.glb'"
-#: Extensions of compressed buffer views; the file may hold the same bytes uncompressed, too.
 #: The extension of material variants, how many of them a line names, and the name by which they are chosen.
 VARIANTS, _NAMED, MATERIALS = "KHR_materials_variants", 20, "materials"
 
+#: Extensions of compressed buffer views; the file may hold the same bytes uncompressed, too.
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 _PICTURE_FORMATS = {"EXT_texture_webp": "webp", "EXT_texture_avif": "avif"}
@@ -338,7 +341,7 @@ def _remark(extension: str) -> str:
     if extension in _FORMER_MATERIALS:
         return f"materials of the glTF extension {extension} are shown as plain ones; {_UPGRADE}"
     if extension == _POINTER:
-        return f"animations of materials, lights and cameras ({extension}) are not followed"
+        return f"animations of materials, lights, cameras and visibility ({extension}) are not followed"
     return f"the glTF extension {extension} is not understood; what it adds is left out"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -28,6 +29,9 @@ _STORAGE: dict[str, Storage] = {
     "weights": storage.KEY_WEIGHTS,
 }
 _INTERPOLATIONS: tuple[Interpolation, ...] = ("LINEAR", "STEP", "CUBICSPLINE")
+
+#: Pointers of KHR_animation_pointer to what a channel without it can move, too.
+_NODE_POINTER = re.compile(r"/nodes/(\d+)/(translation|rotation|scale|weights)")
 
 #: Quaternions closer than this (cosine of half the angle) are blended linearly: the arc's sine would vanish.
 _CLOSE = 0.9995
@@ -126,7 +130,8 @@ class Animation:
 def read_animations(document: Document, accessors: Accessors) -> tuple[Animation, ...]:
     """All animations of a file, in its order.
 
-    Channels of extensions (KHR_animation_pointer) are left out with a note.
+    Channels of KHR_animation_pointer are followed to translations, rotations, scales and weights of nodes; its other
+    channels, and those of other extensions, are left out with a note.
 
     Raises
     ------
@@ -148,7 +153,12 @@ def _read(fields: Fields, number: int, document: Document, accessors: Accessors)
             raise channel.error("target", "it is required")
         node = document.reference(target, "node", "nodes")
         path = target.text("path")
-        if path == "pointer" or (node is None and target.has("extensions")):
+        extension = target.extension("KHR_animation_pointer")
+        pointed = None if extension is None else _NODE_POINTER.fullmatch(extension.text("pointer") or "")
+        if pointed is not None:
+            target = Fields({"node": int(pointed[1]), "path": pointed[2]}, target.place, target.file)
+            node, path = document.reference(target, "node", "nodes"), pointed[2]
+        elif path == "pointer" or (node is None and target.has("extensions")):
             document.notes.add("animations of anything but nodes and weights are not followed", channel.place)
             continue
         if path not in _STORAGE:
