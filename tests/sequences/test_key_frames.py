@@ -73,15 +73,25 @@ def test_no_key_frame_is_rendered_for_a_frame_after_a_cut(motion, display, monke
     assert [has_halves for *_, has_halves in asked] == [True, False, True, True]  # 0 and 3, 6, 7
 
 
-@pytest.mark.parametrize(("jump", "halves"), [(0, [0]), (400, [0, 4])])
-def test_frames_along_a_camera_path_follow_the_first_up_to_a_cut(display, jump, halves):
+@pytest.mark.parametrize(
+    ("places", "halves", "before"),
+    [
+        ((0, 1, 2, 3, 4, 5), [0], [0, 2, 4]),
+        ((0, 1, 2, 3, 404, 405), [0, 4], [4]),
+        ((0, 20, 40, 60, 80, 100), [0, 4], [0, 2, 4]),
+    ],
+    ids=["slow", "cut", "fast"],
+)
+def test_frames_along_a_camera_path_follow_the_first_up_to_a_cut_or_the_next_that_shows_another_view(
+    display, places, halves, before
+):
     scene = lippmann.load_scene("room")
     camera = scene.classic.camera
-    places = [(camera.center[0] + x, *camera.center[1:]) for x in (0, 1, 2, 3, 4 + jump, 5 + jump)]
-    motion = Flight(scene, [CameraPose(view=camera.view, up=camera.up, center=place) for place in places])
+    center = camera.center
+    poses = [CameraPose(view=camera.view, up=camera.up, center=(center[0] + x, *center[1:])) for x in places]
+    motion = Flight(scene, poses)
     every = asked_of(motion, display, range(6))
     assert [frame for frame, (*_, has_halves) in enumerate(every) if has_halves] == halves
-    before = [4] if jump else [0, 2, 4]
     assert asked_of(motion, display, [5]) == [every[number] for number in [*before, 5]]
 
 

@@ -10,7 +10,8 @@ Where nothing but a camera moves, and where the display is at rest, frames take 
 every fourth before a display at rest, passes on the light that it took.
 
 Which frames are key frames follows from their numbers, so that a frame is the same whether it is rendered alone or with
-all others. A frame that shows another scene than its key frame, as after a cut, has halves itself.
+all others. A frame after a cut has halves itself. So has every fourth frame that shows another view than its key frame,
+as in a fast flight.
 """
 
 from __future__ import annotations
@@ -124,7 +125,8 @@ class KeyFrames:
         else:
             key = kept[1]
         has_estimate = key.made.estimate is not None and "by_chance" in key.made.estimate
-        return key if has_estimate and not is_cut(key.moment, moment, self._display) else None
+        # A steady flight leaves its key frame's view behind, too: it has halves again as often as other films do.
+        return key if has_estimate and not (may_have_halves and is_cut(key.moment, moment, self._display)) else None
 
 
 def find_frame_before(frame: int, step: int, halves: int) -> int | None:
