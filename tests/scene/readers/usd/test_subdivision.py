@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lippmann.scene.readers.usd.subdivision import Cage, refine, smooth_groups
+from lippmann.scene.readers.usd import subdivision
+from lippmann.scene.readers.usd.subdivision import Cage, refine, refine_each, smooth_groups
 
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], np.float64)
 CUBE_FACES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
@@ -121,3 +122,24 @@ def test_refinement_keeps_what_every_surface_has(seed, levels, kind):
     assert len(refined.faces) == sum(len(face) for face in faces) * 4 ** (levels - 1)
     assert refined.cage.indices.max() < refined.cage.points == refined.from_points.shape[0]
     assert set(refined.faces) == set(range(len(faces)))
+
+
+def test_cages_refined_together_are_as_each_by_itself(monkeypatch):
+    flat, faces = grid(2, 1)
+    cages = [
+        cage(CUBE, CUBE_FACES, [(0, 1), (1, 3)], [2.5, 0.5], [(7, 1.5)]),
+        cage(np.zeros((7, 3)), [np.array([0, 1, 2]), np.array([2, 1, 3, 4, 5])]),  # and a point that no face uses
+        cage(flat, faces, [(1, 4)], [3.0]),
+    ]
+    expected = [refine(each, 2) for each in cages]
+    calls = []
+    monkeypatch.setattr(subdivision, "refine", lambda *given, **named: calls.append(1) or refine(*given, **named))
+    for one, alone in zip(refine_each(cages, 2), expected, strict=True):
+        for name in ("from_points", "from_points_linear", "from_corners"):
+            assert getattr(one, name).toarray() == pytest.approx(getattr(alone, name).toarray())
+        for name in ("counts", "indices", "edges", "sharpness", "corners"):
+            np.testing.assert_array_equal(getattr(one.cage, name), getattr(alone.cage, name))
+        assert one.cage.points == alone.cage.points
+        np.testing.assert_array_equal(one.faces, alone.faces)
+        np.testing.assert_array_equal(one.corner_groups, alone.corner_groups)
+    assert len(calls) == 1  # many small cages take hardly longer than one

@@ -20,7 +20,7 @@ from lippmann.scene.readers.usd.curves import Curves, Points
 from lippmann.scene.readers.usd.materials import Surface
 from lippmann.scene.readers.usd.primitives import primitive_polygons, unit_ball
 from lippmann.scene.readers.usd.records import Record
-from lippmann.scene.readers.usd.subdivision import Cage, Refined, refine, smooth_groups
+from lippmann.scene.readers.usd.subdivision import Cage, Refined, refine_each, smooth_groups
 from lippmann.scene.values.description import FloatArray, Material, Mesh
 
 Stored = Sequence[NDArray[np.generic]]
@@ -77,9 +77,11 @@ class MeshReader:
     def __init__(self, arrays: Stored, surfaces: Sequence[Surface], where: str, records: Sequence[Record]) -> None:
         """``surfaces`` are the materials of the stage, which say what they read, and ``records`` all its meshes."""
         self._arrays, self._surfaces, self._where = arrays, surfaces, where
-        corners = sum(len(arrays[each["indices"]]) for each in records if each.get("scheme") == "catmullClark")
+        self._records = [each for each in records if each.get("scheme") == "catmullClark"]
+        corners = sum(len(arrays[each["indices"]]) for each in self._records)
         few = [levels for levels in range(LEVELS, _MOST_LEVELS + 1) if corners << (2 * levels - 2) <= _FEW_QUADS]
         self._levels = max(few, default=LEVELS)
+        self._refined: dict[int, Refined] = {}
         self.notes: dict[str, None] = {}
 
     def parts(self, record: Record) -> list[Part]:
@@ -94,9 +96,7 @@ class MeshReader:
             return self._primitive(record)
         if "thin" in record:
             return self._thin(record)
-        counts, indices = self._integers(record, "counts"), self._integers(record, "indices")
-        points = self._array(record, "points").astype(np.float64)
-        self._check(record, points, counts, indices)
+        points, counts, indices = self._checked(record)
         owner = np.repeat(np.arange(len(counts)), counts)
         wide = counts >= 3
         kept = wide[owner]
@@ -221,14 +221,18 @@ class MeshReader:
     def _integers(self, record: Record, name: str) -> Integers:
         return np.asarray(self._array(record, name), np.int64)
 
-    def _check(self, record: Record, points: NDArray[np.float64], counts: Integers, indices: Integers) -> None:
+    def _checked(self, record: Record) -> tuple[NDArray[np.float64], Integers, Integers]:
+        """Points, corners of each face, and their points, if they fit each other."""
         name = record["name"]
+        counts, indices = self._integers(record, "counts"), self._integers(record, "indices")
+        points = self._array(record, "points").astype(np.float64)
         if counts.min(initial=0) < 0 or counts.sum() != len(indices):
             raise self._error(name, f"has {len(indices)} corners where its faces say {int(counts.sum())}")
         if len(indices) and not 0 <= indices.min() <= indices.max() < len(points):
             raise self._error(name, f"uses point {int(indices.max())} of {len(points)}")
         if not np.isfinite(points).all():
             raise self._error(name, "has points that are not finite")
+        return points, counts, indices
 
     def _error(self, name: str, what: str) -> SceneError:
         return SceneError(f"mesh {name} {what}", where=self._where)
@@ -243,29 +247,49 @@ class MeshReader:
         # Bilinear subdivision adds vertices inside a polygon, which leave its surface as it is.
         if not len(counts) or scheme in ("none", "bilinear"):
             return plain
-        cage = self._cage(record, len(points), counts, indices)
-        if scheme != "catmullClark":
-            return replace(plain, corner_groups=smooth_groups(cage))
-        levels = self._levels
-        while levels and len(indices) << (2 * levels - 2) > _MOST_QUADS:
-            levels -= 1
-        if levels < LEVELS:
+        levels = self._levels_of(record) if scheme == "catmullClark" else 0
+        if scheme == "catmullClark" and levels < LEVELS:
             self.notes[f"mesh {record['name']} is refined {levels} time(s) instead of {LEVELS}: it is large"] = None
         if not levels:
-            return replace(plain, corner_groups=smooth_groups(cage))
+            return replace(plain, corner_groups=smooth_groups(self._cage(record)))
         quads = len(indices) << (2 * levels - 2)
         check_input(_BYTES_PER_QUAD * quads, f"mesh {record['name']}, refined,", where=self._where)
-        refined = refine(cage, levels, sharp_corners=record["boundary"] != "edgeOnly")
+        refined = self._refine(record, levels)
         return _Polygons(
             refined.from_points @ points,
             refined.cage.counts,
             refined.cage.indices,
             refined.faces,
             refined,
-            smooth_groups(refined.cage),
+            refined.corner_groups,
         )
 
-    def _cage(self, record: Record, points: int, counts: Integers, indices: Integers) -> Cage:
+    def _levels_of(self, record: Record) -> int:
+        levels = self._levels
+        while levels and len(self._array(record, "indices")) << (2 * levels - 2) > _MOST_QUADS:
+            levels -= 1
+        return levels
+
+    def _refine(self, record: Record, levels: int) -> Refined:
+        """A cage refined, with those that follow it: many small ones take nearly as long as one each by itself."""
+        if id(record) not in self._refined:
+            batch, quads = [record], 0
+            after = next(place for place, each in enumerate(self._records) if each is record) + 1
+            for each in self._records[after:]:
+                quads += len(self._array(each, "indices")) << (2 * levels - 2)
+                if quads > _FEW_QUADS or self._levels_of(each) != levels or each["boundary"] != record["boundary"]:
+                    break
+                batch.append(each)
+            refined = refine_each(
+                [self._cage(each) for each in batch], levels, sharp_corners=record["boundary"] != "edgeOnly"
+            )
+            self._refined = {id(each): one for each, one in zip(batch, refined, strict=True)}
+        return self._refined[id(record)]
+
+    def _cage(self, record: Record) -> Cage:
+        positions, counts, indices = self._checked(record)
+        wide = counts >= 3
+        points, counts, indices = len(positions), counts[wide], indices[np.repeat(wide, counts)]
         lengths, along = self._integers(record, "crease_lengths"), self._integers(record, "crease_indices")
         sharpness = self._array(record, "crease_sharpnesses").astype(np.float64)
         corners = np.zeros(points)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import json
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 #: A part of a stage, in terms of JSON.
 Record = dict[str, Any]
 
-_TREE = "tree"
+#: Bytes of the length of the JSON.
+_LENGTH = 8
 
 
 @dataclass
@@ -29,17 +30,19 @@ class Arrays:
 
 
 def pack(tree: Record, arrays: Arrays) -> bytes:
-    """Records and their arrays as bytes."""
-    written = io.BytesIO()
-    numbered = {f"a{number}": array for number, array in enumerate(arrays.stored)}
-    text = np.frombuffer(json.dumps(tree).encode(), np.uint8)
-    np.savez(written, **{_TREE: text}, **numbered)  # type: ignore[arg-type]  # names are free
-    return written.getvalue()
+    """Records and their arrays as bytes: the length of the JSON, the JSON, and the numbers of all arrays."""
+    kinds = [(array.dtype.str, array.shape) for array in arrays.stored]
+    text = json.dumps([tree, kinds]).encode()
+    return b"".join([len(text).to_bytes(_LENGTH, "little"), text, *(array.tobytes() for array in arrays.stored)])
 
 
 def unpack(data: bytes) -> tuple[Record, list[NDArray[np.generic]]]:
-    """Records and their arrays, as :func:`pack` was given them."""
-    with np.load(io.BytesIO(data), allow_pickle=False) as stored:
-        arrays = dict(stored)
-    tree: Record = json.loads(arrays.pop(_TREE).tobytes())
-    return tree, [arrays[f"a{number}"] for number in range(len(arrays))]
+    """Records and their arrays, as :func:`pack` was given them; the arrays are read-only."""
+    place = _LENGTH + int.from_bytes(data[:_LENGTH], "little")
+    tree, kinds = json.loads(data[_LENGTH:place])
+    arrays = []
+    for kind, shape in kinds:
+        array = np.frombuffer(data, kind, math.prod(shape), place).reshape(shape)
+        arrays.append(array)
+        place += array.nbytes
+    return tree, arrays
