@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
+from lippmann.display.view_cone import cone_tangent
 from lippmann.errors import PictureError
 from lippmann.image.stored_values import FloatArray
 from lippmann.quilts.quilt import Quilt
 from lippmann.viewing.refocus import check_planes
-from lippmann.viewing.replay import Eye, Real, check_size, eye_before, eye_of_offset, lens_plane_points
+from lippmann.viewing.replay import FAR, Eye, Real, check_size, eye_before, lens_plane_points
 
 #: Default limit on the width of a picture, in pixels.
 _WIDEST = 2048
@@ -117,19 +118,15 @@ def refocus_quilt(
 def _refocus(quilt: Quilt, display: Display, plane: float, width: int, height: int) -> FloatArray:
     picture = np.zeros((height, width, 3), dtype=np.float32)
     count = np.zeros((height, width), dtype=np.float32)
-    pixel, (across, _) = display.panel.pixel_pitch, display.pixels_per_lens
     half = display.size_mm[0] / 2, display.size_mm[1] / 2
+    distance = min(display.viewing_distance, FAR)
+    stretch = plane / (distance - plane)
     for number in range(quilt.layout.views):
-        fraction = (number + 0.5) / quilt.layout.views
-        # Views are even in the tangent.
-        place = (0.5 - fraction) * across
-        if display.distortion is not None:
-            place = float(display.place(place * pixel * display.edge_factor)) / pixel
-        eye = eye_of_offset(display, place, 0.0)
+        # Cameras stand level, even in the tangent, whatever the slant of the lenses.
+        camera = ((2 * number + 1) / quilt.layout.views - 1) * cone_tangent(display) * distance
         view = quilt.view(number)[None]
-        stretch = plane / (eye[2] - plane)
         for rows, x, y in lens_plane_points(display, width, height):
-            lens_x, lens_y = x + (x - eye[0]) * stretch, y + (y - eye[1]) * stretch
+            lens_x, lens_y = x + (x - camera) * stretch, y + y * stretch
             inside = (np.abs(lens_x) <= half[0]) & (np.abs(lens_y) <= half[1])
             colors = _sample(view, np.zeros(x.shape, dtype=np.intp), lens_x, lens_y, display)
             picture[rows] += colors * inside[..., None]
