@@ -9,7 +9,7 @@ from pxr import Usd, UsdGeom
 from lippmann.scene.scene import Scene
 
 from .conftest import triangle
-from .test_stage_materials import png
+from .test_stage_materials import png, surface
 
 
 def test_a_distant_light(read):
@@ -25,6 +25,32 @@ def test_a_normalized_distant_light_gives_its_irradiance(read):
     body = 'def DistantLight "sun" {\nfloat inputs:intensity = 3\nbool inputs:normalize = true\n'
     body += "float inputs:exposure = 1\n}"
     assert read(triangle() + body).lights[0].color == pytest.approx((6, 6, 6))
+
+
+@pytest.mark.parametrize(
+    ("mode", "emission", "base"),
+    [
+        ("materialGlowTintsLight", (0.5, 2, 0), (0.18,) * 3),
+        ("independent", (2, 4, 0), (0.18,) * 3),
+        ("noMaterialResponse", (2, 4, 0), (0,) * 3),
+    ],
+)
+def test_meshes_that_are_light_sources(read, mode, emission, base):
+    """A rectangle of the same light says how bright: both are 2 by 3 and normalized."""
+    light = "float inputs:intensity = 24\ncolor3f inputs:color = (0.5, 1, 0)\nbool inputs:normalize = true\n"
+    body = 'def Mesh "glow" (prepend apiSchemas = ["MeshLightAPI", "MaterialBindingAPI"]) {\n' + light
+    body += (
+        "point3f[] points = [(-1, -1.5, 0), (-1, 1.5, 0), (1, 1.5, 0), (1, -1.5, 0)]\nint[] faceVertexCounts = [4]\n"
+    )
+    body += 'int[] faceVertexIndices = [0, 1, 2, 3]\nuniform token subdivisionScheme = "none"\n'
+    body += f'uniform token light:materialSyncMode = "{mode}"\nrel material:binding = </mat>\n}}\n'
+    body += f'def RectLight "r" {{\n{light}float inputs:width = 2\nfloat inputs:height = 3\n}}\n'
+    scene = read(surface("color3f inputs:emissiveColor = (0.25, 0.5, 1)") + body)
+    glowing = {mesh.name: scene.materials[mesh.material] for mesh in scene.meshes}
+    assert glowing["/glow"].emission == pytest.approx(emission)
+    assert glowing["/glow"].base_color == pytest.approx(base)
+    assert glowing["/r"].emission == pytest.approx((2, 4, 0))
+    assert scene.physical_lights
 
 
 def test_a_sphere_light(read):

@@ -186,9 +186,21 @@ def test_the_purpose_of_a_prim_wins_over_that_of_what_holds_it(read):
     assert [mesh.name for mesh in scene.meshes] == ["/proxies/own"]
 
 
-def test_meshes_that_are_light_sources_are_named(read):
-    scene = read(triangle("glow").replace('"glow"', '"glow" (prepend apiSchemas = ["MeshLightAPI"])', 1))
-    assert "/glow: the light that its surface sends out (MeshLightAPI) is not read" in scene.notes
+def test_the_surface_of_tetrahedra_is_shown(read):
+    """Two that share a face, as OpenUSD's own tests have them: six of their eight faces are seen."""
+    body = (
+        'def TetMesh "t" {\npoint3f[] points = [(0, 0, 0), (2, 0, 0), (0, 2, 0), (0, 0, 2), (0, 0, -2)]\n'
+        "int4[] tetVertexIndices = [(0, 1, 2, 3), (0, 2, 1, 4)]\n"
+        'color3f[] primvars:displayColor = [(1, 0, 0), (0, 1, 0)] (interpolation = "uniform")\n'
+        "MORE}\n"
+    )
+    faces = [(0, 1, 3), (0, 2, 4), (0, 3, 2), (0, 4, 1), (1, 2, 3), (2, 1, 4)]
+    for more in ("", f"int3[] surfaceFaceVertexIndices = {faces}\n"):
+        (mesh,) = read(body.replace("MORE", more)).meshes
+        corners = mesh.positions[mesh.faces]
+        volume = np.einsum("ti,ti->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+        assert len(mesh.faces) == 6
+        assert volume == pytest.approx(8 / 3)  # they face outwards
 
 
 PRIMITIVES = {

@@ -6,6 +6,7 @@ UsdLux gives radiance: ``color * intensity * 2^exposure``, divided by the emitti
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -130,6 +131,25 @@ class LightReader:
         )
         self.meshes.append(GlowingMesh(shape, material, world))
 
+    def add_mesh(self, record: Record, parts: Sequence[tuple[Mesh, Material]], worlds: Matrix) -> None:
+        """A mesh that is a light source (MeshLightAPI), at ``worlds`` ``(k, 4, 4)``; ``parts`` have materials.
+
+        Its surface is seen as bright as it shines. Where its material glows, the light's colour tints that.
+        """
+        light = record["light"]
+        for world in worlds:
+            area = sum(_area(mesh.positions, mesh.faces, world) for mesh, _ in parts)
+            color = _times(light, 1.0 / area if light["normalize"] and area > 0.0 else 1.0)
+            for mesh, material in parts:
+                glow, texture = color, None
+                if light["material"] == "materialGlowTintsLight" and any(material.emission):
+                    red, green, blue = (np.array(material.emission) * color).tolist()
+                    glow, texture = (red, green, blue), material.emission_texture
+                shown = replace(material, name=record["name"], emission=glow, emission_texture=texture)
+                if light["material"] == "noMaterialResponse":
+                    shown = Material(record["name"], base_color=(0.0, 0.0, 0.0), specular=0.0, emission=glow)
+                self.meshes.append(GlowingMesh(mesh, shown, world))
+
     def _add_dome(self, record: Record, world: Matrix) -> None:
         if self.environment is not None:
             self.notes[f"{record['name']}: of several dome lights the first is taken"] = None
@@ -216,9 +236,15 @@ def _mesh(
     world: Matrix,
     uvs: NDArray[np.float32] | None = None,
 ) -> tuple[Mesh | None, float]:
-    placed = (points @ world[:3, :3].T)[faces]
-    area = float(np.linalg.norm(np.cross(placed[:, 1] - placed[:, 0], placed[:, 2] - placed[:, 0]), axis=1).sum() / 2)
+    area = _area(points, faces, world)
     if not np.isfinite(area) or area <= 0.0:
         return None, 0.0
     sets = () if uvs is None else (uvs,)
     return Mesh(name, points.astype(np.float32), faces.astype(np.uint32), 0, uvs=sets), area
+
+
+def _area(points: NDArray[np.floating], faces: NDArray[np.integer], world: Matrix) -> float:
+    """The area of triangles in the world."""
+    placed = (points @ world[:3, :3].T)[faces]
+    sides = np.cross(placed[:, 1] - placed[:, 0], placed[:, 2] - placed[:, 0])
+    return float(np.linalg.norm(sides, axis=1).sum() / 2)

@@ -77,6 +77,7 @@ def describe(tree: Record, arrays: Sequence[NDArray[np.generic]], path: Path, as
     surfaces = [SurfaceReader(assets, notes, tree["meters_per_unit"]).read(record) for record in tree["materials"]]
     reader = MeshReader(arrays, surfaces, path.name, tree["meshes"])
     content = _Content(surfaces)
+    lights = LightReader(scene_from_stage, tree["up"], assets, notes)
     splats = SplatReader(arrays, path.name, notes)
 
     def worlds_of(record: Record) -> Matrix:
@@ -90,13 +91,17 @@ def describe(tree: Record, arrays: Sequence[NDArray[np.generic]], path: Path, as
         splats.add(record, worlds_of(record))
     for record in tree["meshes"]:
         worlds = worlds_of(record)
-        for part in reader.parts(record):
+        parts = reader.parts(record)
+        if "light" in record:
+            shown = [(part.mesh, content.materials[content.material_of(part)]) for part in parts]
+            lights.add_mesh(record, shown, worlds)
+            continue
+        for part in parts:
             content.add(part, worlds @ np.diag([part.scale, part.scale, part.scale, 1.0]))
-    if not content.instances and not splats.placed:
+    if not content.instances and not splats.placed and not lights.meshes:
         raise SceneError(
             "the stage shows no meshes", where=path.name, rule="a scene needs some", fix="; ".join([*notes][:3])
         )
-    lights = LightReader(scene_from_stage, tree["up"], assets, notes)
     for record in tree["lights"]:
         lights.add(record)
     for glowing in lights.meshes:
@@ -137,9 +142,12 @@ class _Content:
         """Place the triangles of one material at ``worlds`` ``(k, 4, 4)``."""
         if not len(part.mesh.faces):
             return
-        material = part.material if part.material >= 0 else self._plain(part.mesh)
         self.instances.append(Instance(len(self.meshes), worlds[0] if len(worlds) == 1 else worlds))
-        self.meshes.append(replace(part.mesh, material=material))
+        self.meshes.append(replace(part.mesh, material=self.material_of(part)))
+
+    def material_of(self, part: Part) -> int:
+        """The number of its material, or of one that shows its display colours."""
+        return part.material if part.material >= 0 else self._plain(part.mesh)
 
     def add_mesh(self, mesh: Mesh, material: Material, world: Matrix) -> None:
         """Place one mesh with a material of its own."""

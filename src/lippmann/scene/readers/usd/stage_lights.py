@@ -21,6 +21,7 @@ _INPUTS = {
     "CylinderLight": ("radius", "length"),
     "DomeLight": (),
     "DomeLight_1": (),
+    "Mesh": (),
 }
 
 
@@ -65,6 +66,7 @@ def light_record(prim: Usd.Prim, world: NDArray[np.float64], time: Usd.TimeCode,
         "is_point": bool(value("treatAsPoint", False)),
         "cone": float(value("inputs:shaping:cone:angle", 90.0)),
         "softness": float(value("inputs:shaping:cone:softness", 0.0)),
+        "material": str(value("light:materialSyncMode", "materialGlowTintsLight")),
         "pole": str(value("poleAxis", "Y")),
         "format": str(value("inputs:texture:format", "automatic")),
         **{name: float(value(f"inputs:{name}", 1.0)) for name in _INPUTS[kind]},

@@ -69,6 +69,35 @@ def mesh_record(
     }
 
 
+def tetrahedra_record(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays, materials: MaterialTable) -> Record:
+    """The surface of tetrahedra: the faces that are given, else those that one tetrahedron alone has.
+
+    Values of each tetrahedron, or of each of its faces, do not belong to a surface, and are left out.
+    """
+    tetrahedra = UsdGeom.TetMesh(prim)
+    given = tetrahedra.GetSurfaceFaceVertexIndicesAttr().Get(time)
+    faces = np.asarray(given or UsdGeom.TetMesh.ComputeSurfaceFaces(tetrahedra, time), np.int64).reshape(-1, 3)
+
+    def at_points(primvars: Record) -> Record:
+        fitting = ("constant", "vertex", "varying")
+        return {name: each for name, each in primvars.items() if each and each["interpolation"] in fitting}
+
+    record = _visible(prim, time, arrays, materials)
+    return {
+        **record,
+        "colors": at_points(record["colors"]),
+        "opacity": at_points({"opacity": record["opacity"]}).get("opacity"),
+        "points": arrays.add(_floats(tetrahedra.GetPointsAttr().Get(time), 3)),
+        "counts": arrays.add(np.full(len(faces), 3)),
+        "indices": arrays.add(faces.ravel()),
+        "holes": arrays.add(np.zeros(0, np.int64)),
+        "scheme": "none",
+        "normals": None,
+        "uvs": at_points(_uv_sets(prim, time, arrays)),
+        "subsets": [],
+    }
+
+
 def primitive_record(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays, materials: MaterialTable) -> Record:
     """Record of a primitive (cube, sphere, cylinder, ...): its kind, and its sizes at a time."""
     kind = str(prim.GetTypeName())

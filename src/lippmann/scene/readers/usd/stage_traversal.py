@@ -11,7 +11,14 @@ from pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdSkel
 from lippmann.scene.readers.usd.records import Arrays, Record
 from lippmann.scene.readers.usd.stage_layers import StageError
 from lippmann.scene.readers.usd.stage_lights import camera_record, light_record
-from lippmann.scene.readers.usd.stage_meshes import PRIMITIVES, THIN, mesh_record, primitive_record, thin_record
+from lippmann.scene.readers.usd.stage_meshes import (
+    PRIMITIVES,
+    THIN,
+    mesh_record,
+    primitive_record,
+    tetrahedra_record,
+    thin_record,
+)
 from lippmann.scene.readers.usd.stage_shading import MaterialTable
 from lippmann.scene.readers.usd.stage_skinning import Skinning
 from lippmann.scene.readers.usd.stage_splats import PARTICLES, splat_record
@@ -112,7 +119,7 @@ class Traversal:
             if prim.IsA(UsdGeom.PointInstancer):
                 self._add_instancer(UsdGeom.PointInstancer(prim), base @ place, depth)
                 prims.PruneChildren()
-            elif prim.IsA(UsdGeom.Mesh) or kind in PRIMITIVES or kind in THIN:
+            elif prim.IsA(UsdGeom.Mesh) or kind == "TetMesh" or kind in PRIMITIVES or kind in THIN:
                 self._add_mesh(prim, base, place)
             elif kind.startswith(PARTICLES):
                 self._add_splats(prim, base @ place)
@@ -151,8 +158,6 @@ class Traversal:
         return np.array(self._transforms.GetLocalToWorldTransform(prim), np.float64).T
 
     def _add_mesh(self, prim: Usd.Prim, base: Matrices, place: Matrices) -> None:
-        if prim.HasAPI(UsdLux.LightAPI):
-            self.notes[f"{prim.GetPath()}: the light that its surface sends out (MeshLightAPI) is not read"] = None
         kind = str(prim.GetTypeName())
         skin = self._skinning.of(prim) if prim.IsA(UsdGeom.Mesh) else None
         if skin is not None:
@@ -177,11 +182,15 @@ class Traversal:
                     )
             elif prim.IsA(UsdGeom.Mesh):
                 record = mesh_record(UsdGeom.Mesh(prim), self._time, self._arrays, self._materials, skin)
+            elif kind == "TetMesh":
+                record = tetrahedra_record(prim, self._time, self._arrays, self._materials)
             else:
                 record = primitive_record(prim, self._time, self._arrays, self._materials)
             if copy_color is not None:
                 values = self._arrays.add(np.array([copy_color], np.float32))
                 record["colors"]["displayColor"] = {"values": values, "interpolation": "constant"}
+            if kind == "Mesh" and prim.HasAPI(UsdLux.LightAPI):
+                record["light"] = light_record(prim, worlds[0], self._time, self.notes)
             self._meshes[key] = {**record, "name": str(prim.GetPath()), "material": material}
         self._worlds.setdefault(key, []).append(worlds)
 
