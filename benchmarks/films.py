@@ -36,13 +36,14 @@ from defaults import HERE, Checkout, psnr
 from films_scenes import Film, films
 from harness import save, saved
 
-#: Frames of the two commands whose times are taken from each other; a film of one frame is a still. The earlier version
-#: renders all frames alike; of today's the frames 1 to 32 hold as many key frames as any 32, of camera paths one.
-MANY, FEW = {"other": 5, "today": 33}, 1
+#: Frames of the two commands whose times are taken from each other; a film of one frame is a still. Of today's version
+#: the frames 1 to 32 hold as many key frames as any 32, of camera paths one. The earlier one renders all frames alike:
+#: every eighth of the same 32 stands for them, as those of a turntable differ in samples by up to seven times.
+MANY, FEW = {"other": range(0, 33, 8), "today": range(33)}, range(1)
 #: Runs of each command, whose median counts: single ones differ by a quarter.
 RUNS = 3
 #: Frames that are judged, and samples of each of their two references.
-JUDGED, REFERENCE_SAMPLES = 5, 32
+JUDGED, REFERENCE_SAMPLES = range(5), 32
 SEEDS = (991, 992)
 PLAIN = ["--method", "full", "--denoise", "none", "--spp", str(REFERENCE_SAMPLES)]
 #: What of a picture's options decides what its native pixels show.
@@ -52,16 +53,17 @@ _PROGRAM = "from lippmann.cli import main; main()"
 Frames = Sequence[NDArray[Any]]
 
 
-def render(checkout: Checkout, film: Film, display: str, frames: int, out: Path, more: Sequence[str] = ()) -> Any:
-    """The first frames of a film as files in the folder ``out``; seconds and peak memory."""
-    words = ["render", *film.words, "-d", display, "--depth-scale", "0.5", "-q", "--frames", f"0:{frames}"]
+def render(checkout: Checkout, film: Film, display: str, frames: range, out: Path, more: Sequence[str] = ()) -> Any:
+    """Frames of a film as files in the folder ``out``; seconds and peak memory."""
+    which = f"{frames.start}:{frames.stop}:{frames.step}"
+    words = ["render", *film.words, "-d", display, "--depth-scale", "0.5", "-q", "--frames", which]
     return checkout.run(_PROGRAM, [*words, *more, "-o", str(out / "%04d.png")])
 
 
-def read(folder: Path, frames: int = JUDGED) -> list[Any]:
+def read(folder: Path) -> list[Any]:
     import lippmann
 
-    return [lippmann.read_picture(folder / f"{number:04d}.png") for number in range(frames)]
+    return [lippmann.read_picture(folder / f"{number:04d}.png") for number in JUDGED]
 
 
 def codes(images: Sequence[Any], eye: bool) -> list[NDArray[Any]]:
@@ -92,7 +94,7 @@ def references(checkout: Checkout, film: Film, display: str, folder: Path) -> li
     """Two long renderings of the frames that are judged, kept in ``folder``."""
     for seed in SEEDS:
         (folder / str(seed)).mkdir(parents=True, exist_ok=True)
-        if not (folder / str(seed) / f"{JUDGED - 1:04d}.png").exists():
+        if not (folder / str(seed) / f"{JUDGED[-1]:04d}.png").exists():
             render(checkout, film, display, JUDGED, folder / str(seed), [*PLAIN, "--bits", "16", "--seed", str(seed)])
     return [read(folder / str(seed)) for seed in SEEDS]
 
@@ -104,14 +106,15 @@ def measure(
     sides: dict[str, dict[str, Any]] = {name: {} for name in checkouts}
     for name, checkout in checkouts.items():
         (scratch / name).mkdir()
-        render(
-            checkout, film, display, MANY[name], scratch / name
-        )  # compiles the kernels: not all are the first frame's
-    spent: dict[tuple[str, int], list[dict[str, float]]] = {}
+        (scratch / "timed" / name).mkdir(parents=True)
+        render(checkout, film, display, JUDGED, scratch / name)
+        render(checkout, film, display, MANY[name], scratch / "timed" / name)  # compiles the kernels of all frames
+    spent: dict[tuple[str, range], list[dict[str, float]]] = {}
     for _ in range(RUNS):
         for name, checkout in checkouts.items():
+            out = scratch / "timed" / name
             for frames in (FEW, MANY[name]):
-                spent.setdefault((name, frames), []).append(render(checkout, film, display, frames, scratch / name))
+                spent.setdefault((name, frames), []).append(render(checkout, film, display, frames, out))
     medians = {
         key: {what: statistics.median(run[what] for run in runs) for what in ("cpu", "peak")}
         for key, runs in spent.items()
@@ -119,7 +122,7 @@ def measure(
     images = {name: read(scratch / name) for name in checkouts}
     shows = {name: [all_[0].provenance.options.get(key) for key in SHOWN] for name, all_ in images.items()}
     for name, side in sides.items():
-        side["seconds"] = (medians[name, MANY[name]]["cpu"] - medians[name, FEW]["cpu"]) / (MANY[name] - FEW)
+        side["seconds"] = (medians[name, MANY[name]]["cpu"] - medians[name, FEW]["cpu"]) / len(MANY[name][1:])
         side |= {"still_peak": medians[name, FEW]["peak"], "peak": medians[name, MANY[name]]["peak"]}
         first = images[name][0].provenance
         side |= {"spp": first.spp, "stated": (first.estimate or {}).get("psnr")}

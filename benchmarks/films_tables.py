@@ -23,8 +23,9 @@ def describe(result: dict[str, Any]) -> str:
 `lippmann render SCENE --display NAME --depth-scale 0.5` for many frames and for one, whole commands in processes of
 their own with compiled kernels, in turn; commit {said}. The time of a frame is the difference of their processor
 seconds over that of their frames, of one run each or, since c9dc6c7e, the median of three. Many are five; on this side
-of the flight they are 33, which hold as many key frames as any film. A still is the first frame alone. Turntables have
-48 frames, the swing covers 40 degrees. Films in italics are of bundled scenes; the others no setting was tuned on.
+of the flight they are 33, which hold as many key frames as any film. After 39f2c3be they are 33 here and every eighth
+of them there. A still is the first frame alone. Turntables have 48 frames, the swing covers 40 degrees. Films in
+italics are of bundled scenes; the others no setting was tuned on.
 
 {(chr(10) * 2).join(parts)}
 """
