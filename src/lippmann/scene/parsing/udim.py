@@ -12,7 +12,7 @@ import numpy as np
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import MissingFileError
 from lippmann.scene.parsing.texture_maps import resize, unit
-from lippmann.scene.values.description import Image, Matrix
+from lippmann.scene.values.description import FloatArray, Image, Matrix
 
 #: What stands in a name for a tile's number, or (MaterialX, Mudbox) for ``u1_v1``.
 _MARK = re.compile(r"<UDIM>|%\(UDIM\)d|<UVTILE>", re.IGNORECASE)
@@ -21,9 +21,13 @@ _FIRST, _LAST, _ACROSS = 1001, 1100, 10
 
 @dataclass(frozen=True, eq=False)
 class TiledImage(Image):
-    """Tiles side by side; ``inside`` takes texture coordinates, v downwards, to those of the whole."""
+    """Tiles side by side; ``inside`` takes texture coordinates, v downwards, to those of the whole.
+
+    ``numbers`` are those of the tiles that are there.
+    """
 
     inside: Matrix
+    numbers: frozenset[int]
 
 
 def is_tiled(name: str) -> bool:
@@ -44,12 +48,18 @@ def read_tiles(name: str, read: Callable[[Callable[[str], str]], Image]) -> Tile
     tiles, missing = {}, None
     for number in range(_FIRST, _LAST + 1):
         try:
-            tiles[number - _FIRST] = read(partial(_of_tile, number))
+            tiles[number] = read(partial(_of_tile, number))
         except MissingFileError as error:
             missing = missing or error
     if not tiles and missing:
         raise missing
     return _joined(name, tiles)
+
+
+def missing_tiles(image: TiledImage, coordinates: FloatArray) -> list[int]:
+    """Numbers of the tiles that points ``(n, 2)`` of texture coordinates, v downwards, need and there are not."""
+    column, row = np.floor(coordinates * (1.0, -1.0) + (0.0, 1.0)).T
+    return sorted({int(number) for number in np.unique(_FIRST + column + _ACROSS * row)} - image.numbers)
 
 
 def _of_tile(number: int, name: str) -> str:
@@ -59,8 +69,8 @@ def _of_tile(number: int, name: str) -> str:
 
 
 def _joined(name: str, tiles: Mapping[int, Image]) -> TiledImage:
-    """One image of tiles by ``u + 10 v``: each as large, and of as many channels, as the largest; black between."""
-    places = np.array([(number // _ACROSS, number % _ACROSS) for number in tiles])
+    """One image of tiles by their numbers: each as large, and of as many channels, as the largest; black between."""
+    places = np.array([divmod(number - _FIRST, _ACROSS) for number in tiles])
     (low, left), (high, right) = places.min(axis=0), places.max(axis=0)
     rows, columns = int(high - low) + 1, int(right - left) + 1
     height, width, channels = np.max([tile.pixels.shape for tile in tiles.values()], axis=0)
@@ -78,4 +88,4 @@ def _joined(name: str, tiles: Mapping[int, Image]) -> TiledImage:
             texels = np.stack(planes, axis=2) + (0.5 if in_bytes else 0.0)
         pixels[high - row, :, column - left] = texels
     inside = np.array([[1 / columns, 0.0, -left / columns], [0.0, 1 / rows, (rows - 1 + low) / rows], [0.0, 0.0, 1.0]])
-    return TiledImage(name, pixels.reshape(rows * height, columns * width, channels), inside)
+    return TiledImage(name, pixels.reshape(rows * height, columns * width, channels), inside, frozenset(tiles))

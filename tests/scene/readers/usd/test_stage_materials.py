@@ -132,10 +132,23 @@ def test_a_texture_in_tiles(read, mark, first, other):
     scene = read(body, files=files)
     found = scene.materials[0].base_color_texture
     assert (found.wrap_u, found.wrap_v) == ("clamp", "clamp")
-    for place, color in (((0.5, 0.5), (255, 0, 0)), ((1.5, 1.5), (0, 0, 255))):
+    colors = {(0.5, 0.5): [255, 0, 0], (1.5, 1.5): [0, 0, 255], (1.5, 0.5): [0, 0, 0], (3.5, 1.5): [0, 0, 0]}
+    for place, color in colors.items():
         u, v, _ = found.uv_transform @ (place[0], 1.0 - place[1], 1.0)
-        assert found.image.pixels[int(2 * v), int(2 * u)].tolist() == list(color)
+        height, width, _ = found.image.pixels.shape
+        assert found.image.pixels[int(height * v), int(width * u)].tolist() == color
     assert scene.notes == []
+
+
+def test_tiles_that_a_mesh_needs_and_that_are_not_there_are_named(read):
+    node = texture(file="t.<UDIM>.png", st="move") + READER
+    node += 'def Shader "move" {\nuniform token info:id = "UsdTransform2d"\nfloat2 outputs:result\n'
+    node += "float2 inputs:in.connect = </mat/uv.outputs:result>\nfloat2 inputs:translation = (0, 1)\n}\n"
+    body = surface("color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>", node)
+    files = {"t.1001.png": png([[[255, 0, 0]]]), "t.1012.png": png([[[0, 0, 255]]])}
+    assert read(body, files=files).notes == [
+        "texture 't.<UDIM>.png' has no tile 1011, which mesh /m needs: black there"
+    ]
 
 
 def test_scale_is_a_factor_and_bias_is_added_to_linear_values(read):

@@ -40,6 +40,8 @@ class Surface:
         Values of meshes that lack the colour or display opacity that it reads; None where it reads none.
     color_name:
         The primvar that is its colour.
+    tiled:
+        Its textures in tiles, with the transformation of their coordinates to those of tiles.
     """
 
     material: Material
@@ -47,6 +49,7 @@ class Surface:
     color: Color | None = None
     opacity: float | None = None
     color_name: str = "displayColor"
+    tiled: tuple[Texture, ...] = ()
 
 
 @dataclass(eq=False)
@@ -60,6 +63,7 @@ class SurfaceReader:
     notes: dict[str, None]
     unit: float
     _uv_names: list[str] = field(default_factory=list)
+    _tiled: list[Texture] = field(default_factory=list)
 
     def read(self, record: Record) -> Surface:
         """The material of a record.
@@ -69,7 +73,7 @@ class SurfaceReader:
         SceneError
             A texture is damaged.
         """
-        self._uv_names = []
+        self._uv_names, self._tiled = [], []
         inputs = record["inputs"]
         name = record["name"]
         if _is_displaced(inputs):
@@ -109,6 +113,7 @@ class SurfaceReader:
             None if by_color is None else _color_of(by_color.get("fallback"), (1.0, 1.0, 1.0)),
             None if by_opacity is None else min(max(_scalar_of(by_opacity.get("fallback"), 1.0), 0.0), 1.0),
             "displayColor" if by_color is None else str(by_color["primvar"] or "displayColor"),
+            tuple(self._tiled),
         )
 
     def _reads(self, inputs: Record, name: str) -> Record | None:
@@ -288,17 +293,19 @@ class SurfaceReader:
         if uv_name not in self._uv_names:
             self._uv_names.append(uv_name)
         wraps = [_WRAPS.get(str(node.get(key, {}).get("value", ""))) for key in ("wrapS", "wrapT")]
+        uv_set = self._uv_names.index(uv_name)
         if isinstance(image, TiledImage):
-            wraps = ["clamp", "clamp"]
+            self._tiled.append(Texture(image, srgb=False, uv_transform=transform, uv_set=uv_set))
+            wraps, transform = [None, None], image.inside @ transform  # no tile, no colour: as in OpenUSD's Storm
         border = [2 * int(wrap is None) for wrap in wraps]
-        inside = image.inside if isinstance(image, TiledImage) else _inside_border(image, border[0], border[1])
+        inside = _inside_border(image, border[0], border[1])
         return Texture(
             image=image if not any(border) else _with_border(image, border[0], border[1]),
             srgb=False,
             wrap_u=wraps[0] or "clamp",
             wrap_v=wraps[1] or "clamp",
             uv_transform=inside @ transform,
-            uv_set=self._uv_names.index(uv_name),
+            uv_set=uv_set,
         )
 
     def _is_srgb(self, node: Record, image: Image) -> bool:

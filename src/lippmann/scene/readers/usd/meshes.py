@@ -14,6 +14,7 @@ from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.normals import unit_normals
 from lippmann.scene.parsing.points_lines import MOST, as_mesh
 from lippmann.scene.parsing.triangulation import triangulate
+from lippmann.scene.parsing.udim import TiledImage, missing_tiles
 from lippmann.scene.point_clouds import draw_thin
 from lippmann.scene.readers.gltf.nodes import normal_matrices
 from lippmann.scene.readers.usd.curves import Curves, Points
@@ -21,7 +22,7 @@ from lippmann.scene.readers.usd.materials import Surface
 from lippmann.scene.readers.usd.primitives import primitive_polygons, unit_ball
 from lippmann.scene.readers.usd.records import Record
 from lippmann.scene.readers.usd.subdivision import Cage, Refined, refine_each, smooth_groups
-from lippmann.scene.values.description import FloatArray, Material, Mesh
+from lippmann.scene.values.description import FloatArray, Material, Mesh, Texture
 
 Stored = Sequence[NDArray[np.generic]]
 Integers = NDArray[np.int64]
@@ -370,6 +371,8 @@ class MeshReader:
         places[corners] = np.arange(len(corners), dtype=np.uint32)
         positions = polygons.points[polygons.indices[corners]].astype(np.float32)
         faces = places[triangles]
+        for texture in self._surface(material).tiled:
+            self._note_missing_tiles(name, texture, uvs[texture.uv_set][triangles].mean(axis=1))
         mesh = Mesh(
             name,
             positions,
@@ -381,6 +384,15 @@ class MeshReader:
         if normals is None or not len(faces):
             return mesh
         return replace(mesh, normals=unit_normals(normals[corners].astype(np.float32), positions, faces)[0])
+
+    def _note_missing_tiles(self, name: str, texture: Texture, middles: FloatArray) -> None:
+        """Of the tiles that the middles of triangles need; their corners may lie on the edge of others."""
+        image, to_tiles = texture.image, texture.uv_transform
+        assert isinstance(image, TiledImage)
+        missing = missing_tiles(image, middles @ to_tiles[:2, :2].T + to_tiles[:2, 2])
+        if missing:
+            listing = ", ".join(map(str, missing[:5])) + ", ..." * (len(missing) > 5)
+            self.notes[f"texture '{image.name}' has no tile {listing}, which mesh {name} needs: black there"] = None
 
     def _varies_at_points(self, record: Record, material: int) -> bool:
         """Whether corners of faces that meet in a point may have values of their own, normals of edges apart."""
