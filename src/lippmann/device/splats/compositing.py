@@ -174,7 +174,8 @@ def _composite(
             basis[j] = values[j]
         end = float(ends[ray])
         left = 1.0
-        sums[:] = 0.0
+        for k in range(3):
+            sums[k] = 0.0
         count = 0
         enters = _enters(o, inverse, boxes[0], end)
         if enters < np.inf:
@@ -190,7 +191,10 @@ def _composite(
                     break
                 continue
             if count + LEAF > len(keys):
-                keys, items = np.concatenate((keys, keys)), np.concatenate((items, items))
+                waiting, waiting_items = keys, items
+                keys, items = np.empty(2 * len(waiting)), np.empty(2 * len(waiting), np.int64)
+                for place in range(count):
+                    keys[place], items[place] = waiting[place], waiting_items[place]
             if size[item] == 0:
                 for child in range(first[item], first[item] + 2):
                     enters = _enters(o, inverse, boxes[child], end)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from lippmann.device.volumes.table import BRICK_BITS, Numbers, VolumeTable, bin_of
 from lippmann.runtime.numba_jit import compiled
 from lippmann.runtime.row_threads import Bands
+from lippmann.scene.matrices import inverse
 
 #: Longest step along any axis, voxels.
 STEP = 0.5
@@ -56,11 +57,13 @@ def composite(
     """
     colors = np.empty((len(origins), 3), np.float32)
     transmittances = np.empty(len(origins), np.float32)
+    # Length of a voxel along its shortest side.
+    finest = float(np.linalg.norm(inverse(table.voxel_from_world)[:3, :3], axis=0).min())
     bands = Bands(threads)
     bands.pixels(
         _composite,
         len(origins),
-        *(origins, directions, ends, np.ascontiguousarray(toward_light, dtype=np.float64)),
+        *(origins, directions, ends, np.ascontiguousarray(toward_light, dtype=np.float64), finest),
         *(table.grid, table.voxel_from_world, table.bin_scale, table.bin_offset),
         *(table.extinction, table.integral, table.occupied, table.shading, colors, transmittances),
     )
@@ -151,6 +154,7 @@ def _composite(
     directions: Floats,
     ends: Floats,
     light: Numbers,
+    finest: float,
     grid: NDArray[np.generic],
     voxel_from_world: Numbers,
     bin_scale: float,
@@ -163,19 +167,11 @@ def _composite(
     transmittances: Floats,
 ) -> None:
     bins = len(integral) - 1
-    counts = np.array([grid.shape[2], grid.shape[1], grid.shape[0]])
-    bricks = np.array([occupied.shape[2], occupied.shape[1], occupied.shape[0]])
-    o, d, world, p, start = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    brick = np.empty(3, np.int64)
-    sums, mean = np.empty(3), np.empty(4)
-    # Length of a voxel along its shortest side.
-    finest = np.inf
-    world_from_voxel = np.linalg.inv(voxel_from_world)
+    counts, bricks, brick = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3, np.int64)
     for k in range(3):
-        side = 0.0
-        for j in range(3):
-            side += world_from_voxel[j, k] ** 2
-        finest = min(finest, np.sqrt(side))
+        counts[k], bricks[k] = grid.shape[2 - k], occupied.shape[2 - k]
+    o, d, world, p, start = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    sums, mean = np.empty(3), np.empty(4)
     for ray in range(first_ray, last_ray):
         for k in range(3):
             world[k] = directions[ray, k]
@@ -191,7 +187,8 @@ def _composite(
                 d[k] = 1e-12 * longest
             a, b = (-0.5 - o[k]) / d[k], (counts[k] - 0.5 - o[k]) / d[k]
             near, far = max(near, min(a, b)), min(far, max(a, b))
-        sums[:] = 0.0
+        for c in range(3):
+            sums[c] = 0.0
         left = 1.0
         if near < far:
             step = STEP / longest
