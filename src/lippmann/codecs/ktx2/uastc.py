@@ -192,15 +192,18 @@ def _kernel(
         weight_bits, endpoint_range, subsets, planes, channels = modes[mode, 2:7]
         at[0] += modes[mode, 7]
 
-        pattern[:] = 0
-        anchors[:] = 0
+        # Loops: assignments to slices take several times as long to compile.
+        for texel in range(16):
+            pattern[texel] = 0
+        for subset in range(3):
+            anchors[subset] = 0
         if subsets > 1:
             kind = 2 if subsets == 3 else (1 if mode == _WITH_OTHER_PATTERNS else 0)
             which = take(block, at, 4 if subsets == 3 else 5)
             if which >= patterns.shape[1] or patterns[kind, which, 0] < 0:
                 return 1
-            pattern[:] = patterns[kind, which]
             for texel in range(15, -1, -1):
+                pattern[texel] = patterns[kind, which, texel]
                 anchors[pattern[texel]] = texel
         second_channel = -1
         if planes == 2:
