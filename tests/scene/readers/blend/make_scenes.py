@@ -210,6 +210,80 @@ def surfaces():
     save("surfaces.blend")
 
 
+def mixed():
+    """Surfaces of several nodes, and nodes between a picture and a surface."""
+    scene = fresh()
+    pictures = {}
+    for name, left, right in (("mask", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), ("colors", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))):
+        pictures[name] = picture = bpy.data.images.new(name, 4, 4)
+        picture.pixels[:] = [*left, 1.0, *left, 1.0, *right, 1.0, *right, 1.0] * 4
+        picture.pack()
+
+    def use(name):
+        """A material on a cube of its own, and a function that adds nodes to it."""
+        material = bpy.data.materials.new(name)
+        shader_of(material)
+        tree = material.node_tree
+
+        def add(kind, inputs, **settings):
+            node = tree.nodes.new(f"ShaderNode{kind}")
+            for key, value in settings.items():
+                setattr(node, key, value)
+            for key, value in inputs.items():
+                if hasattr(value, "is_output"):
+                    tree.links.new(value, node.inputs[key])
+                else:
+                    node.inputs[key].default_value = value
+            return node.outputs[0]
+
+        mesh = cube(name)
+        mesh.uv_layers.new()
+        mesh.materials.append(material)
+        put(scene, name, mesh, (2.0 * len(scene.objects), 0.0, 0.0))
+        return add, lambda surface: tree.links.new(surface, tree.nodes["Material Output"].inputs["Surface"])
+
+    red, green, white = (0.8, 0.1, 0.1, 1.0), (0.1, 0.8, 0.1, 1.0), (1.0, 1.0, 1.0, 1.0)
+    for name, factor in (("half", None), ("plastic", "Fresnel"), ("masked", "TexImage"), ("leaf", "TexImage")):
+        add, show = use(name)
+        one = add("BsdfTransparent", {}) if name == "leaf" else add("BsdfDiffuse", {"Color": red})
+        kind = "BsdfAnisotropic" if name in ("plastic", "masked") else "BsdfDiffuse"
+        other = add(kind, {"Color": white if name == "plastic" else green, "Roughness": 0.25})
+        share = 0.5 if factor is None else add(factor, {"IOR": 1.4} if factor == "Fresnel" else {})
+        if factor == "TexImage":
+            share.node.image = pictures["mask"]
+        show(add("MixShader", {0: share, 1: one, 2: other}))
+
+    add, show = use("glow")
+    lit = add("Emission", {"Color": green, "Strength": 4.0})
+    show(add("AddShader", {0: add("BsdfDiffuse", {"Color": red}), 1: lit}))
+    add, show = use("inverted")
+    show(add("BsdfDiffuse", {"Color": add("Invert", {"Color": add("TexImage", {}, image=pictures["colors"])})}))
+    add, show = use("noise")
+    show(add("BsdfDiffuse", {"Color": add("TexNoise", {})}))
+    add, show = use("bumped")
+    height = add("TexImage", {}, image=pictures["mask"])
+    show(add("BsdfPrincipled", {"Normal": add("Bump", {"Height": height, "Distance": 0.5})}))
+
+    inner = bpy.data.node_groups.new("inner", "ShaderNodeTree")
+    inner.interface.new_socket("Color", in_out="INPUT", socket_type="NodeSocketColor")
+    inner.interface.new_socket("Surface", in_out="OUTPUT", socket_type="NodeSocketShader")
+    start, end, change, surface = (
+        inner.nodes.new(kind)
+        for kind in ("NodeGroupInput", "NodeGroupOutput", "ShaderNodeInvert", "ShaderNodeBsdfDiffuse")
+    )
+    for output, entry in (
+        (start.outputs[0], change.inputs["Color"]),
+        (change.outputs[0], surface.inputs["Color"]),
+        (surface.outputs[0], end.inputs[0]),
+    ):
+        inner.links.new(output, entry)
+    add, show = use("grouped")
+    show(add("Group", {}, node_tree=inner))
+    group = bpy.data.materials["grouped"].node_tree.nodes["Group"]
+    group.inputs[0].default_value = (0.2, 0.9, 0.9, 1.0)
+    save("mixed.blend")
+
+
 def lights():
     scene = fresh()
     put(scene, "Cube", cube())
@@ -312,6 +386,7 @@ for make in (
     aside,
     pictures,
     surfaces,
+    mixed,
     lights,
     shifted,
     otherwise,

@@ -13,6 +13,8 @@ from lippmann.scene.extent import bounds_of, extreme_points_of
 from lippmann.scene.readers.blend.in_blender.additions import (
     add_default_material,
     add_focus,
+    add_indices,
+    add_interiors,
     add_lights,
     leave_out,
     leave_out_unseen,
@@ -168,6 +170,27 @@ def test_faces_without_a_material_are_of_a_dull_grey(read):
     add_default_material(glb)
     (material,) = read(glb).materials
     assert (material.base_color, material.metallic, material.roughness) == ((0.8, 0.8, 0.8), 0.0, 1.0)
+
+
+def test_glass_is_solid_but_for_materials_that_say_otherwise(read):
+    glb = document("A")
+    glass = {"KHR_materials_transmission": {"transmissionFactor": 1.0}}
+    deep = {**glass, "KHR_materials_volume": {"thicknessFactor": 0.0}}
+    glb.root["materials"] = [{}, {"extensions": {**glass}}, {"extensions": deep}]
+    part = glb.root["meshes"][0]["primitives"][0]
+    glb.root["meshes"][0]["primitives"] = [{**part, "material": index} for index in range(3)]
+    add_interiors(glb)
+    assert [material.thickness for material in read(glb).materials] == [0.0, 1.0, 0.0]
+
+
+def test_indices_of_refraction_that_the_exporter_leaves_out(read):
+    glb = document("A")
+    told = {"KHR_materials_ior": {"ior": 1.1}}
+    glb.root["materials"] = [{"name": "water"}, {"name": "plain"}, {"name": "ice", "extensions": told}]
+    part = glb.root["meshes"][0]["primitives"][0]
+    glb.root["meshes"][0]["primitives"] = [{**part, "material": index} for index in range(3)]
+    add_indices(glb, {"water": 1.33, "plain": 1.5, "ice": 1.3})
+    assert [material.ior for material in read(glb).materials] == [1.33, 1.5, 1.1]
 
 
 def test_what_cameras_do_not_see_is_left_out_unless_it_glows(read):

@@ -14,6 +14,11 @@ _AROUND = 32
 _PUNCTUAL = "KHR_lights_punctual"
 _STRENGTH = "KHR_materials_emissive_strength"
 _SPECULAR = "KHR_materials_specular"
+_VOLUME = "KHR_materials_volume"
+_IOR = "KHR_materials_ior"
+_UNLIT = "KHR_materials_unlit"
+#: Index of refraction of materials that tell none.
+_PLAIN_INDEX = 1.5
 
 
 def add_lights(glb: Glb, lights: dict[str, dict[str, Any]], unit: float) -> None:
@@ -62,6 +67,24 @@ def add_default_material(glb: Glb) -> None:
         index = glb.append("materials", dull)
         for part in bare:
             part["material"] = index
+
+
+def add_interiors(glb: Glb) -> None:
+    """Let what transmits light be solid, as it is in Cycles: glTF takes it for thin walls where none says its depth."""
+    for material in glb.root.get("materials", []):
+        extensions = material.get("extensions", {})
+        if "KHR_materials_transmission" in extensions and _VOLUME not in extensions:
+            extensions[_VOLUME] = {"thicknessFactor": 1.0}
+            glb.use_extension(_VOLUME)
+
+
+def add_indices(glb: Glb, indices: dict[str, float]) -> None:
+    """Give materials, by their names, their index of refraction: the exporter leaves it out of plain surfaces."""
+    for material in glb.root.get("materials", []):
+        index = indices.get(material.get("name", ""), _PLAIN_INDEX)
+        if index != _PLAIN_INDEX and not material.get("extensions", {}).keys() & {_IOR, _UNLIT}:
+            material.setdefault("extensions", {})[_IOR] = {"ior": max(index, 1.0)}
+            glb.use_extension(_IOR)
 
 
 def add_focus(glb: Glb, distances: dict[str, float], unit: float) -> None:

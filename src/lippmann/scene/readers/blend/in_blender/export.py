@@ -11,6 +11,8 @@ import bpy
 from .additions import (
     add_default_material,
     add_focus,
+    add_indices,
+    add_interiors,
     add_lights,
     leave_out,
     leave_out_unseen,
@@ -22,7 +24,7 @@ from .lights import camera_frames, describe_lights, focus_distances
 from .plain_values import plain_values
 from .remarks import remark_lights, remark_materials, remark_objects, remark_scene, unseen_objects
 from .render_view import as_rendered
-from .surfaces import as_principled
+from .surfaces import as_principled, refraction_indices
 from .working_space import materials_to_rec709, vertex_colors_to_rec709
 from .world import write_world
 
@@ -68,11 +70,11 @@ def export_scene(folder: Path, *, is_animated: bool = False) -> Exported:
 
     path = folder / SCENE
     unit = float(scene.unit_settings.scale_length) if scene.unit_settings.system != "NONE" else 1.0
-    with as_rendered(scene, view_layer), as_principled():
+    with as_rendered(scene, view_layer), as_principled(bpy.context.evaluated_depsgraph_get(), remark):
         depsgraph = bpy.context.evaluated_depsgraph_get()
         for remark_on in (remark_objects, remark_materials, remark_lights):
             remark_on(depsgraph, remark)
-        lights = describe_lights(depsgraph, remark)
+        lights, indices = describe_lights(depsgraph, remark), refraction_indices(depsgraph)
         focus, frames = focus_distances(scene), camera_frames(scene)
         unseen = unseen_objects(depsgraph, view_layer, remark)
         remark_scene(scene, view_layer, remark)
@@ -89,6 +91,8 @@ def export_scene(folder: Path, *, is_animated: bool = False) -> Exported:
     materials_to_rec709(glb)
     vertex_colors_to_rec709(glb)
     add_default_material(glb)
+    add_interiors(glb)
+    add_indices(glb, indices)
     add_lights(glb, lights, unit)
     add_focus(glb, focus, unit)
     set_frames(glb, frames, unit)

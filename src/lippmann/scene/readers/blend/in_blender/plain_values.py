@@ -78,7 +78,7 @@ def _convert_picture(node: Any, remark: Any) -> Any:
         colors[...] = colors @ rec709_from_scene()
     if is_color and colors.max(initial=0.0) > 1.0:
         remark(f"picture '{image.name}': colours brighter than white are cut")
-    colors[...] = _encode(colors) if is_color else _decode(colors)
+    colors[...] = encode(colors) if is_color else _decode(colors)
     # Blender's pictures have four channels, whatever files have.
     pixels = np.ones((len(values), 4), np.float32)
     pixels[:, : image.channels] = values
@@ -132,7 +132,7 @@ def _uses(node: Any, visited: set[str]) -> set[str]:
 
 
 # Blender's Python has nothing of the program's own.
-def _encode(values: Any) -> Any:
+def encode(values: Any) -> Any:
     """sRGB codes, 0 to 1, of linear values (IEC 61966-2-1)."""
     values = np.clip(values, 0.0, 1.0)
     return np.where(values <= 0.0031308, 12.92 * values, 1.055 * values ** (1 / 2.4) - 0.055)
