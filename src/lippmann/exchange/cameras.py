@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import PictureError, UsageError
-from lippmann.image.views import view_grid
 
 Real = NDArray[np.float64]
 
@@ -56,7 +55,10 @@ class Cameras:
     parallel:
         Whether these are stand-in cameras of parallel views.
     center:
-        Position ``(x, y)`` of the centre of the grid in the display frame.
+        Position ``(x, y)`` of the centre of the grid in the display frame, in front of the middle of the lenses: the
+        axis of the middle camera passes the middle of its frame, and layouts have no other principal point. Where
+        lenses stand beside their pixels, the display's own cameras lie off by ``s``, and points at the height z off by
+        ``s z / focus_distance``.
     world_from_display:
         ``(4, 4)`` affine map from the display frame, whose lens plane is the focus plane, to the world.
     """
@@ -148,9 +150,10 @@ class Cameras:
         if parallel:
             focus = -STAND_IN * display.resolvable_depth[1] if distance is None else distance
         baseline = display.panel.pixel_pitch * focus / display.gap
-        grid = view_grid(display)
-        middle = -baseline * float(np.mean(grid.right)), baseline * float(np.mean(grid.down))
-        return Cameras(baseline, focus, display.lattice.pitch, parallel, middle)
+        lattice, grid = display.lattice, display.lens_grid
+        right = lattice.origin_x + 0.5 * (grid.columns - 1) * lattice.pitch
+        down = 0.0 if grid.rows == 1 else 0.5 * (grid.rows - 1) * lattice.row_pitch
+        return Cameras(baseline, focus, lattice.pitch, parallel, (right, lattice.origin_y - down))
 
     def display(self, views: int, width: int, height: int, *, where: str = "") -> Display:
         """The square micro-lens array whose views are ``views`` x ``views`` of these cameras.
