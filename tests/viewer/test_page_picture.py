@@ -24,8 +24,9 @@ from pages import (
 )
 from PIL import Image
 
-from lippmann.color.transfer import encode_srgb
+from lippmann.color.transfer import decode_srgb, encode_srgb, quantize
 from lippmann.display import NUMPY
+from lippmann.display.visible_pixels import mean_of_points
 from lippmann.image import IntegralImage
 from lippmann.viewing.refocus import refocus
 from lippmann.viewing.replay import default_eye
@@ -44,6 +45,19 @@ SUBPIXELS = {
 }
 
 
+#: Makes each drawing take long, and notes which are coarse.
+BUSY_DRAWING = f"""() => {{
+  const stage = {VIEWER}.stage, draw = stage.draw.bind(stage);
+  window.coarse = [];
+  stage.draw = (pictures, view) => {{
+    window.coarse.push(view.isCoarse);
+    const until = performance.now() + 60;
+    while (performance.now() < until);
+    return draw(pictures, view);
+  }};
+}}"""
+
+
 def assert_shows_replay(tab, image, eyes=EYES):
     for eye in (default_eye(image.display), *eyes):
         put_eye(tab, eye)
@@ -57,7 +71,8 @@ def assert_shows_replay(tab, image, eyes=EYES):
 def seen_part(image, eye, frame, shape):
     """What an eye sees through a part of the panel's rectangle, as codes; nearest pixels, no sub-pixels."""
     display, panel = image.display, image.display.panel
-    height, width = shape[:2]
+    across = 2 if shape[1] < frame["width"] * panel.width else 1
+    height, width = (across * side for side in shape[:2])
     u = (frame["x"] + (np.arange(width) + 0.5) / width * frame["width"]) * panel.width
     v = (frame["y"] + (np.arange(height) + 0.5) / height * frame["height"]) * panel.height
     x, y = display.panel_point(*np.meshgrid(u, v))
@@ -65,7 +80,7 @@ def seen_part(image, eye, frame, shape):
     column, row = np.floor(u + 1e-6).astype(int), np.floor(v + 1e-6).astype(int)
     inside = (column >= 0) & (column < panel.width) & (row >= 0) & (row < panel.height)
     values = image.pixels[row.clip(0, panel.height - 1), column.clip(0, panel.width - 1)]
-    return np.round(255 * values) * inside[..., None]
+    return np.round(255 * mean_of_points(values * inside[..., None], across))
 
 
 @pytest.mark.long_cases(but=["hexagonal"])
@@ -143,6 +158,26 @@ def test_codes_of_light_follow_the_transfer(open_tab, tmp_path):
     image = IntegralImage(values, DISPLAYS["lenticular"])
     tab = opened(open_tab, page_of(tmp_path / "page.html", image))
     assert_shows_replay(tab, image, EYES[:1])
+
+
+@pytest.mark.slow
+def test_page_smaller_than_the_panel_shows_means_of_points_but_single_ones_in_slow_motion(open_tab, tmp_path):
+    values = np.random.default_rng(4).uniform(0, 1, (64, 96, 3)).astype(np.float32)
+    image = IntegralImage(decode_srgb(quantize(values, 8, "srgb") / 255).astype(np.float32), DISPLAYS["slanted"])
+    tab = opened(open_tab, page_of(tmp_path / "page.html", image))
+    tab.page.set_viewport_size({"width": 100, "height": 200})
+    tab.wait_for(f"{VIEWER}.stage.canvas.width < 96")
+    put_eye(tab, EYES[0])
+    codes = shown(tab)
+    assert psnr(codes, quantize(image.replay(EYES[0], size=codes.shape[1::-1]), 8, "srgb")) > 55
+    assert psnr(codes, seen(image, EYES[0], codes.shape[1::-1])) < 30
+    tab.evaluate(BUSY_DRAWING)
+    tab.evaluate(f"{VIEWER}.setPlaying(true)")
+    tab.wait_for("window.coarse.at(-1)")
+    tab.evaluate(f"{VIEWER}.pause()")
+    tab.wait_for("!window.coarse.at(-1)")
+    put_eye(tab, EYES[0])
+    assert np.array_equal(shown(tab), codes)
 
 
 @pytest.mark.slow

@@ -92,18 +92,21 @@ export class Picture {
    * Draws what an eye sees into the viewport.
    *
    * @param pane {x, y, width, height} in canvas pixels, y from below
-   * @param overlay {name, share} or null
-   * @param isReal whether through the real lenses, where the display has them
+   * @param view `overlay` {name, share} or null, `isReal`: whether through the real lenses, where the display has them,
+   *   and `isCoarse`: whether each pixel is a single point, however small the pane
    */
-  drawEye(eye, frame, pane, overlay, isReal) {
+  drawEye(eye, frame, pane, { overlay, isReal, isCoarse }) {
     const { gl } = this;
     const layer = overlay && this.overlays.get(overlay.name);
     const light = isReal ? this.light : null;
-    const program = this.#use(light ? "real" : layer ? "overlaid" : "eye");
-    const finer = light ? this.#finer(frame, pane) : [1, 1];
+    const isSmaller = pane.width < frame.width || pane.height < frame.height;
+    const points = isSmaller && !isCoarse ? 2 : 1;
+    const program = light ? this.#use("real") : this.#use(layer ? "overlaid" : "eye", points);
+    const finer = light ? this.#finer(frame, pane) : [points, points];
     const size = [finer[0] * pane.width, finer[1] * pane.height];
     this.#setSightline(program, sightline(this.manifest, eye, 0, frame, ...size), pane);
     this.#setBending(program, bending(this.manifest, eye));
+    gl.uniform1i(program.at("isCoded"), this.isCoded);
     if (light) this.#setLight(program, eye, frame, size, finer);
     if (layer) {
       gl.uniform1f(program.at("overlayShare"), overlay.share);
@@ -155,12 +158,13 @@ export class Picture {
     for (const program of this.programs.values()) this.gl.deleteProgram(program.handle);
   }
 
-  #use(kind) {
+  #use(kind, points = 1) {
     const { gl } = this;
-    if (!this.programs.has(kind)) {
-      this.programs.set(kind, new Program(gl, fragmentSource(kind, this.variant), SIGHT_VERTEX));
+    const key = `${kind} ${points}`;
+    if (!this.programs.has(key)) {
+      this.programs.set(key, new Program(gl, fragmentSource(kind, points, this.variant), SIGHT_VERTEX));
     }
-    const program = this.programs.get(kind);
+    const program = this.programs.get(key);
     gl.useProgram(program.handle);
     const { panel, lenses, tiles } = this.manifest;
     gl.uniform2f(program.at("panel"), panel.width, panel.height);
@@ -194,7 +198,6 @@ export class Picture {
     gl.uniform1f(program.at("pixelPitch"), manifest.panel.pixel_pitch);
     gl.uniform2iv(program.at("finer"), finer);
     gl.uniform1f(program.at("halfRows"), 0.5 * Math.max(1, frame.height / height));
-    gl.uniform1i(program.at("isCoded"), this.isCoded);
     gl.uniform1f(program.at("overlayShare"), 0);
   }
 

@@ -318,13 +318,34 @@ vec3 sampleCode(Fixed u, Fixed v) {
 #endif
 `;
 
+// Code of a pixel of the pane: of POINTS x POINTS points their mean in light, see points_of_pixel of visible_pixels.py.
+const MEAN_CODE = `
+uniform bool isCoded;
+
+vec3 meanCode() {
+  vec2 first = panePixel() * float(POINTS);
+  Fixed u, v;
+#if POINTS == 1
+  visiblePoint(first, u, v);
+  return sampleCode(u, v);
+#else
+  vec3 sum = vec3(0.0);
+  for (int point = 0; point < POINTS * POINTS; point += 1) {
+    visiblePoint(first + vec2(point % POINTS, point / POINTS), u, v);
+    vec3 code = sampleCode(u, v);
+    sum += isCoded ? decodeSrgb(code) : code;
+  }
+  vec3 light = sum / float(POINTS * POINTS);
+  return isCoded ? encodeSrgb(light) : light;
+#endif
+}
+`;
+
 const EYE = `
 out vec4 color;
 
 void main() {
-  Fixed u, v;
-  visiblePoint(panePixel(), u, v);
-  color = vec4(sampleCode(u, v), 1.0);
+  color = vec4(meanCode(), 1.0);
 }`;
 
 // The same with an overlay.
@@ -333,9 +354,9 @@ uniform float overlayShare;
 out vec4 color;
 
 void main() {
+  vec3 code = meanCode();
   Fixed u, v;
-  visiblePoint(panePixel(), u, v);
-  vec3 code = sampleCode(u, v);
+  visiblePoint(panePixel() * float(POINTS) + float(POINTS / 2), u, v);
   vec2 pixel = pixelOf(u, v);
   if (isOnPanel(pixel)) code = mix(code, fetchOverlay(pixel), overlayShare);
   color = vec4(code, 1.0);
@@ -613,10 +634,13 @@ void main() {
  * factors of their distortion (`bent`: 0 of a pinhole); arrangement
  * of sub-pixels (`cells`: 0 all in the pixel's centre, 1 in a row, 2 any, 3 in cells of several kinds, the nearest
  * within `reach` pixels); whether the picture is one texture or an array of tiles (`tiled`); whether the colours of a
- * pixel shine at places of their own (`split`), and whether all rows of pixels are weighed alike (`alike`).
+ * pixel shine at places of their own (`split`), and whether all rows of pixels are weighed alike (`alike`). A pixel of
+ * the pane is the mean of `points` x `points` points.
  */
-export function fragmentSource(kind, { layout, slanted, bent, cells, reach, tiled, split = false, alike = false }) {
+export function fragmentSource(kind, points, variant) {
+  const { layout, slanted, bent, cells, reach, tiled, split = false, alike = false } = variant;
   const values = {
+    POINTS: points,
     LAYOUT: layout,
     SLANTED: slanted,
     BENT: bent,
@@ -628,8 +652,8 @@ export function fragmentSource(kind, { layout, slanted, bent, cells, reach, tile
   };
   const defines = Object.entries(values).map(([name, value]) => `#define ${name} ${Number(value)}\n`);
   const bodies = {
-    eye: BENDING + SIGHTLINE + EYE,
-    overlaid: BENDING + SIGHTLINE + OVERLAY,
+    eye: SRGB + BENDING + SIGHTLINE + MEAN_CODE + EYE,
+    overlaid: SRGB + BENDING + SIGHTLINE + MEAN_CODE + OVERLAY,
     real: SRGB + BENDING + SIGHTLINE + REAL,
     summand: SRGB + LENS_OF_POINT + BENDING + SIGHTLINE + SUMMAND,
     magnifier: LENS_OF_POINT + BENDING + MAGNIFIER,

@@ -113,13 +113,13 @@ export class Stage {
     if (view.plane !== null && this.canSum) return this.#drawFocused(picture, pane, part, frame, view);
     gl.viewport(pane.x, pane.y, pane.width, pane.height);
     if (view.mode !== "anaglyph") {
-      picture.drawEye(eyeOf(view, pane.side), frame, pane, view.overlay, view.isReal);
+      picture.drawEye(eyeOf(view, pane.side), frame, pane, view);
       return false;
     }
     gl.colorMask(true, false, false, true);
-    picture.drawEye(eyeOf(view, -1), frame, pane, view.overlay, view.isReal);
+    picture.drawEye(eyeOf(view, -1), frame, pane, view);
     gl.colorMask(false, true, true, true);
-    picture.drawEye(eyeOf(view, 1), frame, pane, view.overlay, view.isReal);
+    picture.drawEye(eyeOf(view, 1), frame, pane, view);
     gl.colorMask(true, true, true, true);
     return false;
   }

@@ -31,6 +31,10 @@ const VIEWS_PER_FRAME = 6;
 /** Milliseconds between two updates of the controls while the eye moves. */
 const CONTROLS_PAUSE = 100;
 
+/** So many frames in a row that take longer than so many seconds make a moving picture one of single points. */
+const SLOW_FRAMES = 3;
+const SLOW_SECONDS = 0.05;
+
 export function createViewer(root, sources, options = {}) {
   return new Viewer(root, [sources].flat(), options);
 }
@@ -57,10 +61,12 @@ class Viewer {
       isPlaying: false,
       viewsPerFrame: VIEWS_PER_FRAME,
       wholeFocus: false,
+      isCoarse: false,
     };
     this.goal = null;
     this.requested = 0;
     this.lastTime = null;
+    this.slowFrames = 0;
     this.controlsShown = 0;
     this.isDestroyed = false;
     this.layout = new Layout(root, options, () => this.#resize());
@@ -334,7 +340,10 @@ class Viewer {
       if (this.view.eye === this.goal) this.goal = null;
       isMoving = this.goal !== null;
     }
-    const remains = this.#draw({}, isMoving);
+    // Once coarse, the picture stays so until the eye rests: it would flicker.
+    if (this.slowFrames < SLOW_FRAMES) this.slowFrames = seconds > SLOW_SECONDS ? this.slowFrames + 1 : 0;
+    if (!isMoving) this.slowFrames = 0;
+    const remains = this.#draw({ isCoarse: this.slowFrames === SLOW_FRAMES }, isMoving);
     this.lastTime = isMoving ? time : null;
     if (isMoving || remains) this.invalidate();
   }
