@@ -81,7 +81,7 @@ class Proof:
     crosstalk, crosstalk_aside:
         Straight ahead, and half-way to the edge of the zone.
     depth, rule_of_depth:
-        Usable depth before and behind the lenses, together: by the light of one direction, which spreads over one lens
+        Usable depth on both sides of the lenses, together: by the light of one direction, which spreads over one lens
         there; and 2 N t / n by the rule of the trade, None without a lens.
     field, field_of_extreme_ray:
         Between the outermost true directions of a lens, and by the formula; None without a lens.
@@ -180,7 +180,7 @@ def prove(display: Display) -> Proof:
     --------
     >>> from lippmann.optics.proof import prove
     >>> prove(lippmann.load_display("print-60lpi")).advice
-    'keep the scene within 4.59 mm before and behind the lenses; ...'
+    'keep the scene within 4.59 mm in front of and behind the lenses; ...'
     """
     directions, straight = independent_directions(display), crosstalk(display, 0.0)
     slope = edge_slope(display)
@@ -265,7 +265,7 @@ def _tolerances(display: Display, depth: float) -> PrintTolerances:
 
 def _advice(display: Display, straight: float, depth: float, tolerances: PrintTolerances | None) -> str:
     """Advice in one line: on crosstalk first, then on pixels that the lens does not tell apart, or could."""
-    keep = f"keep the scene within {0.5 * depth:.3g} mm before and behind the lenses"
+    keep = f"keep the scene within {0.5 * depth:.3g} mm in front of and behind the lenses"
     if display.lens is None:
         return f"{keep}; with the table [lens] of a display file, or thickness= of a print, the true lens is proved"
     pixels = display.pixels_per_lens[0]

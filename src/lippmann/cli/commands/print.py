@@ -26,8 +26,8 @@ def marks(
         typer.Option(
             "--output",
             "-o",
-            help="The file to write; its ending names the format. By default NAME-marks.tif in this folder, or with "
-            "--job-sheet none.",
+            help="The file to write; its ending names the format. By default NAME-marks.tif in this folder; none is "
+            "written if only --job-sheet is given.",
         ),
     ] = None,
     margin: Annotated[

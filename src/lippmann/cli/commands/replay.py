@@ -34,7 +34,7 @@ Filter = Annotated[
 Size = Annotated[
     str | None,
     typer.Option(
-        "--size", metavar="WIDTHxHEIGHT", help="Size of the result in pixels. Default: as the panel, reduced."
+        "--size", metavar="WIDTHxHEIGHT", help="Size of the result in pixels. Default: the panel's, at most 2048 wide."
     ),
 ]
 
