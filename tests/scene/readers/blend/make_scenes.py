@@ -258,6 +258,10 @@ def mixed():
     show(add("AddShader", {0: add("BsdfDiffuse", {"Color": red}), 1: lit}))
     add, show = use("inverted")
     show(add("BsdfDiffuse", {"Color": add("Invert", {"Color": add("TexImage", {}, image=pictures["colors"])})}))
+    add, show = use("lost")
+    lost = bpy.data.images.new("lost", 4, 4)
+    lost.source, lost.filepath = "FILE", "//lost.png"
+    show(add("BsdfPrincipled", {"Base Color": add("TexImage", {}, image=lost)}))
     add, show = use("noise")
     show(add("BsdfDiffuse", {"Color": add("TexNoise", {})}))
     add, show = use("bumped")

@@ -204,9 +204,8 @@ def _extent(meshes: list[tuple[Any, int]], layer: str) -> tuple[float, ...]:
         found = None if mesh is None else mesh.uv_layers.get(layer) if layer else _active(mesh)
         if found is None or not len(mesh.polygons):
             continue
-        uv = np.empty(2 * len(mesh.loops), np.float32)
-        found.uv.foreach_get("vector", uv)
-        uv = uv.reshape(-1, 2)
+        uv = np.empty((len(mesh.loops), 2), np.float32)
+        found.uv.foreach_get("vector", uv.ravel())
         counts = np.empty(len(mesh.polygons), np.int32)
         mesh.polygons.foreach_get("loop_total", counts)
         owners = np.empty(len(mesh.polygons), np.int32)

@@ -17,6 +17,7 @@ from .baking import Studio, bake
 from .node_reach import by_identifier, group_output, is_plain, reach
 
 _BLACK, _WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+_EMISSION, _DARK = ("Emission Color", "Emission Strength"), (_BLACK, 0.0)
 _DULL = {"Roughness": 1.0, "Specular IOR Level": 0.0}
 #: Surfaces of one node by its type: the values that a Principled BSDF needs beside the node's own inputs.
 _SURFACES: dict[str, dict[str, Any]] = {
@@ -59,6 +60,7 @@ def as_principled(depsgraph: Any, remark: Any) -> Iterator[None]:
             for name in sorted(used):
                 material, meshes = used[name]
                 if material.library is None and material.node_tree is not None and material.use_nodes:
+                    _remark_missing(material, remark)
                     outputs = [node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL"]
                     if any(_needs_rewrite(output) for output in outputs):
                         rewritten.append(_Rewrite(material, remark))
@@ -92,6 +94,15 @@ def _used_materials(depsgraph: Any) -> dict[str, tuple[Any, list[tuple[Any, int]
                 if item.type == "MESH" and mesh not in meshes:
                     meshes.append(mesh)
     return used
+
+
+def _remark_missing(material: Any, remark: Any) -> None:
+    """Name the pictures that a material's surface wants and that cannot be read."""
+    output = material.node_tree.get_output_node("CYCLES")
+    if output is not None and output.inputs["Surface"].is_linked:
+        for image in reach(output.inputs["Surface"].links[0].from_socket).images:
+            if not image.size[0] and image.source != "TILED":
+                remark(f"material '{material.name}': its picture '{image.name}' is not found and left out")
 
 
 def _needs_rewrite(output: Any) -> bool:
@@ -243,23 +254,25 @@ class _Rewrite:
 
     def _glow(self, mixed: Surface, factor: Any, one: Surface, other: Surface) -> Surface:
         """``mixed`` with the mixed emission of two surfaces."""
-        glows = [_emission(each) for each in (one, other)]
-        if glows == [None, None]:
+        first, second = _emission(one), _emission(other)
+        if first is None and second is None:
             return {**mixed, "Emission Strength": 0.0}
-        if None in glows and not hasattr(factor, "is_output"):
-            (color, strength), share = (glows[1], factor) if glows[0] is None else (glows[0], 1.0 - factor)
+        if (first is None or second is None) and not hasattr(factor, "is_output"):
+            (color, strength), share = (first, 1.0 - factor) if first else (second or _DARK, factor)
             return {**mixed, "Emission Color": color, "Emission Strength": self._product(strength, share, "VALUE")}
-        colors = [_BLACK if glow is None else self._product(*glow, "RGBA") for glow in glows]
-        return {**mixed, "Emission Color": self._blend(factor, *colors, "RGBA"), "Emission Strength": 1.0}
+        colors = [self._product(*(glow or _DARK), "RGBA") for glow in (first, second)]
+        glow = self._blend(factor, colors[0], colors[1], "RGBA")
+        return {**mixed, "Emission Color": glow, "Emission Strength": 1.0}
 
     def _sum(self, node: Any, one: Surface, other: Surface) -> Surface:
         for glow, base in ((one, other), (other, one)):
-            if glow.get("Base Color") == _BLACK and _emission(glow) is not None and "Base Color" in base:
-                added = _emission(base)
-                if added is None:
-                    return {**base, **{name: glow[name] for name in ("Emission Color", "Emission Strength")}}
-                colors = [self._product(*each, "RGBA") for each in (_emission(glow), added)]
-                return {**base, "Emission Color": self._join("ADD", *colors, "RGBA"), "Emission Strength": 1.0}
+            added, own = _emission(glow), _emission(base)
+            if glow.get("Base Color") == _BLACK and added is not None and "Base Color" in base:
+                if own is None:
+                    return {**base, **dict(zip(_EMISSION, added, strict=True))}
+                colors = [self._product(*each, "RGBA") for each in (added, own)]
+                total = self._join("ADD", colors[0], colors[1], "RGBA")
+                return {**base, "Emission Color": total, "Emission Strength": 1.0}
         for gloss, base in ((other, one), (one, other)):
             color, is_layer = gloss.get("Base Color"), "Base Color" in base and base.get("Metallic", 0.0) == 0.0
             if gloss.get("Metallic") == 1.0 and is_layer and isinstance(color, tuple) and 0.0 < max(color) < 1.0:
