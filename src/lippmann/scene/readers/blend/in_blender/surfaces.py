@@ -270,7 +270,7 @@ class _Rewrite:
             if glow.get("Base Color") == _BLACK and added is not None and "Base Color" in base:
                 if own is None:
                     return {**base, **dict(zip(_EMISSION, added, strict=True))}
-                colors = [self._product(*each, "RGBA") for each in (added, own)]
+                colors = [self._product(each[0], each[1], "RGBA") for each in (added, own)]
                 total = self._join("ADD", colors[0], colors[1], "RGBA")
                 return {**base, "Emission Color": total, "Emission Strength": 1.0}
         for gloss, base in ((other, one), (one, other)):
