@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lippmann.runtime.machine import check_input
 from lippmann.scene.parsing.files import MissingFileError
 from lippmann.scene.parsing.texture_maps import resize, unit
-from lippmann.scene.values.description import FloatArray, Image, Matrix
+from lippmann.scene.values.description import Image, Matrix
 
 #: What stands in a name for a tile's number, or (MaterialX, Mudbox) for ``u1_v1``.
 _MARK = re.compile(r"<UDIM>|%\(UDIM\)d|<UVTILE>", re.IGNORECASE)
@@ -56,7 +57,7 @@ def read_tiles(name: str, read: Callable[[Callable[[str], str]], Image]) -> Tile
     return _joined(name, tiles)
 
 
-def missing_tiles(image: TiledImage, coordinates: FloatArray) -> list[int]:
+def missing_tiles(image: TiledImage, coordinates: NDArray[np.float64]) -> list[int]:
     """Numbers of the tiles that points ``(n, 2)`` of texture coordinates, v downwards, need and there are not."""
     column, row = np.floor(coordinates * (1.0, -1.0) + (0.0, 1.0)).T
     return sorted({int(number) for number in np.unique(_FIRST + column + _ACROSS * row)} - image.numbers)

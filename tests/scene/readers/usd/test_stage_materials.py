@@ -149,6 +149,9 @@ def test_tiles_that_a_mesh_needs_and_that_are_not_there_are_named(read):
     assert read(body, files=files).notes == [
         "texture 't.<UDIM>.png' has no tile 1011, which mesh /m needs: black there"
     ]
+    body = body.replace("translation = (0, 1)", "translation = (0, 0)").replace('"st"', '"none"')
+    (note,) = read(body, files=files).notes
+    assert "has no texture coordinates 'none'" in note
 
 
 def test_scale_is_a_factor_and_bias_is_added_to_linear_values(read):
@@ -223,7 +226,7 @@ def test_the_only_coordinates_are_taken_for_those_of_another_name(read, count):
     if count == 1:
         body = "\n".join(line for line in body.splitlines() if "primvars:other" not in line)
     scene = read(body, files={"t.png": png(PICTURE)})
-    assert bool(np.ptp(scene.meshes[0].uvs[0])) == (count == 1)
+    assert bool(np.ptp(scene.meshes[0].uvs[0], axis=0).any()) == (count == 1)
     told = "its only ones, 'st', are taken" if count == 1 else "its textures show one texel"
     assert scene.notes == [f"mesh /m has no texture coordinates '_': {told}"]
 
@@ -493,3 +496,25 @@ def test_other_inputs_by_primvars_are_named(read):
     scene = read(painted(nodes, "color3f inputs:emissiveColor.connect = </mat/e.outputs:result>"))
     assert scene.meshes[0].colors is None
     assert "emissiveColor by the primvar 'displayColor' is not read: its fallback is taken" in scene.notes
+
+
+def test_arrays_of_colours_hinder_nothing(read):
+    """Ramps have them."""
+    body = surface(
+        "color3f inputs:diffuseColor = (1, 0, 0)\ncolor3f[] inputs:ramp = [(1, 0, 0), (0, 1, 0)]",
+    )
+    assert read(body).materials[0].base_color == (1, 0, 0)
+
+
+def test_pictures_of_maketx(read, tmp_path):
+    """Either TIFF or OpenEXR, whatever their name says."""
+    write_exr(tmp_path / "light.exr", {name: np.full((1, 1), 0.25, np.float32) for name in "RGB"}, text={})
+    body = surface("color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>", texture(file="t.tx"))
+    found = read(body, files={"t.tx": (tmp_path / "light.exr").read_bytes()}).materials[0].base_color_texture
+    assert not found.srgb
+    assert (found.image.pixels == 0.25).all()
+    held = io.BytesIO()
+    Pillow.fromarray(np.full((1, 1, 3), 64, np.uint8)).save(held, "TIFF")
+    found = read(body, files={"t.tx": held.getvalue()}).materials[0].base_color_texture
+    assert found.srgb
+    assert (found.image.pixels == 64).all()

@@ -156,3 +156,13 @@ def test_variants_that_are_not_there_are_refused(stage):
         load_scene(path, variants={"paint": "green"})
     with pytest.raises(UsageError, match="has no variants"):
         load_scene("teapot", variants={"paint": "green"})
+
+
+@pytest.mark.parametrize("span", ["startTimeCode = 224\n    endTimeCode = 224", ""])
+def test_copies_with_velocities_in_a_stage_of_one_frame(read, span):
+    """As Houdini writes a frame: samples for motion blur on both sides of it."""
+    body = 'def PointInstancer "i" {\nint[] protoIndices = [0]\nrel prototypes = [</i/m>]\n'
+    body += "point3f[] positions.timeSamples = { 223.5: [(0, 0, 0)], 224: [(1, 0, 0)] }\n"
+    body += "vector3f[] velocities.timeSamples = { 223.5: [(48, 0, 0)], 224: [(48, 0, 0)] }\n"
+    scene = read(body + triangle() + "}", head=HEAD.replace('"Y"', f'"Y"\n    timeCodesPerSecond = 24\n    {span}'))
+    assert scene.instances[0].world_from_mesh[:3, 3].tolist() == ([1, 0, 0] if span else [0, 0, 0])

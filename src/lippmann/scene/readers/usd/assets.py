@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.codecs.exr import SIGNATURE
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.runtime.atomic_write import scratch_folder
@@ -98,7 +99,7 @@ class Assets:
             return read_tiles(
                 name, lambda tile: self._load({**asset, "name": tile(name), "found": tile(asset["found"])})
             )
-        if name.lower().endswith(LINEAR_SUFFIXES):
+        if self._is_linear(asset):
             with self._file(asset) as path:
                 pixels, notes = read_linear(path)
             self.notes.update(dict.fromkeys(notes))
@@ -115,7 +116,7 @@ class Assets:
         SceneError
             As :meth:`image`, and as :func:`lippmann.scene.readers.environment_map.read_environment`.
         """
-        if asset["name"].lower().endswith(LINEAR_SUFFIXES):
+        if self._is_linear(asset):
             try:
                 with self._file(asset) as path:
                     sky = read_environment(path)
@@ -129,6 +130,11 @@ class Assets:
             return _WHITE_SKY
         values = unit(image)[..., :3]
         return panorama(np.asarray(decode_srgb(np.broadcast_to(values, (*values.shape[:2], 3))), np.float32))
+
+    def _is_linear(self, asset: Record) -> bool:
+        """Whether a picture is OpenEXR or Radiance; those that ``maketx`` has made (``.tx``) are TIFF or OpenEXR."""
+        name = asset["name"].lower()
+        return name.endswith(LINEAR_SUFFIXES) or (name.endswith(".tx") and self._bytes(asset).startswith(SIGNATURE))
 
     @contextmanager
     def _file(self, asset: Record) -> Iterator[Path]:

@@ -356,7 +356,7 @@ class MeshReader:
                 ] = None
             if entry is None:
                 self._note_no_uvs(record, uv_name)
-                uvs.append(np.zeros((len(polygons.indices), 2), np.float32))
+                uvs.append(np.tile(np.array([0.0, 1.0], np.float32), (len(polygons.indices), 1)))  # a stage's (0, 0)
                 continue
             values = self._values(sampler, entry, name, f"texture coordinates '{uv_name}'")
             # A stage's v points up the picture.

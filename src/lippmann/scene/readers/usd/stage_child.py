@@ -58,10 +58,11 @@ def _read(request: Record, arrays: Arrays) -> Record:
     stage, notes = _open(request)
     rate = stage.GetTimeCodesPerSecond() or 24.0
     start, end = stage.GetStartTimeCode(), stage.GetEndTimeCode()
-    is_timed = stage.HasAuthoredTimeCodeRange() and end > start
+    has_range = stage.HasAuthoredTimeCodeRange()
+    is_timed = has_range and end > start
     seconds = request["seconds"]
     if seconds is None:
-        time = Usd.TimeCode(start) if is_timed else Usd.TimeCode.EarliestTime()
+        time = Usd.TimeCode(start) if has_range else Usd.TimeCode.EarliestTime()
     else:
         time = Usd.TimeCode(start + seconds * rate)
     traversal = Traversal(stage, time, arrays, notes)

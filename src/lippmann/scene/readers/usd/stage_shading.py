@@ -89,6 +89,8 @@ class MaterialTable:
                 if primaries_of(space) is not None:
                     self._notes[f"pictures in the colour space '{space}' are taken as those of Rec. 709"] = None
                 return {"asset": asset_record(attribute, value, self._time)}
+            if attribute.GetTypeName().isArray:  # of ramps and the like
+                return None
             if str(attribute.GetTypeName()).startswith("color"):
                 value = type(value)(*_rec709(np.array(value)[:3], space), *list(value)[3:])
             return None if value is None else {"value": _plain(value)}

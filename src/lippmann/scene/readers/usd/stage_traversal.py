@@ -283,6 +283,9 @@ def _has_own(prim: Usd.Prim, name: str) -> bool:
 
 def _instance_matrices(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode) -> Matrices:
     """``instancer_from_copy`` ``(k, 4, 4)`` of all copies, hidden ones too."""
+    samples = instancer.GetPositionsAttr().GetTimeSamples()
+    if samples and time.IsEarliestTime():  # from which velocities would carry them to their places
+        time = Usd.TimeCode(samples[0])
     exclude, ignore = UsdGeom.PointInstancer.ExcludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
     matrices = instancer.ComputeInstanceTransformsAtTime(time, time, exclude, ignore)
     return np.array(matrices, np.float64).reshape(-1, 4, 4).transpose(0, 2, 1)
