@@ -103,6 +103,12 @@ def test_emitters_of_a_scene_with_another_sky_are_told_apart():
     assert weights[unseen] == pytest.approx(TUNING.uniform_share / 3)
 
 
+def test_direct_light_of_a_single_emitter_takes_no_pilot():
+    from lippmann.rendering.preparation.prepare import trace_pilot
+
+    assert trace_pilot(*stage(room(("bright",)), depth=1)).region is None
+
+
 def test_the_scene_stays_as_it_was():
 
     integrator, source = stage(room())

@@ -241,12 +241,12 @@ class Pilot:
 def trace_pilot(integrator: PathIntegrator, source: RaySource) -> Pilot:
     """Trace the pilot of the picture of ``source``, which depends on the scene, the ray depth and the rays alone.
 
-    In scenes that are lit by their environment alone nothing is traced, as no rule needs it. ``integrator`` samples
-    emitters uniformly.
+    In scenes that are lit by their environment alone nothing is traced, nor of direct light of a single emitter, as no
+    rule needs it. ``integrator`` samples emitters uniformly.
     """
     lights = integrator.scene.emitters()
     count = len(lights)
-    if all(each.is_environment() for each in lights):
+    if all(each.is_environment() for each in lights) or (count == 1 and integrator.depth < 2):
         return Pilot(np.zeros(count), 0.0, None)
     emitters = count if 0 < count <= TUNING.most_weighed_emitters else 1
     paths = TRANSPORT.rays_of_each(emitters)
