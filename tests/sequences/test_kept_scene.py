@@ -69,11 +69,13 @@ def light_source(kind="point", **more):
     return Light(kind, (80.0, 80.0, 80.0), PLACE, **more)
 
 
-@pytest.mark.parametrize("kind", ["point", "spot", "directional"])
-def test_light_sources_go_along_with_what_is_built(engine, display, builds, kind):
-    motion = open_turntable(
-        teapot(lights=[light_source(kind), light_source("point")], environment=sky(), background=None), 5
+def test_light_sources_go_along_with_what_is_built(engine, display, builds):
+    lights = [light_source(kind) for kind in ("point", "spot", "directional")]
+    # From above, where it is seen.
+    lights[1] = replace(
+        lights[1], world_from_light=np.array([[1, 0, 0, 6], [0, 0, 1, 70], [0, -1, 0, 6], [0, 0, 0, 1.0]])
     )
+    motion = open_turntable(teapot(lights=lights, environment=sky(), background=None), 5)
     *_, (_, together) = render_sequence(motion, display, [0, 1], **QUICK)
     assert len(builds) == 1
     ((_, alone),) = render_sequence(motion, display, [1], **QUICK)
@@ -126,6 +128,7 @@ def begun_there(engine, display, lit_teapot):
     return [image for _, image in render_sequence(motion, display, [1, 2], integrator="path", device="cpu")]
 
 
+@pytest.mark.long_cases("object", "light")
 @pytest.mark.parametrize("change", ["surfaces", "object", "light", "dark"])
 def test_a_film_after_a_cut_is_one_that_begins_there(engine, display, lit_teapot, begun_there, change):
     scene = lit_teapot
