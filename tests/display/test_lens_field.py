@@ -26,6 +26,13 @@ def test_reach_is_the_longest_stretch_of_one_lens_in_a_row(name):
     assert field.reach == max(len(list(pixels)) for row in field.lens for _, pixels in groupby(row))
 
 
+def test_numba_has_one_type_for_all_displays():
+    """Kernels that read the field are compiled for one of them alone, whichever is rendered."""
+    from numba import typeof
+
+    assert len({typeof(LensField.of(display)) for display in DISPLAYS.values()}) == 1
+
+
 def test_corresponding_pixels_lie_at_the_same_place():
     field = LensField.of(DISPLAYS["square"])
     numbers = np.arange(96 * 96)

@@ -60,7 +60,11 @@ class LensField(NamedTuple):
             lens = np.broadcast_to(i.astype(np.int32), (panel.height, panel.width))
         else:
             i, j = pixel_lenses(display)
-            lens = (j * np.int32(grid.columns) + i).astype(np.int32)
+            # Read-only and with a gap after each row: Numba has one type for this and for a row that stands for all,
+            # so that kernels are compiled once.
+            padded = np.empty((panel.height, panel.width + 1), np.int32)
+            padded[:, :-1] = j * np.int32(grid.columns) + i
+            lens = np.broadcast_to(padded[:, :-1], (panel.height, panel.width))
         middle = np.array([panel.width - 1, panel.height - 1]) / 2
         return LensField(lens, lens_centers(display).reshape(-1, 2) + middle, grid.columns)
 
