@@ -166,18 +166,17 @@ class EyeMap:
         return _pixel_set(visible, number, panel.width, self._blocks(number))
 
     def _nearest(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Columns and rows of the pixels whose sub-pixels have the nearest centres; -1 where none is on the panel."""
-        panel, cells = self.display.panel, self._cells
+        """Columns and rows of the pixels whose sub-pixels have the nearest centres, on the panel or past it."""
+        cells = self._cells
         middle_column, middle_row = (np.floor(part + _ON_BOUNDARY).astype(np.int64) for part in (u, v))
         shape = (*u.shape[:2], cells.shape[2])
         best = np.full(shape, np.inf)
-        best_column, best_row = np.full((2, *shape), -1, np.int64)
+        best_column, best_row = np.empty((2, *shape), np.int64)
         for down, right in product(range(-2, 3), repeat=2):
             column, row = middle_column + right, middle_row + down
-            on_panel = (column >= 0) & (column < panel.width) & (row >= 0) & (row < panel.height)
             offset = cells[row % cells.shape[0], column % cells.shape[1]][:, :, 0]
             distance = np.square(column + 0.5 + offset[..., 0] - u) + np.square(row + 0.5 + offset[..., 1] - v)
-            is_nearer = on_panel & (distance < best)
+            is_nearer = distance < best
             best = np.where(is_nearer, distance, best)
             best_column, best_row = np.where(is_nearer, column, best_column), np.where(is_nearer, row, best_row)
         return best_column, best_row
