@@ -301,4 +301,4 @@ def test_what_the_panel_cuts_is_said_once_with_the_first_frame_concerned(engine,
     assert done.code == 0, done.err
     (line,) = [line for line in done.err.splitlines() if "the panel's edge cuts" in line]
     assert "(right " in line
-    assert line.endswith("sets it behind and the like (2 of 5 frames, the first is 18)")
+    assert line.endswith("sets it behind (frame 18; with other numbers 1 more of 5 frames)")

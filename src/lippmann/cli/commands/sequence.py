@@ -142,9 +142,11 @@ class _Account:
         """Print the remarks and the result."""
         frames, count = self._frames, len(self._frames)
         for alike in self._notes.values():
-            where = next(iter(alike))
-            only = f" ({len(alike)} of {count} frames, the first is {where})" if len(alike) < count else ""
-            console.remark(f"{alike[where]}{' and the like' if len(set(alike.values())) > 1 else ''}{only}")
+            first, text = next(iter(alike.items()))
+            told = f" ({len(alike)} of {count} frames, the first is {first})" if len(alike) < count else ""
+            if len(set(alike.values())) > 1:
+                told = f" (frame {first}; with other numbers {len(alike) - 1} more of {count} frames)"
+            console.remark(text + told)
         if (line := film_in_words([one["estimate"] for one in frames])) is not None:
             console.remark(line)
         film = "" if video is None else f", {video}"
