@@ -260,7 +260,7 @@ class _Rewrite:
         if (first is None or second is None) and not hasattr(factor, "is_output"):
             (color, strength), share = (first, 1.0 - factor) if first else (second or _DARK, factor)
             return {**mixed, "Emission Color": color, "Emission Strength": self._product(strength, share, "VALUE")}
-        colors = [self._product(*(glow or _DARK), "RGBA") for glow in (first, second)]
+        colors = [self._product(color, strength, "RGBA") for color, strength in (first or _DARK, second or _DARK)]
         glow = self._blend(factor, colors[0], colors[1], "RGBA")
         return {**mixed, "Emission Color": glow, "Emission Strength": 1.0}
 
