@@ -21,6 +21,8 @@ def device(engine):
 
 
 def assert_same_on_device(display, device, seed):
+    import drjit as dr
+
     real, ops = device
     rng = np.random.default_rng(seed)
     width, height = display.panel.width, display.panel.height
@@ -46,6 +48,7 @@ def assert_same_on_device(display, device, seed):
 
     here, there = evaluate(np.asarray), evaluate(real, ops)
     assert all(type(array) is real for array in there)
+    dr.eval(there)  # by one kernel, not one for each
     there = [np.broadcast_to(array.numpy(), u.shape) for array in there]
     np.testing.assert_array_equal(there[:2], here[:2])
     np.testing.assert_allclose(there[2:], here[2:], rtol=1e-12, atol=1e-11)

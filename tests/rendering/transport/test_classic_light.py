@@ -49,6 +49,8 @@ class Lab:
         ray = mi.Ray3f(mi.Point3f(o.T.astype(np.float32)), mi.Vector3f(d.T.astype(np.float32)))
         stream = SampleStream.of_pixels(dr.arange(mi.UInt32, len(o)), mi.UInt32(0), mi.UInt32(0))
         color, counts, first = integrator.sample_with_hit(ray, stream, mi.Bool(True))
+        # By one kernel, not one for each.
+        dr.eval(color, counts.shadow, counts.secondary, first.distance, first.view_dependent)
         return Seen(
             np.array(color).T,
             np.array(counts.shadow),

@@ -28,18 +28,23 @@ def scattered(count, seed, *, flat=True):
     return Photons(*arrays, random.integers(1, 5, count).astype(np.uint32))
 
 
-def gathered(photon_map, points, half, surfaces, *, choice=0.5, active=True, normal=(0, 0, 1), by_kernel=True, **parts):
+def gathered(
+    photon_map, points, half, surfaces, *, choice=0.5, active=True, normal=(0, 0, 1), by_kernel=True, part=0, **parts
+):
     import drjit as dr
     import mitsuba as mi
 
     si = dr.zeros(mi.SurfaceInteraction3f, len(points))
     si.p = mi.Point3f(np.ascontiguousarray(points.T))
-    up, none, choice = mi.Vector3f(*normal), mi.Vector3f(0), mi.Float(np.float32(choice))
+    # Opaque to the compiler as they are in pictures, so that all look-ups share a kernel.
+    up = mi.Vector3f(*(dr.opaque(mi.Float, float(along)) for along in normal))
+    none, choice = mi.Vector3f(0), mi.Float(np.float32(choice))
     si.n = mi.Normal3f(up)
     si.sh_frame = mi.Frame3f(up)
     si.wi = mi.Vector3f(0, 0, 1)
-    half, surfaces = mi.UInt32(half), mi.UInt32(surfaces)
-    return photon_map.gather(si, up, none, half, surfaces, choice, mi.Bool(by_kernel), mi.Bool(active), **parts)
+    half, surfaces, part = (dr.opaque(mi.UInt32, number) for number in (half, surfaces, part))
+    by_kernel, active = dr.opaque(mi.Bool, by_kernel), mi.Bool(active)
+    return photon_map.gather(si, up, none, half, surfaces, choice, by_kernel, active, part=part, **parts)
 
 
 def looked_up(photon_map, points, half, surfaces, active=True):
