@@ -26,7 +26,7 @@ A file counts as *valid* if it shows triangles and is sound. Khronos' own valida
 for its XML; errors of the validator on bounds, weights and alignment alone do not count against a file. Files of other
 formats are valid unless their set names them as damaged. Not valid are files that name another one which their set
 lacks, and glTF 1.0. Most inputs of the tests of validators and readers are not valid, on purpose. Files that require
-Draco or an extension that nobody knows are valid.
+an extension that nobody knows are valid.
 
 Of {total["valid"]} valid files, {total["valid_rendered"]} are rendered ({share:.1%}).
 

@@ -304,7 +304,7 @@ def test_where_a_tile_lies_on_the_globe_does_not_matter(writer, read):
 
 
 def test_used_extension_that_is_not_understood_is_noted(writer, read):
-    writer.triangle().json["extensionsUsed"] = ["KHR_materials_dispersion", "KHR_materials_ior", "EXT_mesh_manifold"]
+    writer.triangle().json["extensionsUsed"] = ["KHR_materials_dispersion", "KHR_materials_ior", "EXT_feature_metadata"]
     assert read(writer).notes == (
         "the glTF extension KHR_materials_dispersion is not understood; what it adds is left out",
     )

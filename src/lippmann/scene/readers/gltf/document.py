@@ -77,7 +77,8 @@ _UNDERSTOOD = frozenset(
 # They say nothing about what is seen while the scene stands still.
 _SILENT = frozenset({"KHR_xmp", "KHR_xmp_json_ld", "KHR_node_selectability", "KHR_node_hoverability"})
 # They say where on the globe a tile lies, and what its parts stand for.
-_SILENT |= {"CESIUM_RTC", "EXT_instance_features", "EXT_mesh_features", "EXT_structural_metadata"}
+_SILENT |= {"CESIUM_RTC", "EXT_instance_features", "EXT_mesh_features"}
+_SILENT |= {"EXT_feature_metadata", "EXT_structural_metadata"}
 
 # They say which triangles were one face, that a mesh is closed, and how an editor shows the root.
 _SILENT |= {"EXT_mesh_manifold", "FB_ngon_encoding", "GODOT_single_root"}
