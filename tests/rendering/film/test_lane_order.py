@@ -14,13 +14,15 @@ pytestmark = pytest.mark.usefixtures("engine")
 
 def places(width: int, height: int) -> np.ndarray:
     """Row and column of every place, ``(places, 2)``."""
+    import drjit as dr
     import mitsuba as mi
 
     count = width * height
     number = mi.UInt32(np.arange(count, dtype=np.uint32))
-    return np.stack(
-        [np.array(part) for part in locate_pixel(number, width, mi.UInt32(in_strips(count, width)))], axis=1
-    )
+    # As pictures do it: pictures of all sizes share a kernel.
+    found = locate_pixel(number, width, dr.opaque(mi.UInt32, in_strips(count, width)))
+    dr.eval(found)
+    return np.stack([np.array(part) for part in found], axis=1)
 
 
 @settings(deadline=None)
