@@ -518,3 +518,16 @@ def test_pictures_of_maketx(read, tmp_path):
     found = read(body, files={"t.tx": held.getvalue()}).materials[0].base_color_texture
     assert found.srgb
     assert (found.image.pixels == 64).all()
+
+
+@pytest.mark.parametrize(("st", "texel"), [("", (1, 0)), ("float2 inputs:st = (0.9, 0.9)", (0, 1))])
+def test_a_texture_whose_coordinates_are_not_connected_shows_one_texel(read, st, texel):
+    """That at (0, 0), which is the schema's fallback and what usdview shows, below on the left."""
+    pixels = [[[10, 20, 30], [40, 50, 60]], [[70, 80, 90], [100, 110, 120]]]
+    node = texture().replace("float2 inputs:st.connect = </mat/uv.outputs:result>", st)
+    body = surface("color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>", node)
+    scene = read(body.replace("primvars:st =", "primvars:map1 ="), files={"t.png": png(pixels)})
+    found = scene.materials[0].base_color_texture
+    assert scene.notes == []
+    assert (found.wrap_u, found.wrap_v) == ("clamp", "clamp")
+    assert found.image.pixels.tolist() == [[pixels[texel[0]][texel[1]]]]

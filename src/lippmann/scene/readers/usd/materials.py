@@ -35,7 +35,7 @@ class Surface:
     Attributes
     ----------
     uv_names:
-        Names of its texture coordinates in the order of their sets.
+        Names of its texture coordinates in the order of their sets; empty where any do.
     color, opacity:
         Values of meshes that lack the colour or display opacity that it reads; None where it reads none.
     color_name:
@@ -294,6 +294,8 @@ class SurfaceReader:
             self._uv_names.append(uv_name)
         wraps = [_WRAPS.get(str(node.get(key, {}).get("value", ""))) for key in ("wrapS", "wrapT")]
         uv_set = self._uv_names.index(uv_name)
+        if "value" in node.get("st", {}):
+            image, wraps = _texel(image, *_pair(node["st"], (0.0, 0.0))), ["clamp", "clamp"]
         if isinstance(image, TiledImage):
             self._tiled.append(Texture(image, srgb=False, uv_transform=transform, uv_set=uv_set))
             wraps, transform = [None, None], image.inside @ transform  # no tile, no colour: as in OpenUSD's Storm
@@ -314,6 +316,14 @@ class SurfaceReader:
         if space == "auto":
             return image.pixels.dtype == np.uint8 and image.pixels.shape[2] >= 3
         return space.lower() == "srgb"
+
+
+def _texel(image: Image, u: float, v: float) -> Image:
+    """The texel at coordinates that are the same everywhere, v upwards."""
+    height, width = image.pixels.shape[:2]
+    row = height - 1 - int(np.clip(v * height, 0, height - 1))
+    column = int(np.clip(u * width, 0, width - 1))
+    return Image(image.name, image.pixels[row : row + 1, column : column + 1])
 
 
 def _with_border(image: Image, columns: int, rows: int) -> Image:
@@ -373,6 +383,8 @@ def _coordinates(source: Record | None, depth: int = 0) -> tuple[str, Matrix]:
     """The primvar of a texture's coordinates, and the transformation on the way, for v downwards."""
     if source is None or depth > 8:
         return "st", np.eye(3)
+    if "value" in source:
+        return "", np.eye(3)
     if "primvar" in source:
         return str(source["primvar"] or "st"), np.eye(3)
     if "transform" not in source:

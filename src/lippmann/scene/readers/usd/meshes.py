@@ -187,7 +187,9 @@ class MeshReader:
         return [Part(record["material"], each) for each in drawn]
 
     def _note_no_uvs(self, record: Record, uv_name: str) -> None:
-        self.notes[f"mesh {record['name']} has no texture coordinates '{uv_name}': its textures show one texel"] = None
+        if uv_name:
+            note = f"mesh {record['name']} has no texture coordinates '{uv_name}': its textures show one texel"
+            self.notes[note] = None
 
     def _surface(self, material: int) -> Surface:
         return self._surfaces[material] if material >= 0 else _PLAIN
@@ -349,7 +351,7 @@ class MeshReader:
         uvs = []
         for uv_name in self._surface(material).uv_names:
             entry = record["uvs"].get(uv_name)
-            if entry is None and len(record["uvs"]) == 1:  # exporters name it otherwise in materials
+            if entry is None and uv_name and len(record["uvs"]) == 1:  # exporters name it otherwise in materials
                 ((only, entry),) = record["uvs"].items()
                 self.notes[
                     f"mesh {name} has no texture coordinates '{uv_name}': its only ones, '{only}', are taken"

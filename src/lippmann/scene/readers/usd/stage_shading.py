@@ -103,6 +103,9 @@ class MaterialTable:
             return own
         node_kind = node_kind.removeprefix("ND_")
         if node_kind.startswith("UsdUVTexture"):
+            st = node.GetInput("st")
+            if not (st and st.HasConnectedSource()):  # the schema's own coordinates, of one texel
+                given.setdefault("st", {"value": [0.0, 0.0]})
             return {"texture": given, "channel": name}
         if node_kind.startswith("UsdTransform2d"):
             return {"transform": given}
