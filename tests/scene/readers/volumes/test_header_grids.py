@@ -1,5 +1,6 @@
 """NRRD and MetaImage files as volumes."""
 
+import bz2
 import gzip
 import zlib
 
@@ -32,10 +33,13 @@ def volume_of(path):
 
 @pytest.mark.parametrize("axes", [LPS, RAS])
 @pytest.mark.parametrize(("kind", "endian", "dtype"), [("short", "little", "<i2"), ("long long int", "big", ">i8")])
-@pytest.mark.parametrize(("encoding", "pack"), [("raw", bytes), ("gzip", gzip.compress)])
+@pytest.mark.parametrize(
+    ("encoding", "pack"), [("raw", bytes), ("gzip", gzip.compress), ("bzip2", bz2.compress), ("ascii", None)]
+)
 def test_nrrd_lies_as_its_directions_say(tmp_path, axes, kind, endian, dtype, encoding, pack):
     header = NRRD.format(kind=kind, endian=endian, encoding=encoding, more="", **axes)
-    (tmp_path / "a.nrrd").write_bytes(header.encode() + pack(GRID.astype(dtype).tobytes()))
+    text = " ".join(map(str, GRID.ravel().tolist())).encode()
+    (tmp_path / "a.nrrd").write_bytes(header.encode() + (pack(GRID.astype(dtype).tobytes()) if pack else text))
     volume = volume_of(tmp_path / "a.nrrd")
     assert (volume.grid == GRID).all()
     assert volume.world_from_voxel == pytest.approx(np.array(PLACES))
@@ -105,7 +109,8 @@ def test_rows_of_a_metaimage_s_matrix_are_directions(tmp_path):
     ("change", "said"),
     [
         (("short", "block"), "has a header without sense"),
-        (("encoding: raw", "encoding: bzip2"), "encoding bzip2; raw and gzip are read"),
+        (("encoding: raw", "encoding: hex"), "encoding hex; raw, text, gzip and bzip2 are read"),
+        (("encoding: raw", "encoding: ascii"), "holds voxels that are no numbers"),
         (("sizes: 2 3 4", "sizes: 3 2 2 2"), "one number a voxel on three axes"),
         (
             (

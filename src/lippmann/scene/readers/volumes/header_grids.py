@@ -6,6 +6,7 @@ Sources: "Definition of NRRD File Format" (teem.sourceforge.net), ITK's "MetaIO"
 
 from __future__ import annotations
 
+import bz2
 import math
 import re
 import zlib
@@ -40,6 +41,15 @@ _TYPES = {
     "float": "f4",
     "double": "f8",
 }
+#: NRRD's encodings by their names; text is numbers, and blanks or commas between them.
+_ENCODINGS = {
+    "raw": "raw",
+    **dict.fromkeys(("gzip", "gz"), "zlib"),
+    **dict.fromkeys(("bzip2", "bz2"), "bzip2"),
+    **dict.fromkeys(("ascii", "text", "txt"), "text"),
+}
+#: Bytes that a byte of text takes while its numbers are read.
+_BYTES_PER_BYTE = 32
 #: Without a word on how a patient lies: slice 0 in front, row 0 on top.
 _WORLD_FROM_SLICES = np.diag([1.0, -1.0, -1.0, 1.0])
 #: Kinds of axes along which places, and not the numbers of one voxel, lie.
@@ -51,7 +61,8 @@ _LINE = re.compile(r"\s*([^:=#]+?)\s*[:=]\s*(.*?)\s*")
 class _Grid:
     """Voxels of ``dtype``, ``sizes`` along each axis (the fastest first), in ``file`` (None: behind the header).
 
-    ``lines`` and then ``skip`` bytes stand before them, the bytes within what is packed; -1: they end the file.
+    ``encoding`` is a value of :data:`_ENCODINGS`. ``lines`` and then ``skip`` bytes stand before the voxels, the bytes
+    within what is packed; -1: the voxels end the file.
     """
 
     sizes: list[int]
@@ -59,13 +70,13 @@ class _Grid:
     matrix: NDArray[np.float64]
     file: str | None
     skip: int
-    is_packed: bool
+    encoding: str
     notes: list[str]
     lines: int = 0
 
 
 def read_header_grid(path: Path, *, files: NamedFiles) -> SceneDescription:
-    """Read a volume of one number a voxel, raw or packed by zlib. World units are millimetres.
+    """Read a volume of one number a voxel: raw, as text, or packed by zlib or bzip2. World units are millimetres.
 
     A patient is seen from the front, head up.
 
@@ -102,11 +113,19 @@ def read_header_grid(path: Path, *, files: NamedFiles) -> SceneDescription:
         if (start := data.find(b"\n", start) + 1) == 0:
             raise SceneError(f"has no {grid.lines} lines before its voxels", where=where, fix="is it whole?")
     skip = max(grid.skip, 0)
-    if grid.is_packed:
-        check_input(skip + size, f"{skip} bytes before the voxels", where=where)
+    if grid.encoding == "text":
+        check_input(_BYTES_PER_BYTE * len(data), "voxels as text", where=where)
         try:
-            body = zlib.decompressobj(47).decompress(data[start:], skip + size)[skip:]  # of zlib or gzip
-        except zlib.error as error:
+            words = data[start + skip :].replace(b",", b" ").split()
+            body = np.array(words[: math.prod(shape)], np.float64).astype(grid.dtype).tobytes()
+        except ValueError as error:
+            raise SceneError(f"holds voxels that are no numbers ({error})", where=where, fix="is it whole?") from None
+    elif grid.encoding != "raw":
+        check_input(skip + size, f"{skip} bytes before the voxels", where=where)
+        unpacker = bz2.BZ2Decompressor() if grid.encoding == "bzip2" else zlib.decompressobj(47)  # of zlib or gzip
+        try:
+            body = unpacker.decompress(data[start:], skip + size)[skip:]
+        except (zlib.error, OSError) as error:
             raise SceneError(f"cannot be unpacked ({error})", where=where, fix="is it whole?") from None
     else:
         body = data[-size:] if grid.skip < 0 else data[start + skip : start + skip + size]
@@ -131,8 +150,8 @@ def _numbers(text: str) -> NDArray[np.float64]:
 
 def _nrrd(entries: Mapping[str, str]) -> _Grid:
     encoding = entries["encoding"].lower()
-    if encoding not in ("raw", "gzip", "gz"):
-        raise ValueError(f"encoding {encoding}; raw and gzip are read")
+    if encoding not in _ENCODINGS:
+        raise ValueError(f"encoding {encoding}; raw, text, gzip and bzip2 are read")
     order = ">" if entries.get("endian", "little").lower() == "big" else "<"
     dtype = np.dtype(order + _TYPES[entries["type"].lower().removeprefix("signed ")])
     sizes = [int(word) for word in entries["sizes"].split()]
@@ -157,7 +176,7 @@ def _nrrd(entries: Mapping[str, str]) -> _Grid:
         matrix = _matrix(np.diag(spacings[np.isfinite(spacings)][:3]), np.zeros(3))
     file = entries.get("data file", entries.get("datafile"))
     skip, lines = (int(entries.get(f"{unit} skip", 0)) for unit in ("byte", "line"))
-    return _Grid(sizes, dtype, world @ matrix, file, skip, encoding != "raw", notes, lines)
+    return _Grid(sizes, dtype, world @ matrix, file, skip, _ENCODINGS[encoding], notes, lines)
 
 
 def _metaimage(entries: Mapping[str, str]) -> _Grid:
@@ -170,7 +189,9 @@ def _metaimage(entries: Mapping[str, str]) -> _Grid:
     if (channels := int(entries.get("elementnumberofchannels", 1))) > 1:
         sizes = [channels, *sizes]
     if entries.get("binarydata", "true").lower() in ("false", "0"):
-        raise ValueError("voxels as text; binary ones are read")
+        encoding = "text"
+    else:
+        encoding = "zlib" if says("compresseddata") else "raw"
     axes = min(int(entries["ndims"]), 3)
     names = ("transformmatrix", "orientation", "rotation")
     turn = next((_numbers(entries[name]) for name in names if name in entries), np.eye(int(entries["ndims"])).ravel())
@@ -183,4 +204,4 @@ def _metaimage(entries: Mapping[str, str]) -> _Grid:
     file = entries["elementdatafile"]
     matrix = WORLD_FROM_LPS @ _matrix(steps, np.zeros(axes) if origin is None else origin)
     skip = int(entries.get("headersize", 0))
-    return _Grid(sizes, dtype, matrix, None if file == "LOCAL" else file, skip, says("compresseddata"), [])
+    return _Grid(sizes, dtype, matrix, None if file == "LOCAL" else file, skip, encoding, [])
