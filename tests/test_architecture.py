@@ -312,6 +312,7 @@ def test_only_the_modules_that_render_use_the_engine():
 HEAVY: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "scene.readers.blend": (("bpy", "mathutils"), ()),
     "scene.readers.heif": (("pillow_heif",), ("scene.readers.depth_photo", "quilts.photos")),
+    "scene.readers.lidar": (("laspy", "lazrs"), ()),
     "scene.readers.molecules": (("gemmi",), ()),
     "scene.readers.usd": (("pxr",), ()),
     "scene.readers.volumes": (("nibabel", "pydicom", "openvdb", "pyopenvdb"), ()),

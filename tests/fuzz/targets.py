@@ -571,6 +571,7 @@ _READERS: dict[str, Target] = {
     "spz": Target(_spz),
     "splat": Target(_scene("s.splat")),
     "pcd": Target(_scene("s.pcd")),
+    "las": Target(_with("laspy", _scene("s.laz"))),
     "sog": Target(_sog, tree=part_tree(b"meta.json")),
     "stl": Target(_scene("s.stl")),
     "off": Target(_scene("s.off")),

@@ -72,3 +72,11 @@ def test_what_is_no_cloud(tmp_path, text, line):
     with pytest.raises(SceneError, match=r"^a\.asc: is no cloud of points") as caught:
         read_text_cloud(path)
     assert line in str(caught.value)
+
+
+def test_land_is_shown_from_above(tmp_path):
+    (tmp_path / "a.xyz").write_text("0 0 0\n90 0 1\n90 50 2\n0 50 9\n")
+    scene = load_scene(tmp_path / "a.xyz")
+    assert "land is shown from above, as a map with +y on top (else up=z)" in scene.notes
+    assert (scene.description.instances[0].world_from_mesh == np.eye(4)).all()
+    assert (load_scene(tmp_path / "a.xyz", up="z").description.instances[0].world_from_mesh != np.eye(4)).any()

@@ -68,6 +68,9 @@ _STEP = "export it as STEP, open that in FreeCAD, then File > Export > glTF (.gl
 _LYTRO = "decode it by LFToolbox or PlenoptiCam; views become a picture by 'lippmann weave', .mat by 'lippmann import'"
 _OPEN_BABEL = "save it as .pdb or .cif, in Avogadro or by: obabel in{0} -O out.pdb"
 
+#: Height over length below which a scan is one of land.
+_FLAT = 1 / 8
+
 #: Files of other programs, and how one that is read is made of them.
 _ELSEWHERE = {
     **dict.fromkeys((".fbx", ".abc"), _BLENDER),
@@ -112,7 +115,7 @@ _ELSEWHERE = {
     **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar"), "unpack it, and name the scene file inside"),
     ".zae": "unzip it, and convert the .dae by Assimp: assimp export in.dae out.glb",
     **dict.fromkeys((".ksplat", ".lcc"), "open it in SuperSplat (superspl.at/editor), export it as .ply"),
-    **dict.fromkeys((".las", ".laz", ".e57", ".ptx", ".xyzrgb"), _CLOUD_COMPARE),
+    **dict.fromkeys((".e57", ".ptx", ".xyzrgb"), _CLOUD_COMPARE),
     ".txt": "save clouds of points as .ply, in CloudCompare for instance, COLMAP's by its model_converter",
     **dict.fromkeys((".mrc", ".map", ".ccp4"), "save it as .npy: numpy.save('a.npy', mrcfile.read('a.mrc'))"),
     **{kind: _OPEN_BABEL.format(kind) for kind in (".cube", ".gro", ".mae", ".pqr")},
@@ -428,8 +431,12 @@ def _upright(description: SceneDescription, suffix: str, reader: Reader, up: Up 
     usual: Up = "-y" if splats is not None and suffix == ".ply" else reader.up
     is_guessed = up is None and description.up is None
     notes = [*description.notes]
-    if is_guessed and usual == "z":
-        who = "3D printing" if suffix in (".stl", ".3mf") else "surveying"
+    is_printed = suffix in (".stl", ".3mf")
+    if is_guessed and usual == "z" and not is_printed and _is_land(description):
+        usual = "y"
+        notes.append("land is shown from above, as a map with +y on top (else up=z)")
+    elif is_guessed and usual == "z":
+        who = "3D printing" if is_printed else "surveying"
         notes.append(f"up is taken as +z, as {who} has it, for nothing in {suffix} files says it (else up=y)")
     if is_guessed and usual == "-y":
         notes.append("up is taken as -y, as trainers of splats have it, for nothing in the file says it (else up=y)")
@@ -450,6 +457,12 @@ def _upright(description: SceneDescription, suffix: str, reader: Reader, up: Up 
     splats = None if splats is None else move(splats, matrix)
     volume = None if description.volume is None else move_volume(description.volume, matrix)
     return replace(description, instances=instances, splats=splats, volume=volume, notes=notes)
+
+
+def _is_land(description: SceneDescription) -> bool:
+    """Whether a scan with z up is so flat that it is a strip from the side; storeys of buildings are less flat."""
+    extents = np.ptp(np.concatenate([each.positions for each in description.meshes if each.fitted]), axis=0)
+    return bool(extents[2] < _FLAT * extents.max())
 
 
 def _turn_up(direction: Direction) -> Matrix:

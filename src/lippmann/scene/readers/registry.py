@@ -169,6 +169,7 @@ _OWN = {
     "pcd": Reader((".pcd",), f"{_HERE}.pcd:read_pcd", {b"# .PCD": ".pcd"}, up="y"),
     "text-cloud": Reader((".pts", ".asc"), f"{_HERE}.text_cloud:read_text_cloud", up="z"),
     "xyz": Reader((".xyz",), f"{_HERE}.text_cloud:read_xyz", up="z"),
+    "las": Reader((".las", ".laz"), f"{_HERE}.lidar.reader:read_las", {b"LASF": ".las"}, up="z"),
     "off": Reader((".off",), f"{_HERE}.off:read_off", up="y"),
     "sog": Reader((".sog",), f"{_HERE}.splats.sog:read_sog", options=("files",), up="-y"),
     "spz": Reader((".spz",), f"{_HERE}.splats.spz:read_spz", up="y"),
