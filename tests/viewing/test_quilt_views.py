@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from lippmann.display import Display, LensArray, Panel
+from lippmann.display.sheet_layout import with_margin
 from lippmann.errors import PictureError, UsageError
 from lippmann.quilts.quilt import Quilt, QuiltLayout
 from lippmann.viewing.quilt_views import quilt_display, refocus_quilt, replay_quilt
@@ -73,6 +74,14 @@ def test_an_eye_nearer_than_the_cameras_sees_the_plane_in_perspective():
     seen = replay_quilt(drawn(z), display(), eye, size=(240, 9))[4, :, 0]
     expected = stripes(x + (eye[0] - x) * z / eye[2])
     assert np.abs(seen - expected)[20:-20].max() < 0.06
+
+
+def test_a_view_shows_the_trim_of_a_sheet_as_in_a_weave():
+    sheet = with_margin(display(), 60)
+    eye = (20.0, 0.0, 300.0)
+    whole = replay_quilt(drawn(6.0), sheet, eye, size=(60, 48))
+    trim = replay_quilt(drawn(6.0), display(), eye, size=(48, 36))
+    np.testing.assert_allclose(whole[6:-6, 6:-6], trim, atol=1e-5)
 
 
 @pytest.mark.parametrize(("z", "slant"), [(-15.0, 0.0), (10.0, 0.0), (-15.0, 25.0)])

@@ -322,7 +322,8 @@ def _samples_of_window(
 def _samples_at(quilt: Quilt, display: Display, choice: ViewChoice, channel: int, u: Real, v: Real) -> _Samples:
     x, y = display.subpixel_point(u, v, channel, NUMPY)
     number, share = _views(view_fraction(display, x, y), quilt.layout.views, choice)
-    return _Samples(number, share, *_position_in_view(quilt, display, x, y))
+    lens_x, lens_y = display.lens_center(*display.lens_of(x, y), x, y)
+    return _Samples(number, share, *position_in_view(quilt, display, lens_x, lens_y))
 
 
 def view_fraction(display: Display, x: Real, y: Real) -> Real:
@@ -378,12 +379,10 @@ def _views(fraction: Real, count: int, choice: ViewChoice) -> tuple[NDArray[np.i
     return number, position - number
 
 
-def _position_in_view(quilt: Quilt, display: Display, x: Real, y: Real) -> tuple[Real, Real]:
-    """Pixel coordinates in a view, 0 at the centre of its first pixel, of the points that panel points show."""
-    lens = display.lens_of(x, y, NUMPY)
-    lens_x, lens_y = display.lens_center(*lens, x, y, NUMPY)
+def position_in_view(quilt: Quilt, display: Display, x: Real, y: Real) -> tuple[Real, Real]:
+    """Pixel coordinates in a view, 0 at the centre of its first pixel, of points of the lens plane (mm)."""
     width, height = quilt.view_size
     trim, pixel = trim_of(display), display.panel.pixel_pitch
-    across = (lens_x / (trim.width * pixel) + 0.5) * width - 0.5
-    down = (0.5 - lens_y / (trim.height * pixel)) * height - 0.5
+    across = (x / (trim.width * pixel) + 0.5) * width - 0.5
+    down = (0.5 - y / (trim.height * pixel)) * height - 0.5
     return np.clip(across, 0.0, width - 1.0), np.clip(down, 0.0, height - 1.0)

@@ -18,6 +18,7 @@ from lippmann.display.view_cone import cone_tangent
 from lippmann.errors import PictureError
 from lippmann.image.stored_values import FloatArray
 from lippmann.quilts.quilt import Quilt
+from lippmann.quilts.weave import position_in_view
 from lippmann.viewing.refocus import check_planes
 from lippmann.viewing.replay import FAR, Eye, Real, check_size, eye_before, lens_plane_points
 
@@ -83,8 +84,9 @@ def replay_quilt(
         position = np.clip((0.5 - place) * count - 0.5, 0.0, count - 1.0)
         first = np.floor(position if linear else position + 0.5).astype(np.intp)
         share = (position - first if linear else np.zeros_like(position))[..., None]
-        near_view = _sample(views, first, x, y, display)
-        following = _sample(views, np.minimum(first + 1, count - 1), x, y, display)
+        at = position_in_view(quilt, display, x, y)
+        near_view = _sample(views, first, *at)
+        following = _sample(views, np.minimum(first + 1, count - 1), *at)
         picture[rows] = near_view + (following - near_view) * share.astype(np.float32)
     return picture
 
@@ -128,19 +130,16 @@ def _refocus(quilt: Quilt, display: Display, plane: float, width: int, height: i
         for rows, x, y in lens_plane_points(display, width, height):
             lens_x, lens_y = x + (x - camera) * stretch, y + y * stretch
             inside = (np.abs(lens_x) <= half[0]) & (np.abs(lens_y) <= half[1])
-            colors = _sample(view, np.zeros(x.shape, dtype=np.intp), lens_x, lens_y, display)
+            colors = _sample(view, np.zeros(x.shape, dtype=np.intp), *position_in_view(quilt, display, lens_x, lens_y))
             picture[rows] += colors * inside[..., None]
             count[rows] += inside
     picture /= np.maximum(count, 1)[..., None]
     return picture
 
 
-def _sample(views: FloatArray, number: NDArray[np.intp], x: Real, y: Real, display: Display) -> FloatArray:
-    """Bilinear samples ``(..., 3)`` of ``views`` ``(views, rows, columns, 3)`` at points of the lens plane, mm."""
+def _sample(views: FloatArray, number: NDArray[np.intp], across: Real, down: Real) -> FloatArray:
+    """Bilinear samples ``(..., 3)`` of ``views`` ``(views, rows, columns, 3)`` at :func:`position_in_view`."""
     rows, columns = views.shape[1:3]
-    width, height = display.size_mm
-    across = np.clip((x / width + 0.5) * columns - 0.5, 0.0, columns - 1.0)
-    down = np.clip((0.5 - y / height) * rows - 0.5, 0.0, rows - 1.0)
     left, top = across.astype(np.intp), down.astype(np.intp)
     right, bottom = np.minimum(left + 1, columns - 1), np.minimum(top + 1, rows - 1)
     part_x, part_y = (part.astype(np.float32)[..., None] for part in (across - left, down - top))
