@@ -288,6 +288,26 @@ def mixed():
     save("mixed.blend")
 
 
+def posed():
+    """A cube on a bone that is turned by a quarter, away from the bone's rest."""
+    scene = fresh()
+    rig = put(scene, "Rig", bpy.data.armatures.new("rig"))
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    bone = rig.data.edit_bones.new("bone")
+    bone.head, bone.tail = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    rig.pose.bones["bone"].rotation_mode = "XYZ"
+    rig.pose.bones["bone"].rotation_euler = (1.5707963, 0.0, 0.0)
+    mesh = cube()
+    for vertex in mesh.vertices:
+        vertex.co.z += 3.0
+    item = put(scene, "Cube", mesh, parent=rig)
+    item.vertex_groups.new(name="bone").add(range(8), 1.0, "REPLACE")
+    item.modifiers.new("rig", "ARMATURE").object = rig
+    save("posed.blend")
+
+
 def lights():
     scene = fresh()
     put(scene, "Cube", cube())
@@ -391,6 +411,7 @@ for make in (
     pictures,
     surfaces,
     mixed,
+    posed,
     lights,
     shifted,
     otherwise,

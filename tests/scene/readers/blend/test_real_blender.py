@@ -221,6 +221,14 @@ def test_nodes_between_a_picture_and_a_surface(read_real):
     assert scene.notes == ("material 'lost': its picture 'lost' is not found and left out", mean)
 
 
+def test_a_still_shows_the_pose_of_an_armature(read_real):
+    scene = read_real("posed.blend")
+    (place,) = scene.placements[0]
+    middle = (scene.meshes[0].positions @ place[:3, :3].T + place[:3, 3]).mean(axis=0)
+    # Three units up at rest; turned about x, towards Blender's -y.
+    assert middle == pytest.approx([0.0, 0.0, 3.0], abs=1e-4)
+
+
 def test_lights_with_a_temperature_or_the_strength_of_their_surface(read_real):
     scene = read_real("lights.blend")
     warm, sized = lamp(scene, "warm"), lamp(scene, "sized")

@@ -121,6 +121,8 @@ def _options(*, is_animated: bool) -> dict[str, Any]:
         "use_active_scene": True,
         "use_renderable": True,
         "export_animations": is_animated,
+        # Without animation the exporter has bones at rest: a still shows meshes as armatures bend them.
+        "export_skins": is_animated,
     }
     if is_animated:
         # All objects together, over the frames of the scene, from time 0.
