@@ -16,6 +16,7 @@ NUDGE, JUMP = 1e-4, 1e-2
 
 def camera_rays(world_from_display, distance, viewpoint, points):
     """Rays of the Mitsuba camera at one viewpoint through ``points`` ``(n, 2)`` of the lens plane."""
+    import drjit as dr
     import mitsuba as mi
 
     def in_world(point):
@@ -49,6 +50,7 @@ def camera_rays(world_from_display, distance, viewpoint, points):
     film = 0.5 + 0.5 * picture / half * [1.0, -1.0]
     position = mi.Point2f(film[:, 0].astype(np.float32), film[:, 1].astype(np.float32))
     ray, _ = sensor.sample_ray(0.0, 0.5, position, mi.Point2f(0.5, 0.5))
+    dr.eval(ray.o, ray.d)  # by one kernel, not one for each
     return tuple(np.broadcast_to(np.array(vector).T, (len(points), 3)) for vector in (ray.o, ray.d))
 
 
@@ -95,7 +97,9 @@ def intersect(built, origin, direction):
     si = scene.ray_intersect(ray)
     hit = si.is_valid()
     light = dr.select(hit, si.emitter(scene).eval(si), 0)
-    return (np.array(hit), *(np.array(value).T for value in (dr.select(hit, si.p, 0), si.sh_frame.n, light)))
+    values = dr.select(hit, si.p, 0), si.sh_frame.n, light
+    dr.eval(hit, values)
+    return (np.array(hit), *(np.array(value).T for value in values))
 
 
 def in_display(world_from_display, position, normal):

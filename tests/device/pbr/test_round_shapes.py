@@ -44,12 +44,16 @@ def shapes_of(description):
 
 def hits(description, origin, direction):
     """Distance and normal of the first hit of each ray; distance infinite where there is none."""
+    import drjit as dr
     import mitsuba as mi
 
     scene = build_description(description).mitsuba
     ray = mi.Ray3f(mi.Point3f(*origin.T.astype(np.float32)), mi.Vector3f(*direction.T.astype(np.float32)))
     si = scene.ray_intersect(ray)
-    return np.where(si.is_valid(), np.array(si.t), np.inf), np.array(si.sh_frame.n).T
+    found = si.is_valid(), si.t, si.sh_frame.n
+    dr.eval(found)  # by one kernel, not one for each
+    valid, t, normal = map(np.array, found)
+    return np.where(valid, t, np.inf), normal.T
 
 
 def placed(linear, offset):
