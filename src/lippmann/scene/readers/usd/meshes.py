@@ -368,7 +368,9 @@ class MeshReader:
             colors = np.broadcast_to(colors, (len(polygons.indices), colors.shape[1]))
         if not self._varies_at_points(record, material):
             triangles = _first_corners(polygons)[triangles]
-        corners = np.unique(triangles)
+        shown = np.zeros(len(polygons.indices), bool)
+        shown[triangles] = True
+        corners = np.flatnonzero(shown)
         places = np.zeros(len(polygons.indices), np.uint32)
         places[corners] = np.arange(len(corners), dtype=np.uint32)
         positions = polygons.points[polygons.indices[corners]].astype(np.float32)
@@ -454,8 +456,9 @@ class _Sampler:
 def _first_corners(polygons: _Polygons) -> Integers:
     """The first corner ``(c,)`` with the same point and normal, for each corner."""
     groups = polygons.indices if polygons.corner_groups is None else polygons.corner_groups
-    _, first, group = np.unique(groups, return_index=True, return_inverse=True)
-    return np.asarray(first[group], np.int64)
+    first = np.zeros(int(groups.max(initial=0)) + 1, np.int64)
+    first[groups[::-1]] = np.arange(len(groups))[::-1]
+    return first[groups]
 
 
 def _smooth_normals(polygons: _Polygons, left_handed: bool) -> FloatArray:
