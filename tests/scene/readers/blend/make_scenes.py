@@ -289,7 +289,7 @@ def mixed():
 
 
 def posed():
-    """A cube on a bone that is turned by a quarter, away from the bone's rest."""
+    """A cube on a bone that is turned by a quarter at the present frame, and at rest at the first one."""
     scene = fresh()
     rig = put(scene, "Rig", bpy.data.armatures.new("rig"))
     bpy.context.view_layer.objects.active = rig
@@ -298,7 +298,10 @@ def posed():
     bone.head, bone.tail = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
     bpy.ops.object.mode_set(mode="OBJECT")
     rig.pose.bones["bone"].rotation_mode = "XYZ"
+    rig.pose.bones["bone"].keyframe_insert("rotation_euler", frame=1)
     rig.pose.bones["bone"].rotation_euler = (1.5707963, 0.0, 0.0)
+    rig.pose.bones["bone"].keyframe_insert("rotation_euler", frame=5)
+    scene.frame_set(5)
     mesh = cube()
     for vertex in mesh.vertices:
         vertex.co.z += 3.0

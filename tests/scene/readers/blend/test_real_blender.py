@@ -221,7 +221,7 @@ def test_nodes_between_a_picture_and_a_surface(read_real):
     assert scene.notes == ("material 'lost': its picture 'lost' is not found and left out", mean)
 
 
-def test_a_still_shows_the_pose_of_an_armature(read_real):
+def test_a_still_shows_the_pose_of_an_armature_at_the_present_frame(read_real):
     scene = read_real("posed.blend")
     (place,) = scene.placements[0]
     middle = (scene.meshes[0].positions @ place[:3, :3].T + place[:3, 3]).mean(axis=0)

@@ -123,6 +123,8 @@ def _options(*, is_animated: bool) -> dict[str, Any]:
         "export_animations": is_animated,
         # Without animation the exporter has bones at rest: a still shows meshes as armatures bend them.
         "export_skins": is_animated,
+        # Else the exporter goes to frame 0.
+        "export_current_frame": not is_animated,
     }
     if is_animated:
         # All objects together, over the frames of the scene, from time 0.
