@@ -163,9 +163,8 @@ def centers_of_lenses(display: Display, rows: Indices, columns: Indices) -> tupl
         u, v = display.pixel_coordinates(x * display.magnification, y * display.magnification)
         return u, v, (row * grid.columns + i).astype(np.int32)
     _, y = display.panel_point(0.0 * row, row + 0.5)
-    slant = math.radians(lattice.slant)
-    across = (lattice.origin_x + i * lattice.pitch) * display.magnification
-    u, v = display.pixel_coordinates(across / math.cos(slant) + y * math.tan(slant), y)
+    scale = display.magnification
+    u, v = display.pixel_coordinates(lattice.axis_at(i, y / scale) * scale, y)
     return u, v, i.astype(np.int32)
 
 
