@@ -42,16 +42,15 @@ def server():
 
 def ask(server, path="/", method="GET", headers=None, body=None):
     """Status, headers and body of one request, sent just as it is said."""
-    with closing(http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)) as connection:
-        connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
-        named = {"Host": f"127.0.0.1:{server.port}", **(headers or {})}
-        for name, value in named.items():
-            if value is not None:
-                connection.putheader(name, value)
-        if body is not None and "Content-Length" not in named:
-            connection.putheader("Content-Length", str(len(body)))
-        connection.endheaders(body)
-        answer = connection.getresponse()
+    named = {"Host": f"127.0.0.1:{server.port}", **(headers or {})}
+    if body is not None:
+        named.setdefault("Content-Length", str(len(body)))
+    lines = [f"{method} {path} HTTP/1.1", *(f"{name}: {value}" for name, value in named.items() if value is not None)]
+    with socket.create_connection(("127.0.0.1", server.port), timeout=10) as connection:
+        # At once: a body that comes after a refusal would reset the connection, and the answer might be lost.
+        connection.sendall("\r\n".join([*lines, "", ""]).encode("latin-1") + (body or b""))
+        answer = http.client.HTTPResponse(connection, method=method)
+        answer.begin()
         return answer.status, answer.headers, answer.read()
 
 
