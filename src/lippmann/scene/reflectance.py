@@ -52,11 +52,13 @@ def emitted_luminance(scene: SceneDescription) -> float:
 
 def _placed_area(mesh: Mesh, places: NDArray[np.float64]) -> float:
     """The area of all of a mesh's copies, as if they were scaled evenly."""
-    return _area(mesh) * float((np.abs(np.linalg.det(places[:, :3, :3])) ** (2.0 / 3.0)).sum())
+    area = surface_area(mesh.positions, mesh.faces)
+    return area * float((np.abs(np.linalg.det(places[:, :3, :3])) ** (2.0 / 3.0)).sum())
 
 
-def _area(mesh: Mesh) -> float:
-    corners = np.asarray(mesh.positions, np.float64)[mesh.faces]
+def surface_area(positions: NDArray[np.floating], faces: NDArray[np.integer]) -> float:
+    """The area of triangles ``faces`` ``(m, 3)`` of ``positions`` ``(n, 3)``."""
+    corners = np.asarray(positions, np.float64)[faces]
     sides = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     return float(np.linalg.norm(np.cross(*sides), axis=-1).sum() / 2.0)
 

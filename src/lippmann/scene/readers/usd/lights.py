@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from lippmann.scene.readers.gltf.nodes import rigid
 from lippmann.scene.readers.usd.assets import Assets
 from lippmann.scene.readers.usd.records import Record
+from lippmann.scene.reflectance import surface_area
 from lippmann.scene.values.description import Camera, Color, Environment, Light, Material, Matrix, Mesh, Texture
 
 _AROUND = 64
@@ -138,7 +139,7 @@ class LightReader:
         """
         light = record["light"]
         for world in worlds:
-            area = sum(_area(mesh.positions, mesh.faces, world) for mesh, _ in parts)
+            area = sum(surface_area(mesh.positions @ world[:3, :3].T, mesh.faces) for mesh, _ in parts)
             color = _times(light, 1.0 / area if light["normalize"] and area > 0.0 else 1.0)
             for mesh, material in parts:
                 glow, texture = color, None
@@ -236,15 +237,8 @@ def _mesh(
     world: Matrix,
     uvs: NDArray[np.float32] | None = None,
 ) -> tuple[Mesh | None, float]:
-    area = _area(points, faces, world)
+    area = surface_area(points @ world[:3, :3].T, faces)
     if not np.isfinite(area) or area <= 0.0:
         return None, 0.0
     sets = () if uvs is None else (uvs,)
     return Mesh(name, points.astype(np.float32), faces.astype(np.uint32), 0, uvs=sets), area
-
-
-def _area(points: NDArray[np.floating], faces: NDArray[np.integer], world: Matrix) -> float:
-    """The area of triangles in the world."""
-    placed = (points @ world[:3, :3].T)[faces]
-    sides = np.cross(placed[:, 1] - placed[:, 0], placed[:, 2] - placed[:, 0])
-    return float(np.linalg.norm(sides, axis=1).sum() / 2)

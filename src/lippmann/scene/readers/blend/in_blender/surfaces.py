@@ -187,7 +187,7 @@ class _Rewrite:
 
     def give(self, entry: Any, value: Any) -> None:
         """Set an input, or link it."""
-        if hasattr(value, "is_output"):
+        if _is_output(value):
             self.tree.links.new(value, entry)
         elif entry.type == "RGBA":
             entry.default_value = (*_as_color(value), 1.0)
@@ -218,7 +218,7 @@ class _Rewrite:
             return values
         if kind == "BSDF_TRANSPARENT":
             color = values["Color"]
-            if not hasattr(color, "is_output") and max(color) - min(color) > 0.1:
+            if not _is_output(color) and max(color) - min(color) > 0.1:
                 self.remark(f"node '{node.name}': its colour is left out")
             return {"Alpha": self._blend(color, 1.0, 0.0, "VALUE")}
         if kind in ("EMISSION", "BACKGROUND"):
@@ -234,7 +234,7 @@ class _Rewrite:
         return {**own, "Base Color": values.get("Color", values.get("Base Color")), **_SURFACES[kind]}
 
     def _mix(self, node: Any, factor: Any, one: Surface, other: Surface) -> Surface:
-        if not hasattr(factor, "is_output") and factor in (0.0, 1.0):
+        if not _is_output(factor) and factor in (0.0, 1.0):
             return other if factor else one
         for clear, solid, share in ((one, other, factor), (other, one, self._blend(factor, 1.0, 0.0, "VALUE"))):
             if "Base Color" not in clear:
@@ -257,7 +257,7 @@ class _Rewrite:
         first, second = _emission(one), _emission(other)
         if first is None and second is None:
             return {**mixed, "Emission Strength": 0.0}
-        if (first is None or second is None) and not hasattr(factor, "is_output"):
+        if (first is None or second is None) and not _is_output(factor):
             (color, strength), share = (first, 1.0 - factor) if first else (second or _DARK, factor)
             return {**mixed, "Emission Color": color, "Emission Strength": self._product(strength, share, "VALUE")}
         colors = [self._product(color, strength, "RGBA") for color, strength in (first or _DARK, second or _DARK)]
@@ -284,7 +284,7 @@ class _Rewrite:
 
     def _fresnel_index(self, factor: Any) -> float | None:
         """Index of refraction of a surface that reflects this share; None if it is not one."""
-        if not hasattr(factor, "is_output"):
+        if not _is_output(factor):
             return _index(factor) if 0.0 < factor <= 0.5 else None
         for node in reach(factor).nodes:
             if node.type == "FRESNEL":
@@ -295,7 +295,7 @@ class _Rewrite:
 
     def _fold(self, value: Any) -> Any:
         """A factor, as a number from 0 to 1 where it is one."""
-        if hasattr(value, "is_output"):
+        if _is_output(value):
             if not reach(value).is_constant:
                 return value
             value = _as_number(self._studio.mean(self, value))
@@ -325,11 +325,11 @@ class _Rewrite:
         """``one`` to ``other``, by a factor from 0 to 1; of three colours or of numbers."""
         if one is None or other is None or one == other:
             return other if one is None else one
-        if not hasattr(factor, "is_output"):
+        if not _is_output(factor):
             share = _as_number(factor)
             if share in (0.0, 1.0):
                 return other if share else one
-            if not hasattr(one, "is_output") and not hasattr(other, "is_output"):
+            if not _is_output(one) and not _is_output(other):
                 if not isinstance(one, tuple):
                     return one + share * (other - one)
                 return tuple(a + share * (b - a) for a, b in zip(one, other, strict=True))
@@ -337,10 +337,10 @@ class _Rewrite:
 
     def _product(self, one: Any, other: Any, kind: str) -> Any:
         for value, rest in ((one, other), (other, one)):
-            if not hasattr(value, "is_output"):
+            if not _is_output(value):
                 if value in (1.0, _WHITE):
                     return rest
-                if not hasattr(rest, "is_output"):
+                if not _is_output(rest):
                     pair = zip(_as_color(value), _as_color(rest), strict=True)
                     product = tuple(a * b for a, b in pair)
                     return product if kind == "RGBA" else product[0]
@@ -413,6 +413,11 @@ def _constant(value: Any, kind: str) -> Any:
     if kind == "VALUE":
         return _as_number(value)
     return _as_color(value) if kind == "RGBA" else value
+
+
+def _is_output(value: Any) -> bool:
+    """Whether a value is an output of a node, and no constant."""
+    return hasattr(value, "is_output")
 
 
 def _as_color(value: Any) -> tuple[float, ...]:
