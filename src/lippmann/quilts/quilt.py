@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from lippmann.display import Display
+from lippmann.display.sheet_layout import trim_of
 from lippmann.display.stereo import PairWidth, StereoPair
 from lippmann.errors import OutputError, PictureError, UsageError
 from lippmann.image.encoding import display_codes, linear_values
@@ -284,7 +285,7 @@ def quilt_of_display(
 
     Returns
     -------
-    The quilt's size and layout, with the aspect ratio of the display's panel.
+    The quilt's size and layout, with the aspect ratio of the display's panel, of a print that of its trim.
 
     Raises
     ------
@@ -317,7 +318,8 @@ def quilt_of_display(
             raise UsageError("the number of views is not known", where=display.name, fix="say views=..., too")
         layout = known[0].layout[:2]
     width, height = size or matching[0][1:3]
-    aspect = float(f"{display.panel.width / display.panel.height:.6g}")
+    trim = trim_of(display)
+    aspect = float(f"{trim.width / trim.height:.6g}")
     quilt = DeviceQuilt(display.name, width, height, QuiltLayout(*layout, aspect))
     check_size(width, height, quilt.layout, "quilt")
     return quilt

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
+from lippmann.display.sheet_layout import trimmed
 from lippmann.display.view_cone import view_window
 from lippmann.image.metadata import Provenance
 from lippmann.progress import ProgressCallback, silent
@@ -44,7 +45,7 @@ def render_quilt(
     progress: ProgressCallback = silent,
     build: Build | None = None,
 ) -> QuiltFrame:
-    """Render the views that cameras in front of ``display`` see, see
+    """Render the views that cameras in front of ``display`` see, of a print those of its trim, see
     :class:`~lippmann.rendering.transport.ray_source.QuiltRays`.
 
     Before a background of one colour only the part of the views is traced in which the scene's box can be seen.
@@ -70,7 +71,7 @@ def render_quilt(
     session = open_session(scene, request, size, progress=progress, build=build)
     request = session.request
     placement = session.place(display)
-    display = placement.traced(display)
+    display = placement.traced(trimmed(display))
 
     from lippmann.device.pbr import BuiltScene
     from lippmann.device.pbr.scene import scene_corners

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
+from lippmann.display.sheet_layout import trimmed
 from lippmann.display.view_cone import cone_tangent
 from lippmann.errors import PictureError
 from lippmann.image.stored_values import FloatArray
@@ -27,7 +28,7 @@ _WIDEST = 2048
 
 
 def quilt_display(quilt: Quilt, display: Display | None, where: str) -> Display:
-    """The display of a quilt: ``display``, or else the quilt's own.
+    """The display of a quilt: ``display``, or else the quilt's own; of a print the trim, which the views show.
 
     Raises
     ------
@@ -40,7 +41,7 @@ def quilt_display(quilt: Quilt, display: Display | None, where: str) -> Display:
     if display.lens_array.layout != "lenticular":
         rule = "a quilt needs cylindrical lenses"
         raise PictureError(f"{display.name} has {display.lens_array.layout} lenses", where=where, rule=rule)
-    return display
+    return trimmed(display)
 
 
 def replay_quilt(

@@ -7,9 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 import lippmann
 from lippmann.display import NUMPY, Display, LensArray, Panel, load_display
+from lippmann.display.sheet_layout import trim_of, with_margin
 from lippmann.display.view_cone import cone_tangent
 from lippmann.errors import PictureError, UsageError
 from lippmann.options.placement import PlacementOptions
@@ -114,6 +116,27 @@ def test_parallel_cameras_for_a_display_without_viewing_distance():
     first = directions[-1, 0]
     np.testing.assert_allclose(directions[-VIEW[1] :, : VIEW[0]], np.broadcast_to(first, (20, 15, 3)), atol=1e-6)
     assert np.ptp(origins[-VIEW[1] :, : VIEW[0]].reshape(-1, 3), axis=0).max() > 20
+
+
+def test_a_woven_quilt_of_a_sheet_meets_the_light_lines_of_its_trim():
+    """Positions on a board behind the lens plane are linear in view and pixel: weaving interpolates them exactly."""
+    sheet = with_margin(Display("sheet", Panel(60, 40, 0.5), LensArray("lenticular", 2.0), 3.0, "", 240.0), 10)
+    board, place = trimesh.creation.box((30.0, 20.0, 0.1)), {"place": "fit", "shift": (0, 0, -20.0), "scale": 5.0}
+    asked = {"integrator": "position", "spp": 1, "pixel_filter": "point", "placement": place}
+    quilt = lippmann.render_quilt(board, sheet, views=(2, 2), size=(256, 256), **asked)
+    assert quilt.layout.aspect == 1.5
+    trim = trim_of(sheet)
+    row, column = np.indices((sheet.panel.height, sheet.panel.width))[(slice(None), *trim.slices)] + 0.5
+    x, y = sheet.subpixel_point(column, row, 0)
+    fraction = view_fraction(sheet, x, y)
+    (ox, oy, oz), (dx, dy, dz) = sheet.light_ray(x, y, NUMPY)
+    (height,) = np.unique(quilt.pixels[..., 2].round(3))
+    # Inside of the outermost cameras, and of the outermost pixels of their views.
+    inner = (fraction > 1 / 8) & (fraction < 7 / 8)
+    inner[:, :1], inner[:, -1:] = False, False
+    woven = weave(quilt, sheet, choice="linear").pixels[trim.slices]
+    np.testing.assert_allclose(woven[inner, 0], (ox + dx * (height - oz) / dz)[inner], atol=1e-3)
+    np.testing.assert_allclose(woven[..., 1], oy + dy * (height - oz) / dz, atol=1e-3)
 
 
 def small_quilt(**options):
