@@ -167,7 +167,7 @@ def test_bad_input_is_one_line_and_code_2(lippmann, views, calibration, tmp_path
     for command in ("weave", "interlace"):
         message = refused(command, views, "-d", "mla-square", "-o", native)
         assert ("square lenses" in message, "cut off" in message) == (True, False)
-    assert "unknown choice of views 'cubic'" in refused(
+    assert "--views: unknown value 'cubic'" in refused(
         "weave", views, "-d", calibration, "-o", native, "--views=cubic", "-q"
     )
     assert "unknown ending '.jpg'" in refused("weave", views, "-d", calibration, "-o", tmp_path / "native.jpg")

@@ -57,7 +57,7 @@ GROUPS: Mapping[str, Mapping[str, tuple[str, str, str]]] = {
             "proof",
             "Say what a display's lenses can show: directions, crosstalk, depth, field, viewing zone and moire.",
         ),
-        "quilt": ("quilt", "quilt", "Quilts: all views side by side in one picture."),
+        "quilt": ("quilt", "quilt", "Render, pack and unpack quilts: all views side by side in one picture."),
     },
     "Look": {
         "studio": (

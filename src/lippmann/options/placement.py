@@ -100,7 +100,7 @@ class PlacementOptions(Options):
     )
     pop_out: float | None = _placement(
         None,
-        "Share of the scene's depth in front of the lens plane, 0 to 1.",
+        "Share of the scene's depth in front of the lens plane, 0 to 1; by default a third, or as the camera focuses.",
         first=True,
         low=0.0,
         high=1.0,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -107,6 +108,16 @@ def test_the_documented_example_is_a_display(write):
     page = (Path(__file__).parents[3] / "docs" / "reference" / "displays.md").read_text(encoding="utf-8")
     example = page.split("```toml\n")[1].split("```")[0]
     assert load_display(write(example)).lens_array.offset == pytest.approx((1.5 * 25.4 / 282.4, 0))
+
+
+def test_the_page_of_presets_says_their_field_and_depth():
+    page = (Path(__file__).parents[3] / "docs" / "reference" / "displays.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([\w-]+)` \|.*?\| ([\d.]+) deg \| ±(\d+) mm \|", page, re.MULTILINE)
+    shown = {name: (load_display(name).field_of_view, load_display(name).resolvable_depth[0]) for name, *_ in rows}
+    assert len(shown) == 6
+    assert {name: (f"{field:.1f}", f"{depth:.0f}") for name, (field, depth) in shown.items()} == {
+        name: (field, depth) for name, field, depth in rows
+    }
 
 
 def test_numbers_are_millimetres_and_infinity_has_two_spellings(write):

@@ -34,12 +34,20 @@ def pattern(
     output: options.Output,
     display: options.DisplayName,
     pitch: Annotated[
-        str | None, typer.Option("--pitch", help="Visual pitch in lenses per inch. Default: the display's.")
+        str | None,
+        typer.Option("--pitch", metavar="LPI", help="Visual pitch in lenses per inch. Default: the display's."),
     ] = None,
     slope: Annotated[
-        str | None, typer.Option("--slope", help="Slope of the lenses, or infinite. Default: the display's.")
+        str | None,
+        typer.Option(
+            "--slope",
+            metavar="NUMBER|infinite",
+            help="Slope of the lenses: they lean by -atan(1/slope) from the vertical. Default: the display's.",
+        ),
     ] = None,
-    center: Annotated[str | None, typer.Option("--center", help="Centre in lenses. Default: the display's.")] = None,
+    center: Annotated[
+        str | None, typer.Option("--center", metavar="LENSES", help="Centre in lenses. Default: the display's.")
+    ] = None,
     views: Annotated[int | None, typer.Option("--views", help="Number of views, for stripes. Default: 3.")] = None,
     fields: Annotated[
         int | None, typer.Option("--fields", help="Number of fields, for the other patterns. Default: 11.")
@@ -48,7 +56,8 @@ def pattern(
         float | None,
         typer.Option(
             "--step",
-            help="Step between fields: pitch in lpi, slope in 1/slope, center in lenses.",
+            help="Step between fields: pitch in lpi, slope in 1/slope, center in lenses. Default: half a lens or less "
+            "over the panel; of center one lens over all fields.",
         ),
     ] = None,
     bits: options.Bits = None,

@@ -26,7 +26,7 @@ FitOption = Annotated[
     typer.Option(
         "--fit",
         help="cover: crop; contain: leave white paper; stretch: change proportions. "
-        "Default: cover; pictures must then have one size.",
+        "Default: cover, of photographs of one size; a quilt must have the display's shape.",
     ),
 ]
 

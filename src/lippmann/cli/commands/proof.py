@@ -14,7 +14,9 @@ from lippmann.cli.shared.console import Console
 def proof(
     display: Annotated[
         str,
-        typer.Argument(help="Display: a preset, a .toml file, a Looking Glass's visual.json, or print:lpi=60,..."),
+        typer.Argument(
+            help="Display: a preset, a .toml file, a Looking Glass's visual.json, print:lpi=60,... or monitor:..."
+        ),
     ],
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write a page with plots: a .html, .pdf or .png file.")

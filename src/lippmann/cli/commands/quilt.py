@@ -27,7 +27,11 @@ from lippmann.wording import samples_in_words
 if TYPE_CHECKING:
     from lippmann.quilts.quilt import Quilt, QuiltLayout
 
-quilt = typer.Typer(cls=HelpfulGroup, help="Quilts: all views side by side in one picture.", rich_markup_mode=None)
+quilt = typer.Typer(
+    cls=HelpfulGroup,
+    help="Render, pack and unpack quilts: all views side by side in one picture.",
+    rich_markup_mode=None,
+)
 
 Device = Annotated[
     str,
@@ -54,21 +58,32 @@ Output = Annotated[
 Views = Annotated[
     str | None,
     typer.Option(
-        "--views", help="Columns x rows of views; by default those that the device is given.", rich_help_panel="Display"
+        "--views",
+        metavar="COLUMNSxROWS",
+        help="Views across and up; by default those that the device is given.",
+        rich_help_panel="Display",
     ),
 ]
 Size = Annotated[
     str | None,
     typer.Option(
-        "--size", help="Width x height of the quilt in pixels; by default the device's.", rich_help_panel="Display"
+        "--size",
+        metavar="WIDTHxHEIGHT",
+        help="Size of the quilt in pixels; by default the device's.",
+        rich_help_panel="Display",
     ),
 ]
 Layout = Annotated[
     str | None,
-    typer.Option("--layout", help="Columns x rows of a quilt whose name and metadata do not say them, such as 8x6."),
+    typer.Option(
+        "--layout",
+        metavar="COLUMNSxROWS",
+        help="Views across and up in a quilt whose name and metadata do not say them, such as 8x6.",
+    ),
 ]
 Aspect = Annotated[
-    float | None, typer.Option("--aspect", help="With --layout: width over height of the displayed picture.")
+    float | None,
+    typer.Option("--aspect", help="With --layout: width over height of the displayed picture. Default: the display's."),
 ]
 Format = Annotated[
     Literal["png", "exr", "tiff"] | None,
@@ -263,7 +278,7 @@ def weave(
     display: options.DisplayName,
     output: options.OptionalOutput = None,
     choice: Annotated[
-        str | None,
+        Literal["nearest", "linear"] | None,
         typer.Option(
             "--views",
             help="nearest: one view per sub-pixel; linear: a mixture of two. Default: linear, of a pair nearest.",

@@ -63,7 +63,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "reproduce": ("lippmann reproduce -o report", "lippmann reproduce --quick -o report"),
     "quilt render": (
         "lippmann quilt render model.glb --display portrait",
-        "lippmann quilt render model.glb --turntable 48 --video turn_qs8x6a0.75.mp4 -o frames",
+        "lippmann quilt render model.glb --turntable 48 -o turn.mp4",
     ),
     "quilt pack": (
         "lippmann quilt pack views -o city_qs8x6a0.75.png",

@@ -17,7 +17,10 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but erro
 Bits = Annotated[
     int | None,
     typer.Option(
-        "--bits", help="Bits per value: PNG 8, 16; EXR 16, 32; TIFF and Zarr 8, 16, 32.", rich_help_panel="Output"
+        "--bits",
+        help="Bits per value: PNG 8, 16; EXR 16, 32; TIFF and Zarr 8, 16, 32. Default: the input's where its pixels "
+        "are kept, else 8, of EXR 32.",
+        rich_help_panel="Output",
     ),
 ]
 Correct = Annotated[
