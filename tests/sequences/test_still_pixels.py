@@ -183,3 +183,14 @@ def test_surfaces_that_no_light_reaches_stay_as_they_are(display):
 def test_key_frames_have_one_seed(display):
     keys = KeyFrames(display, None, None, StillPixels())
     assert [keys.noise_of(number, RenderRequest()) for number in (0, 4, 31, 32, 33)] == [0, 4, 31, 0, 33]
+
+
+def test_a_key_frame_in_mid_film_keeps_its_own_features_and_probes(monkeypatch):
+    from lippmann.sequences import still_pixels
+
+    none = np.zeros((0, 0))
+    still, job = StillPixels(), SimpleNamespace(source=SimpleNamespace(width=1), sample_source=SimpleNamespace(width=1))
+    still._own = still_pixels._Picture(PixelWindow(0, 0, 9, 9), none, none, none)  # of the frame before
+    monkeypatch.setattr(still_pixels, "_find_window", lambda job: None)
+    still.trace_key(job, lambda job: SimpleNamespace(frame=SimpleNamespace(pixels=none)))
+    assert still._key is None

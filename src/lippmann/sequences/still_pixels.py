@@ -91,6 +91,10 @@ class StillPixels(KeyLight):
         self._key: _Picture | None = None
         self._own: _Picture | None = None
 
+    def trace_key(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
+        self._own = None  # of the frame before, which passed nothing on
+        return super().trace_key(job, trace)
+
     def trace_next(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
         self._own = None
         window, columns = _find_window(job), count_columns(job)
