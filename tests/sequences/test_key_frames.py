@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -121,13 +122,27 @@ def test_without_the_estimate_of_a_denoised_key_frame_all_have_halves(motion, di
     assert [has_halves for *_, has_halves in asked] == [True] * 3
 
 
-def test_fewer_samples_lower_the_estimate_by_their_root_and_its_lower_end_by_their_share():
-    after = estimate_next({**ESTIMATE, "worst_lens": [3, 4]})
-    by_share = -10 * math.log10(0.75)
-    assert after["psnr"] == pytest.approx(40 - by_share / 2, abs=0.01)
-    assert after["by_chance"] == pytest.approx(46 - by_share / 2, abs=0.01)
-    assert after["psnr_low"] == pytest.approx(38 - by_share, abs=0.01)
-    assert (after["psnr_high"], after["worst_lens"]) == (43.0, [3, 4])
+def test_more_noise_lowers_the_estimate_by_its_root_and_the_lower_end_by_itself():
+    more, less = (estimate_next({**ESTIMATE, "worst_lens": [3, 4]}, noise) for noise in (4 / 3, 3 / 4))
+    by_share = 10 * math.log10(4 / 3)
+    for after, sign in ((more, -1), (less, 1)):
+        assert after["psnr"] == pytest.approx(40 + sign * by_share / 2, abs=0.01)
+        assert after["by_chance"] == pytest.approx(46 + sign * by_share / 2, abs=0.01)
+        assert after["worst_lens"] == [3, 4]
+    assert (more["psnr_low"], more["psnr_high"]) == (pytest.approx(38 - by_share, abs=0.01), 43.0)
+    assert (less["psnr_low"], less["psnr_high"]) == (38.0, pytest.approx(43 + by_share, abs=0.01))
+
+
+@pytest.mark.parametrize(
+    ("variances", "noise"), [((2.0, 6.0), 4.0), ((6.0, 2.0), 4 / 9), ((0.0, 2.0), 4 / 3), ((2.0, 0.0), 4 / 3)]
+)
+def test_a_frame_notices_that_its_object_has_turned_to_a_noisier_side(display, variances, noise):
+    keys, key = KeyFrames(display, None, None, None), None
+    for number, variance in enumerate(variances):
+        through = keys.make_request(RenderRequest(), Moment(number, None, None), key).trace_through
+        assert through(SimpleNamespace(denoiser=SimpleNamespace(variance=variance)), lambda job: "traced") == "traced"
+        key = keys.add(Moment(number, None, None), Provenance(method="pooled", spp=8, estimate=ESTIMATE), key)
+    assert keys.estimate(Provenance(), key) == estimate_next(ESTIMATE, noise)
 
 
 def test_frames_after_a_key_frame_are_denoised_once(engine, motion, display, monkeypatch):

@@ -28,7 +28,7 @@ from lippmann.sequences.cuts import Moment
 from lippmann.sequences.flicker import add_flicker
 from lippmann.sequences.forms import INTEGRAL, Form, Output, QuiltForm
 from lippmann.sequences.kept_scene import KeptScene
-from lippmann.sequences.key_frames import KeyFrames, estimate_next
+from lippmann.sequences.key_frames import KeyFrames
 from lippmann.sequences.key_light import KeyLight, LightOfSurfaces
 from lippmann.sequences.motion import Motion, open_motion
 from lippmann.sequences.still_pixels import StillPixels
@@ -354,7 +354,7 @@ def render_frames(
         image = trace(now, own, _report_frame(progress, position, len(frames)))
         made = image.provenance
         keys.add(now, made, key)
-        estimate = made.estimate if key is None or key.made.estimate is None else estimate_next(key.made.estimate)
+        estimate = keys.estimate(made, key)
         # Noise that stands still has no flicker that the frames' own errors would tell.
         if not request.fixed_noise:
             stays = shared is not None and shared.keeps_noise

@@ -3,7 +3,7 @@
 The half-buffers of a frame are denoised separately, so that each measures the error of the other. Their mean has 0.3 to
 0.7 dB less than a frame whose samples are one stream, denoised together (``docs/research/films.md``). So the frames
 after a key frame have no half-buffers. They take three quarters of its samples, and the estimate of their error follows
-from the key frame's.
+from the key frame's and from how much noise the denoiser took from either: an object may turn to a noisier side.
 
 Where nothing but a camera moves, and where the display is at rest, frames take a key frame's light
 (:mod:`lippmann.sequences.key_light`). Then only every 32nd frame has halves. Every second frame of a moving camera, and
@@ -19,7 +19,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple, cast
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 from lippmann.display import Display
 from lippmann.image.metadata import Provenance
@@ -29,6 +30,9 @@ from lippmann.sequences.flicker import Figures
 from lippmann.sequences.kept_light import KeptLight
 from lippmann.sequences.key_light import KeyLight
 from lippmann.sequences.tuning import TUNING
+
+if TYPE_CHECKING:
+    from lippmann.rendering.methods import Job, Traced
 
 
 class Key(NamedTuple):
@@ -67,6 +71,7 @@ class KeyFrames:
         self._step = TUNING.frames_of_key if shared is None else shared.frames_of_link
         self._last: tuple[Moment, Key] | None = None  # the last frame that others follow, and its key frame
         self._light = KeptLight()
+        self._variances = {"key": 0.0, "next": 0.0}  # of one sample of the last frame of either kind
 
     def make_request(self, request: RenderRequest, moment: Moment, key: Key | None) -> RenderRequest:
         """The request of a frame, which follows a ``key`` frame or, None, has halves of its own."""
@@ -79,14 +84,32 @@ class KeyFrames:
             source = f"the estimate of the error follows from frame {frame}'s, with three quarters of its samples"
             own = replace(request, spp=samples, judged_by=source, keep_light=self._light.reuse_key)
             if self._shared is None:
-                return own
+                return replace(own, trace_through=partial(self._note_variance, "next"))
             if self._shared.holds(self._last[0], moment):
                 return replace(own, trace_through=self._shared.pass_on if has_next else self._shared.trace_next)
             return replace(own, trace_through=self._shared.trace_key) if has_next else own
         if not (has_next and _is_open(request)):
             return request
-        own = replace(request, keep_light=self._light.keep_key)
-        return own if self._shared is None else replace(own, trace_through=self._shared.trace_key)
+        through = partial(self._note_variance, "key") if self._shared is None else self._shared.trace_key
+        return replace(request, keep_light=self._light.keep_key, trace_through=through)
+
+    def _note_variance(self, kind: str, job: Job, trace: Callable[[Job], Traced]) -> Traced:
+        traced = trace(job)
+        self._variances[kind] = job.denoiser.variance
+        return traced
+
+    def estimate(self, made: Provenance, key: Key | None) -> Figures | None:
+        """The estimate of a frame that was ``made`` last, after a ``key`` frame or, None, as one; as its file holds it.
+
+        Noise is taken to fall in proportion to the samples, and to grow with the variance of one. Where frames take a
+        key frame's light, only the samples count.
+        """
+        if key is None or key.made.estimate is None:
+            return made.estimate
+        variances = self._variances
+        is_known = self._shared is None and 0.0 not in variances.values()
+        grown = variances["next"] / variances["key"] if is_known else 1.0
+        return estimate_next(key.made.estimate, grown / TUNING.samples_kept)
 
     def noise_of(self, frame: int, request: RenderRequest) -> int:
         """Number of the frame whose seed a frame takes: its own, or 0 where kept pixels would jump to new noise."""
@@ -134,16 +157,21 @@ def find_frame_before(frame: int, step: int, halves: int) -> int | None:
     return (frame - 1) // step * step if frame % halves else None
 
 
-def estimate_next(key: Figures) -> Figures:
-    """The estimate of a frame after a key frame, whose own is ``key``, both as files hold them.
+def estimate_next(key: Figures, noise: float) -> Figures:
+    """The estimate of a frame with ``noise`` times the key frame's, whose estimate is ``key``, both as files hold them.
 
-    The MSE of a denoised picture is taken to fall with the square root of the number of samples, as it does on the
-    average (``docs/background/measurements.md``: 2.4 dB for four times as many), and at most in proportion to it: that
-    are the lower ends. The upper ends are the key frame's, as the frame is denoised as a whole.
+    The MSE of a denoised picture is taken to follow the square root of the noise, as it does on the average
+    (``docs/background/measurements.md``: 2.4 dB for four times the samples), and at most the noise itself: that is the
+    lower end of a frame with more of it, and the upper end of one with less. The other ends are the key frame's.
     """
-    most = -10 * math.log10(TUNING.samples_kept)
-    less = {"psnr": most / 2, "worst": most / 2, "by_chance": most / 2, "psnr_low": most, "worst_low": most}
-    return {name: round(cast("float", value) - less[name], 2) if name in less else value for name, value in key.items()}
+    less = 10 * math.log10(noise)
+    middle = dict.fromkeys(("psnr", "worst", "by_chance"), less / 2)
+    ends = {"psnr_low": max(less, 0), "worst_low": max(less, 0), "psnr_high": min(less, 0), "worst_high": min(less, 0)}
+    changes = {**middle, **ends}
+    return {
+        name: round(cast("float", value) - changes[name], 2) if name in changes else value
+        for name, value in key.items()
+    }
 
 
 def _is_open(request: RenderRequest) -> bool:

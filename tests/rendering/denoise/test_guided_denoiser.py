@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lippmann.rendering.denoise import guided_denoiser as module
-from lippmann.rendering.denoise.guided_denoiser import MARGIN, SurfacePart, denoise_surfaces
+from lippmann.rendering.denoise.guided_denoiser import MARGIN, SurfacePart, denoise_surfaces, measure_noise
 
 SHAPE = (200, 260)
 
@@ -71,3 +71,13 @@ def test_where_nothing_is_seen_nothing_is_done(calls):
     np.testing.assert_array_equal(result, color)
     assert result is not color
     assert calls == []
+
+
+def test_the_noise_that_is_taken_falls_with_the_samples_and_does_not_rest_on_single_paths():
+    rng = np.random.default_rng(1)
+    clean = np.full((*SHAPE, 3), 0.25, np.float32)
+    few, more = (np.square(0.5 + rng.normal(0, width, clean.shape)).astype(np.float32) for width in (0.08, 0.04))
+    assert measure_noise(few, clean) == pytest.approx(4 * measure_noise(more, clean), rel=0.02)
+    assert measure_noise(more, clean) == pytest.approx(0.04**2 * 2 / np.pi, rel=0.02)  # of the mean of a half-normal
+    more[::50, ::50] = 1000.0
+    assert measure_noise(more, clean) == pytest.approx(0.04**2 * 2 / np.pi, rel=0.03)

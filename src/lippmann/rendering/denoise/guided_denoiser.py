@@ -60,6 +60,8 @@ class GuidedDenoiser:
         Spent so far, guides included.
     used:
         The effort of the last picture.
+    variance:
+        Of one sample, by the noise that was taken from the last picture.
     """
 
     def __init__(
@@ -91,12 +93,14 @@ class GuidedDenoiser:
         self._surfaces: list[SurfacePart | None] = []
         self.seconds = 0.0
         self.used: Effort = "fast"
+        self.variance = 0.0
 
     def __call__(self, pixels: Floats, samples: int, rotated: bool = False) -> Floats:
         """The denoised picture, with its light shared where that is asked for.
 
-        Views of a quilt share their light before denoising, micro-images after it. ``samples`` are those of each pixel;
-        ``rotated`` is that of :func:`~lippmann.rendering.denoise.oidn.denoise`.
+        Views of a quilt share their light before denoising, micro-images after it. ``samples`` are those of each pixel
+        in two half-buffers, of which this is one, or twice those of a picture in one stream; ``rotated`` is that of
+        :func:`~lippmann.rendering.denoise.oidn.denoise`.
         """
         started = time.perf_counter()
         self._progress(Progress("denoise", 0, 1))
@@ -108,6 +112,7 @@ class GuidedDenoiser:
         clean = np.maximum(self._denoise_tiles(pixels, guides, rotated), np.float32(0))
         if self._shares and not isinstance(self._source, QuiltRays):
             clean = self._share(clean)
+        self.variance = samples / 2 * measure_noise(pixels, clean)
         self._progress(Progress("denoise", 1, 1))
         self.seconds += time.perf_counter() - started
         return clean
@@ -185,6 +190,14 @@ class GuidedDenoiser:
                 progress=self._progress,
             )
         return self._guides
+
+
+def measure_noise(noisy: Floats, clean: Floats) -> float:
+    """Noise that a denoiser took from a picture: the squared mean change of the roots of light, which are much like
+    codes. The mean square would rest on single paths.
+    """
+    rows = zip(noisy, clean, strict=True)  # one by one: copies of the picture would count
+    return float(np.mean([np.abs(np.subtract(*np.sqrt(np.clip(pair, 0, 1)))).mean() for pair in rows])) ** 2
 
 
 def choose_effort(kind: Denoiser, samples: int) -> Effort:
