@@ -44,7 +44,7 @@ def test_the_lens_plane_moves_until_nothing_seen_is_cut():
     front = (placed @ (0, 0, -12.0, 1))[2]
     assert 9.9 < front < 10.0
     assert len(warnings) == 1
-    assert "the lens plane moved from 20 to 12.4" in warnings[0]
+    assert "the lens plane moved by 7.59 to 12.4" in warnings[0]
 
 
 def test_enlarging_the_scene_leaves_less_room_before_the_lens_plane():

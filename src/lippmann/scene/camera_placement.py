@@ -120,8 +120,9 @@ def place_by_camera(
         if focus > most:
             if pop_out is None:
                 warnings.append(
-                    f"the lens plane moved from {focus:.3g} to {most:.3g} scene units in front of the camera: recorded "
-                    f"rays begin {display.aperture_distance:g} mm in front of it, and would cut off what is nearer"
+                    f"the lens plane moved by {focus - most:.3g} to {most:.3g} scene units in front of the camera: "
+                    f"recorded rays begin {display.aperture_distance:g} mm in front of it, and would cut off what "
+                    "is nearer"
                 )
             focus = most
     units, (least, largest) = _units_per_mm(camera, focus, display), _UNITS_PER_MM
