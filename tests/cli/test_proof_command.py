@@ -41,6 +41,7 @@ def test_as_json_with_a_page(lippmann, tmp_path):
         ),
         (("print:lpi=60,ppi=360,size=30x20mm,radius=0.3mm",), "print: radius: radius is given without a thickness"),
         (("print:sheet=60lpi,ppi=360,size=30x20mm",), "unknown sheet '60lpi'"),
+        (("odyssey-3d",), "odyssey-3d has no proof; an eye-tracked monitor steers the light of unknown lenses"),
         (("nowhere",), "unknown display 'nowhere'"),
         ((SHEET, "-o", "page.docx"), "page.docx: the ending is '.docx'; the page of a proof ends in .html, .pdf, .png"),
     ],

@@ -12,6 +12,7 @@ from lippmann.display.display import INFINITE, Display
 from lippmann.display.pixel_aperture import PixelAperture
 from lippmann.display.validation import INCH
 from lippmann.display.view_cone import visible_size
+from lippmann.errors import DisplayError
 from lippmann.json_values import JsonObject, JsonValue
 from lippmann.optics.crosstalk import ANNOYING, VISIBLE, crosstalk, independent_directions, most_strips
 from lippmann.optics.directions import true_directions
@@ -174,7 +175,7 @@ def prove(display: Display) -> Proof:
     Raises
     ------
     DisplayError
-        ``display`` is no :class:`~lippmann.Display`.
+        ``display`` is no :class:`~lippmann.Display`, or an eye-tracked monitor, whose lenses are not known.
 
     Examples
     --------
@@ -182,6 +183,9 @@ def prove(display: Display) -> Proof:
     >>> prove(lippmann.load_display("print-60lpi")).advice
     'keep the scene within 4.59 mm in front of and behind the lenses; ...'
     """
+    if display.stereo is not None:
+        rule, fix = "an eye-tracked monitor steers the light of unknown lenses", "'lippmann plan' says its depth"
+        raise DisplayError(f"{display.name} has no proof", parameter="display", rule=rule, fix=fix)
     directions, straight = independent_directions(display), crosstalk(display, 0.0)
     slope = edge_slope(display)
     depth = 2.0 * directions * display.gap
