@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import sys
+import types
 
 import pytest
 
@@ -76,6 +78,22 @@ def test_the_bar_fits_eighty_columns(monkeypatch):
             told(Progress("guides", done, 4, "worst micro-image 33.3 dB, goal 40 dB, about 1234 s left"))
     lines = stream.getvalue().replace("\r", "\n").split("\n")
     assert all(len(line) <= 80 for line in lines)
+
+
+def test_a_notebook_has_a_bar_of_its_own_that_goes_away(monkeypatch):
+    shown = []
+    handle = types.SimpleNamespace(update=lambda data, raw: shown.append(data))
+    module = types.SimpleNamespace(display=lambda data, raw, display_id: handle)
+    shell = types.SimpleNamespace(kernel=object())
+    monkeypatch.setitem(sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: shell))
+    monkeypatch.setitem(sys.modules, "IPython.display", module)
+    monkeypatch.setattr("lippmann.progress_bar.NOTEBOOK_INTERVAL", 0.0)
+    with show_progress(None) as told:
+        told(Progress("trace", 1, 2, "<b>"))
+    assert shown == [
+        {"text/plain": "32 % tracing <b>", "text/html": '<progress value="0.320"></progress> 32 % tracing &lt;b&gt;'},
+        {"text/plain": ""},
+    ]
 
 
 def test_plain_lines_do_not_repeat_themselves(monkeypatch, capsys):

@@ -6,15 +6,17 @@ as a rule; stages come back (samples are traced and denoised in turns), and only
 
 from __future__ import annotations
 
+import html
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 
 from lippmann.progress import Progress, ProgressCallback, silent
 
-#: Seconds between two plain lines where output is not a terminal.
-PLAIN_INTERVAL = 5.0
+#: Seconds between two plain lines where output is not a terminal, and between two states of a notebook's bar.
+PLAIN_INTERVAL, NOTEBOOK_INTERVAL = 5.0, 0.2
 
 STAGE_NAMES = {
     "load": "loading",
@@ -62,7 +64,7 @@ class Overall:
 
 @contextmanager
 def bar() -> Iterator[ProgressCallback]:
-    """A bar on standard error, or below a notebook's cell, that goes away when the work is done."""
+    """A bar on standard error that goes away when the work is done."""
     # rich takes a tenth of a second to load, which --help should not cost.
     from rich.console import Console
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
@@ -81,13 +83,40 @@ def bar() -> Iterator[ProgressCallback]:
         began = time.perf_counter()
 
         def report(progress: Progress) -> None:
-            remark = progress.note.split(", about ")[0]
-            if not remark and progress.stage == "trace" and progress.done:
-                remark = f"{progress.done / max(time.perf_counter() - began, 1e-9) / 1e6:.1f} M samples/s"
-            name = STAGE_NAMES.get(progress.stage, progress.stage)
+            name, remark = _in_words(progress, began)
             progress_bar.update(task, completed=overall(progress), description=name, remark=remark[:_REMARK])
 
         yield report
+
+
+@contextmanager
+def notebook_bar() -> Iterator[ProgressCallback]:
+    """A bar below a notebook's cell that goes away when the work is done. It is plain HTML: rich's needs ipywidgets."""
+    shown = import_module("IPython.display").display({"text/plain": ""}, raw=True, display_id=True)
+    overall, began, last = Overall(), time.perf_counter(), 0.0
+
+    def report(progress: Progress) -> None:
+        nonlocal last
+        share, now = overall(progress), time.perf_counter()
+        if now - last < NOTEBOOK_INTERVAL:
+            return
+        last = now
+        line = " ".join((f"{100 * share:.0f} %", *_in_words(progress, began)))
+        bar = f'<progress value="{share:.3f}"></progress> {html.escape(line)}'
+        shown.update({"text/plain": line, "text/html": bar}, raw=True)
+
+    try:
+        yield report
+    finally:
+        shown.update({"text/plain": ""}, raw=True)
+
+
+def _in_words(progress: Progress, began: float) -> tuple[str, str]:
+    """Name of the stage, and a remark: its note, or the speed of tracing since ``began``."""
+    remark = progress.note.split(", about ")[0]
+    if not remark and progress.stage == "trace" and progress.done:
+        remark = f"{progress.done / max(time.perf_counter() - began, 1e-9) / 1e6:.1f} M samples/s"
+    return STAGE_NAMES.get(progress.stage, progress.stage), remark
 
 
 class PlainProgress:
@@ -115,8 +144,8 @@ def show_progress(progress: ProgressCallback | None) -> Iterator[ProgressCallbac
     """The callback that was given; without one a bar in terminals and notebooks, and nothing elsewhere."""
     if progress is not None:
         yield progress
-    elif sys.stderr.isatty() or in_notebook():
-        with bar() as callback:
+    elif in_notebook() or sys.stderr.isatty():
+        with notebook_bar() if in_notebook() else bar() as callback:
             yield callback
     else:
         yield silent

@@ -49,6 +49,7 @@ def test_a_pinhole_is_proved_by_the_formulas_of_displays():
     assert proof.to_dict()["viewing_distance"] == "infinite"
     assert proof.advice.startswith("keep the scene within 54.4 mm")
     assert proof.in_words()["lens"] == "none is given: an ideal pinhole at the gap"
+    assert ">none is given: an ideal pinhole at the gap<" in proof._repr_html_()
 
 
 def test_a_slanted_panels_zone_is_its_cone():

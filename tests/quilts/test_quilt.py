@@ -142,6 +142,8 @@ def test_a_quilt_shows_itself_in_notebooks_and_gives_its_codes():
     layout = QuiltLayout(4, 3, 0.75)
     quilt = Quilt(np.full((900, 1600, 3), 0.5, np.float32), layout)
     assert repr(quilt) == "<Quilt 1600 x 900 pixels, 4 x 3 views, aspect 0.75>"
+    unknown = Quilt(quilt.values, QuiltLayout(4, 3, None))
+    assert repr(unknown) == "<Quilt 1600 x 900 pixels, 4 x 3 views>"
     with Image.open(io.BytesIO(quilt._repr_png_())) as shown:
         assert shown.size == (534, 300)
         assert shown.getpixel((9, 9)) == (188, 188, 188)

@@ -66,6 +66,7 @@ def test_a_picture_shows_itself_as_a_widget_in_a_notebook(image, kernel):
     bundle = image._repr_mimebundle_(include=None, exclude=None)
     data = bundle[0] if isinstance(bundle, tuple) else bundle
     assert WIDGET_VIEW in data
+    assert data["text/plain"] == repr(image)
 
 
 @pytest.mark.parametrize("shell", [None, types.SimpleNamespace()], ids=["script", "terminal"])

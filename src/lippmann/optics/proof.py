@@ -21,6 +21,7 @@ from lippmann.optics.fitting import fit_profile, gap_of
 from lippmann.optics.lens import Lens
 from lippmann.optics.moire import Wave, moire_waves
 from lippmann.optics.zone import ViewingZone
+from lippmann.wording import html_table
 
 #: By how much a sheet may be thicker than its maker says.
 THICKER = 1.03
@@ -146,6 +147,10 @@ class Proof:
         if self.tolerances is not None:
             words |= _tolerances_in_words(self.tolerances)
         return {**words, "advice": self.advice}
+
+    def _repr_html_(self) -> str:
+        """The table of :meth:`in_words` for notebooks."""
+        return html_table("Proof", self.in_words())
 
     def to_dict(self) -> JsonObject:
         """Plain values for JSON; an infinite distance is ``"infinite"``."""

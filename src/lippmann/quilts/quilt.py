@@ -214,7 +214,8 @@ class Quilt:
 
     def __repr__(self) -> str:
         (width, height), layout = self.size, self.layout
-        return f"<Quilt {width} x {height} pixels, {layout.columns} x {layout.rows} views, aspect {layout.aspect:g}>"
+        aspect = "" if layout.aspect is None else f", aspect {layout.aspect:g}"
+        return f"<Quilt {width} x {height} pixels, {layout.columns} x {layout.rows} views{aspect}>"
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """:attr:`pixels`, for ``np.asarray`` and NumPy's functions."""

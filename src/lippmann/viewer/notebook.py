@@ -17,4 +17,7 @@ def mimebundle(image: IntegralImage) -> object:
         return None
     from lippmann.viewer.widget import PictureWidget
 
-    return PictureWidget(image)._repr_mimebundle_()
+    bundle = PictureWidget(image)._repr_mimebundle_()
+    data = bundle[0] if isinstance(bundle, tuple) else bundle
+    data["text/plain"] = repr(image)  # where widgets are not shown
+    return bundle
