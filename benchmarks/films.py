@@ -3,11 +3,11 @@
 Time on two cores: an estimated three hours for all films on the seed display, and an hour for one on a Portrait.
 
 python benchmarks/films.py OTHER [--today CHECKOUT] [--films "KIND OF SCENE"...] [--display NAME]
-    [--given FOLDER] [--time-only]
+    [--given FOLDER] [--time-only] [--runs N] [--last FRAME]
 
 ``OTHER`` is the folder of an earlier checkout, run as ``defaults.py`` runs it. The seconds of a frame are those of a
 command for many frames less those of one for few, divided by how many more: starting up falls out. Processor time of
-the whole tree of processes, medians of three runs of the two checkouts in turn, after one that compiles the kernels.
+the whole tree of processes, medians of ``--runs`` of the two checkouts in turn, after one that compiles the kernels.
 ``--depth-scale 0.5`` is said everywhere, so that both show much the same native pixels; where the files say that they
 stand otherwise, each checkout has its own reference.
 
@@ -36,12 +36,8 @@ from defaults import HERE, Checkout, psnr
 from films_scenes import Film, films
 from harness import save, saved
 
-#: Frames of the two commands whose times are taken from each other; a film of one frame is a still. Of today's version
-#: the frames 1 to 32 hold as many key frames as any 32, of camera paths one. The earlier one renders all frames alike:
-#: every eighth of the same 32 stands for them, as those of a turntable differ in samples by up to seven times.
-MANY, FEW = {"other": range(0, 33, 8), "today": range(33)}, range(1)
-#: Runs of each command, whose median counts: single ones differ by a quarter.
-RUNS = 3
+#: Frames of the shorter of the two commands whose times are taken from each other; a film of one frame is a still.
+FEW = range(1)
 #: Frames that are judged, and samples of each of their two references.
 JUDGED, REFERENCE_SAMPLES = range(5), 32
 SEEDS = (991, 992)
@@ -58,6 +54,15 @@ def render(checkout: Checkout, film: Film, display: str, frames: range, out: Pat
     which = f"{frames.start}:{frames.stop}:{frames.step}"
     words = ["render", *film.words, "-d", display, "--depth-scale", "0.5", "-q", "--frames", which]
     return checkout.run(_PROGRAM, [*words, *more, "-o", str(out / "%04d.png")])
+
+
+def longer(last: int) -> dict[str, range]:
+    """Frames of the longer command: those up to the 32nd hold as many key frames as any 32, of camera paths one.
+
+    The earlier version renders all frames alike: every eighth of the same ones stands for them, as those of a turntable
+    differ in samples by up to seven times.
+    """
+    return {"other": range(0, last + 1, 8), "today": range(last + 1)}
 
 
 def read(folder: Path) -> list[Any]:
@@ -99,21 +104,20 @@ def references(checkout: Checkout, film: Film, display: str, folder: Path) -> li
     return [read(folder / str(seed)) for seed in SEEDS]
 
 
-def measure(
-    checkouts: dict[str, Checkout], film: Film, display: str, cache: Path, judged: bool, scratch: Path
-) -> dict[str, Any]:
+def measure(checkouts: dict[str, Checkout], film: Film, scratch: Path, options: argparse.Namespace) -> dict[str, Any]:
     """Figures of one film by checkout."""
+    display, many = options.display, longer(options.last)
     sides: dict[str, dict[str, Any]] = {name: {} for name in checkouts}
     for name, checkout in checkouts.items():
         (scratch / name).mkdir()
         (scratch / "timed" / name).mkdir(parents=True)
         render(checkout, film, display, JUDGED, scratch / name)
-        render(checkout, film, display, MANY[name], scratch / "timed" / name)  # compiles the kernels of all frames
+        render(checkout, film, display, many[name], scratch / "timed" / name)  # compiles the kernels of all frames
     spent: dict[tuple[str, range], list[dict[str, float]]] = {}
-    for _ in range(RUNS):
+    for _ in range(options.runs):
         for name, checkout in checkouts.items():
             out = scratch / "timed" / name
-            for frames in (FEW, MANY[name]):
+            for frames in (FEW, many[name]):
                 spent.setdefault((name, frames), []).append(render(checkout, film, display, frames, out))
     medians = {
         key: {what: statistics.median(run[what] for run in runs) for what in ("cpu", "peak")}
@@ -122,25 +126,26 @@ def measure(
     images = {name: read(scratch / name) for name in checkouts}
     shows = {name: [all_[0].provenance.options.get(key) for key in SHOWN] for name, all_ in images.items()}
     for name, side in sides.items():
-        side["seconds"] = (medians[name, MANY[name]]["cpu"] - medians[name, FEW]["cpu"]) / len(MANY[name][1:])
-        side |= {"still_peak": medians[name, FEW]["peak"], "peak": medians[name, MANY[name]]["peak"]}
+        side["seconds"] = (medians[name, many[name]]["cpu"] - medians[name, FEW]["cpu"]) / len(many[name][1:])
+        side |= {"still_peak": medians[name, FEW]["peak"], "peak": medians[name, many[name]]["peak"]}
         first = images[name][0].provenance
         side |= {"spp": first.spp, "stated": (first.estimate or {}).get("psnr")}
-    if not judged:
-        return dict(sides)
+    measured = {**sides, "runs": options.runs, "last": options.last}
+    if options.time_only:
+        return measured
     alike = _same(*shows.values())
     fixed = {}
     for name, side in sides.items():
         own = "today" if alike else name
         version = checkouts[own].commit()
-        kept = cache / "films" / f"{film.name}_{display}_{REFERENCE_SAMPLES}_{version}".replace(" ", "_")
+        kept = options.cache / "films" / f"{film.name}_{display}_{REFERENCE_SAMPLES}_{version}".replace(" ", "_")
         long = references(checkouts[own], film, display, kept)
         side |= judge(images[name], long)
         if name == "today":
             (scratch / "fixed").mkdir()
             render(checkouts[name], film, display, JUDGED, scratch / "fixed", ["--fixed-noise"])
             fixed = judge(read(scratch / "fixed"), long)
-    return {**sides, "fixed": fixed, "alike": alike}
+    return {**measured, "fixed": fixed, "alike": alike}
 
 
 def _same(a: list[Any], b: list[Any]) -> bool:
@@ -158,6 +163,8 @@ def main() -> None:
     parser.add_argument("--display", default="seed-lenticular")
     parser.add_argument("--given", type=Path, help="folder of models that somebody else made")
     parser.add_argument("--time-only", action="store_true", help="no references: time and memory alone")
+    parser.add_argument("--runs", type=int, default=3, help="whose median counts: single ones may differ by a quarter")
+    parser.add_argument("--last", type=int, default=32, help="last frame that is timed, a multiple of 8")
     parser.add_argument("--cache", type=Path, default=Path.home() / ".cache" / "lippmann-benchmarks")
     options = parser.parse_args()
     known, missing = films(options.cache, options.given)
@@ -172,7 +179,7 @@ def main() -> None:
         missing = kept.get("missing", {})  # of all films, which were not asked for
     for name in wanted:
         with tempfile.TemporaryDirectory() as folder:
-            found = measure(checkouts, known[name], options.display, options.cache, not options.time_only, Path(folder))
+            found = measure(checkouts, known[name], Path(folder), options)
         place = {"film": name, "seen": known[name].seen, "display": options.display, "commits": commits}
         rows = [row for row in rows if (row["film"], row["display"]) != (name, options.display)]
         rows.append({**place, **found})

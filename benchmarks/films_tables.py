@@ -16,16 +16,17 @@ def describe(result: dict[str, Any]) -> str:
     missing = [f"{name} {reason}." for name, reason in result["missing"].items()]
     if missing:
         parts.append("Left out: " + " ".join(missing))
-    commits = dict.fromkeys(tuple(row["commits"].values()) for row in result["rows"])
-    said = "; ".join(f"{other} and, after the arrows, {today}" for other, today in commits)
+    commits = {row["commits"]["today"]: None for row in result["rows"]}
+    before = ", ".join(dict.fromkeys(row["commits"]["other"] for row in result["rows"]))
     return f"""## Films beside an earlier version (`films.py`)
 
 `lippmann render SCENE --display NAME --depth-scale 0.5` for many frames and for one, whole commands in processes of
-their own with compiled kernels, in turn; commit {said}. The time of a frame is the difference of their processor
-seconds over that of their frames, of one run each or, since c9dc6c7e, the median of three. Many are five; on this side
-of the flight they are 33, which hold as many key frames as any film. After 39f2c3be they are 33 here and every eighth
-of them there. A still is the first frame alone. Turntables have 48 frames, the swing covers 40 degrees. Films in
-italics are of bundled scenes; the others no setting was tuned on.
+their own with compiled kernels, in turn; commit {before} and, after the arrows,
+{", ".join(commits)}.
+The time of a frame is the difference of their processor seconds over that of their frames. Many are the frames up to
+the one that the table names, every eighth of them on the other side; it is the median of so many runs. A still is the
+first frame alone. Turntables have 48 frames, the swing covers 40 degrees. Films in italics are of bundled scenes; no
+setting was tuned on the others.
 
 {(chr(10) * 2).join(parts)}
 """
@@ -36,14 +37,16 @@ def _name(row: dict[str, Any]) -> str:
 
 
 def _times(rows: list[dict[str, Any]]) -> str:
-    lines = ["| film | a frame | ratio | peak memory | that of a still | over it | samples |", "|" + "---|" * 7]
+    names = "film | a frame | ratio | peak memory | that of a still | over it | samples | last frame, runs"
+    lines = [f"| {names} |", "|" + "---|" * 8]
     for row in rows:
         a, b = row["other"], row["today"]
         lines.append(
             f"| {_name(row)} | {a['seconds']:.2f} → {b['seconds']:.2f} s | {b['seconds'] / a['seconds']:.2f} | "
             f"{a['peak'] / 1e6:.0f} → {b['peak'] / 1e6:.0f} MB | "
             f"{a['still_peak'] / 1e6:.0f} → {b['still_peak'] / 1e6:.0f} MB | "
-            f"{a['peak'] / a['still_peak']:.2f} → {b['peak'] / b['still_peak']:.2f} | {a['spp']} → {b['spp']} |"
+            f"{a['peak'] / a['still_peak']:.2f} → {b['peak'] / b['still_peak']:.2f} | {a['spp']} → {b['spp']} | "
+            f"{row['last']}, {row['runs']} |"
         )
     return "\n".join(lines)
 
