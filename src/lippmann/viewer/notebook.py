@@ -19,5 +19,6 @@ def mimebundle(image: IntegralImage) -> object:
 
     bundle = PictureWidget(image)._repr_mimebundle_()
     data = bundle[0] if isinstance(bundle, tuple) else bundle
+    assert data is not None  # of a widget that has a view
     data["text/plain"] = repr(image)  # where widgets are not shown
     return bundle
