@@ -41,6 +41,8 @@ FEW = range(1)
 #: Frames that are judged, and samples of each of their two references.
 JUDGED, REFERENCE_SAMPLES = range(5), 32
 SEEDS = (991, 992)
+#: What is kept of a frame's own estimate.
+STATED = ("psnr", "psnr_low", "psnr_high", "flicker")
 PLAIN = ["--method", "full", "--denoise", "none", "--spp", str(REFERENCE_SAMPLES)]
 #: What of a picture's options decides what its native pixels show.
 SHOWN = ("depth_scale", "depth_range", "tone_map", "exposure")
@@ -78,15 +80,18 @@ def codes(images: Sequence[Any], eye: bool) -> list[NDArray[Any]]:
     return [encode_srgb(image.replay() if eye else image.pixels) for image in images]
 
 
-def judge(images: Sequence[Any], references: Sequence[Sequence[Any]]) -> dict[str, float]:
-    """PSNR of frames and of their changes, of native pixels and as an eye sees them, in dB."""
-    found = {}
+def judge(images: Sequence[Any], references: Sequence[Sequence[Any]]) -> dict[str, Any]:
+    """PSNR of frames and of their changes, of native pixels and as an eye sees them, in dB; and what frames state."""
+    found: dict[str, Any] = {}
     for name, eye in (("", False), ("eye_", True)):
         shown, a, b = (codes(each, eye) for each in (images, *references))
         found[f"{name}psnr"] = _agreement(shown, a, b)
         found[f"{name}flicker"] = _agreement(*(np.diff(np.stack(each), axis=0) for each in (shown, a, b)))
         found[f"{name}reference"] = psnr((np.stack(a) - np.stack(b)) / 2)
-    return found
+        if not eye:
+            found["frames"] = [_agreement(*each) for each in zip(shown, a, b, strict=True)]
+    estimates = [image.provenance.estimate for image in images]
+    return {**found, "estimates": [each and {name: each.get(name) for name in STATED} for each in estimates]}
 
 
 def _agreement(shown: Any, a: Any, b: Any) -> float:
