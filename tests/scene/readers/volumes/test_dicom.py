@@ -174,6 +174,10 @@ def test_a_table_of_the_modality(tmp_path):
     pixels = np.tile([[0], [1], [2], [2]], (1, 5))
     save_slice(tmp_path / "a.dcm", pixels, ImagePositionPatient=[0, 0, 0], ModalityLUTSequence=[table], **plain)
     assert load_scene(tmp_path / "a.dcm").description.volume.grid[0, :, 0].tolist() == [100, 300, 200, 200]
+    for tag in ("LUTDescriptor", "LUTData"):  # as LEADTOOLS writes it
+        table[tag].value = None
+    save_slice(tmp_path / "a.dcm", pixels, ImagePositionPatient=[0, 0, 0], ModalityLUTSequence=[table], **plain)
+    assert load_scene(tmp_path / "a.dcm").description.volume.grid[0, :, 0].tolist() == [0, 1, 2, 2]
 
 
 @pytest.mark.parametrize("stored", [12, 16])

@@ -304,6 +304,7 @@ def _apply_modality(dataset: pydicom.Dataset, pixels: np.ndarray[Any, Any]) -> n
         padded = (pixels >= ends[0]) & (pixels <= ends[1])
         if padded.any() and not padded.all():
             pixels = np.where(padded, pixels[~padded].min(), pixels)
-    if _first(dataset, "ModalityLUTSequence") is not None:
+    table = _first(dataset, "ModalityLUTSequence")
+    if table is not None and table.get("LUTDescriptor") is not None:  # some programs write one without values
         pixels = pydicom.pixels.apply_modality_lut(pixels, dataset)
     return pixels
