@@ -47,6 +47,12 @@ def test_a_relative_preset_leaves_the_dark_out():
     assert 220 < high < 300
 
 
+def test_what_a_map_of_a_statistic_leaves_empty_is_left_out():
+    values = np.concatenate([np.zeros(6000), np.linspace(-6.0, 7.0, 5000)])
+    assert preset("grey", values).values[0] == 0.0
+    assert preset("grey", values[2000:]).values[0] < -1.0  # a field that has much of everything
+
+
 def written(tmp_path, text, name="a.toml"):
     (tmp_path / name).write_text(text)
     return tmp_path / name

@@ -118,6 +118,7 @@ def _range(values: Numbers) -> tuple[float, float]:
     """The lowest value that is shown, and that from which all are shown alike.
 
     Half-way from the lowest to where Otsu's threshold (1979) parts the dark from the bright; and all but outliers.
+    From 0, if the lowest is less and most are 0: maps of a statistic have it where nothing was measured.
     """
     lowest, highest = float(values.min()), float(np.quantile(values, _BRIGHTEST))
     if highest <= lowest:
@@ -135,5 +136,5 @@ def _range(values: Numbers) -> tuple[float, float]:
     apart = np.where(above > 0, apart, -1.0)
     # All thresholds in a gap part the values alike: the middle one.
     best = np.flatnonzero(apart >= apart.max() * (1.0 - 1e-9))
-    threshold = float(edges[1 + best].mean())
-    return (lowest + threshold) / 2.0, highest
+    low = (lowest + float(edges[1 + best].mean())) / 2.0
+    return (0.0 if low < 0.0 < highest and (values == 0.0).mean() > 0.5 else low), highest
