@@ -145,7 +145,7 @@ def test_an_unknown_display_suggests_a_known_one(lippmann, kept):
         (("--method", "guess"), "guess"),
         (("--depth", "0"), "--depth"),
         (("--memory", "lots"), "--memory"),
-        (("--memory", "1M"), "--memory"),
+        (("--memory", "1M"), "raise the limit, or give the output the ending .tif or .zarr"),
         (("--background", "1,2"), "--background"),
         (
             ("--background", "255,255,255"),

@@ -62,8 +62,10 @@ def test_depth_is_that_of_the_picture():
     assert foreseen.blur[1] == pytest.approx(abs(foreseen.depth_range[1]) / 24.0)
 
 
-def test_a_notebook_shows_a_table():
-    foreseen = lippmann.plan("teapot", SHEET, placement={"turn": 30, "place": "fit"}, spp=1)
+def test_a_notebook_shows_a_table(monkeypatch):
+    monkeypatch.setattr(forecast, "resident_memory", lambda: 0)
+    foreseen = lippmann.plan("teapot", SHEET, placement={"turn": 30, "place": "fit"}, spp=1, memory=16 << 20)
+    assert foreseen.memory == {"expected": 16 << 20, "limit": 16 << 20}
     # A pitch of 2 mm over a gap of 3 mm: 36.9 degrees, and tan 18.4 over tan 17.5 times as much in 35.
     assert foreseen.in_words()["resolved"].endswith(
         "in a view cone of 37 degrees (in 35, 1.1 times as much would fuse)"

@@ -209,7 +209,8 @@ def forecast(
             **{kind: round(frames * samples * share) for kind, share in probed.rays.items()},
         },
         memory={
-            "expected": resident_memory() + size[0] * size[1] * memory_model.PICTURE + _working_bytes(source, session),
+            "expected": resident_memory()
+            + min(size[0] * size[1] * memory_model.PICTURE + _working_bytes(source, session), session.memory),
             "limit": session.memory,
         },
         seconds=seconds,
@@ -342,4 +343,4 @@ def _working_bytes(source: DisplayRays | WindowRays, session: Session) -> int:
         kept = min(pixels * memory_model.batches(memory_model.MOST_BATCHES), max(0, left) // 2)
     if request.denoises:
         kept += min(pixels * memory_model.DENOISER, memory_model.NETWORK_MOST + pixels * 2 * memory_model.LAYERS)
-    return min(kept + wave, limit)
+    return kept + wave

@@ -13,7 +13,7 @@ from lippmann.cli.shared import options, standard_streams
 from lippmann.cli.shared.command_options import with_options
 from lippmann.cli.shared.console import Console, add_seconds, remarks, report
 from lippmann.cli.shared.scene_source import SceneSource, display_of, output_of, sheet_of
-from lippmann.errors import UsageError
+from lippmann.errors import MemoryLimitError, UsageError
 from lippmann.options.light import LightOptions
 from lippmann.options.outputs import AccessOptions, ClusterOptions, SequenceOptions
 from lippmann.options.placement import PlacementOptions
@@ -169,7 +169,12 @@ def _render_whole(
         check_folder_writable(maps)
     with console.progress() as progress:
         scene, load_seconds = source.load_timed()
-        image = render_one(scene, display, request, progress)
+        try:
+            image = render_one(scene, display, request, progress)
+        except MemoryLimitError as error:
+            if error.parameter == "memory" and output.suffix.lower() in (".png", ".exr"):
+                error.fix = f"{error.fix}, or give the output the ending .tif or .zarr, which is rendered in tiles"
+            raise
         progress(Progress("write", 0, 1))
         writing = time.perf_counter()
         image = _add_seconds(image, load=load_seconds)
