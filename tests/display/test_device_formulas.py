@@ -12,18 +12,18 @@ from lippmann.display import list_displays
 
 @pytest.fixture(scope="module")
 def device(engine):
-    """Double-precision device arrays: their type, and their operations."""
+    """Double-precision device arrays: their type, their operations, and displays of such numbers."""
     import mitsuba as mi
 
-    from lippmann.device.kernel_ops import DEVICE
+    from lippmann.device.kernel_ops import DEVICE, upload_display
 
-    return mi.Float64, DEVICE
+    return mi.Float64, DEVICE, upload_display
 
 
 def assert_same_on_device(display, device, seed):
     import drjit as dr
 
-    real, ops = device
+    real, ops, upload = device
     rng = np.random.default_rng(seed)
     width, height = display.panel.width, display.panel.height
     # Random points, pixel centres and pixel corners: ties must be decided alike.
@@ -33,7 +33,7 @@ def assert_same_on_device(display, device, seed):
     c = rng.integers(0, 3, len(u)).astype(float)
     point, z = rng.uniform(-5, 5, (2, len(u))), rng.uniform(-60, -0.1, len(u))
 
-    def evaluate(number, *ops):
+    def evaluate(display, number, *ops):
         x, y = display.panel_point(number(u), number(v))
         lens = display.lens_of(x, y, *ops)
         ray = display.light_ray(x, y, *ops)
@@ -46,7 +46,7 @@ def assert_same_on_device(display, device, seed):
             *display.pixel_coordinates(x, y),
         ]
 
-    here, there = evaluate(np.asarray), evaluate(real, ops)
+    here, there = evaluate(display, np.asarray), evaluate(upload(display), real, ops)
     assert all(type(array) is real for array in there)
     dr.eval(there)  # by one kernel, not one for each
     there = [np.broadcast_to(array.numpy(), u.shape) for array in there]

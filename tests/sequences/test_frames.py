@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lippmann import api
-from lippmann.display import load_display
+from lippmann.display import LensArray, Panel, load_display
 from lippmann.errors import SceneError, UsageError
 from lippmann.image import Provenance
 from lippmann.image.preview import Preview
@@ -163,7 +165,7 @@ def test_nothing_is_compiled_for_later_frames(engine, moving_ball, room, kind, m
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["display", "quilt"])
-def test_windows_of_any_size_share_kernels(engine, display, form, monkeypatch):
+def test_windows_of_any_size_and_displays_share_kernels(engine, display, form, monkeypatch):
     """What is traced of a frame is the part in which the scene can be seen, wider or narrower as it turns."""
     import drjit as dr
 
@@ -173,17 +175,26 @@ def test_windows_of_any_size_share_kernels(engine, display, form, monkeypatch):
         monkeypatch.setattr(module, "measure_compilation", lambda started: 0.0)
     motion = open_turntable(api.load_scene("teapot"), 48)
     options = {"integrator": "path", "spp": 2, "device": "cpu"}
+    other = replace(display, panel=Panel(140, 90, 0.15), lens_array=LensArray("lenticular", 1.04), gap=3.7)
     if form == "display":
-        frames = render_sequence(motion, display.resized(256, 256), [0, 4, 8], **options)
+        films = [
+            render_sequence(motion, display.resized(256, 256), [0, 8], **options),
+            render_sequence(motion, other, [0], **options),
+        ]
     else:
-        frames = render_quilt_sequence(motion, display, [0, 4, 8], views=(3, 1), size=(384, 256), **options)
+        films = [
+            render_quilt_sequence(motion, display, [0, 8], views=(3, 1), size=(384, 256), **options),
+            render_quilt_sequence(motion, other, [0], views=(2, 1), size=(256, 256), **options),
+        ]
     kernels, rays = [], []
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
-        for _ in range(3):
+        for film in films:
             dr.kernel_history_clear()
-            rays.append(next(frames)[1].provenance.rays["primary"])
-            kernels.append({kernel["hash"] for kernel in dr.kernel_history() if "hash" in kernel})
-    assert len(set(rays)) > 1
+            for _, picture in film:
+                rays.append(picture.provenance.rays["primary"])
+                kernels.append({kernel["hash"] for kernel in dr.kernel_history() if "hash" in kernel})
+                dr.kernel_history_clear()
+    assert len(set(rays)) == 3
     assert kernels[2]
     assert kernels[2] <= kernels[0] | kernels[1]
 

@@ -103,13 +103,12 @@ def test_tiles_have_the_samples_of_the_whole_picture(settings):
 def test_a_window_has_the_pixels_of_the_whole():
     from lippmann.display.panel import PixelWindow
     from lippmann.rendering.film.sample_batches import BatchedRender
-    from lippmann.rendering.transport.ray_source import WindowRays
     from lippmann.tiles.tile_render import prepare
 
     prepared = prepare(job(replace(DENOISED, denoise="none"), side=128))
     window = PixelWindow(40, 25, 48, 33)
     pictures = []
-    for source in (prepared.source, WindowRays(prepared.source, window)):
+    for source in (prepared.source, prepared.source.of_window(window)):
         batches = BatchedRender(prepared.integrator, source, memory=1 << 28)
         batches.add(2)
         pictures.append(batches.picture())

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import is_dataclass
-from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import drjit as dr
 import mitsuba as mi
@@ -25,7 +24,11 @@ from lippmann.color.transfer import (
     SRGB_THRESHOLD,
     Coding,
 )
-from lippmann.device.types import Array, Bool, Color3f, FloatOrColor, UInt32
+from lippmann.device.types import Array, Bool, Color3f, Float, FloatOrColor, UInt32
+from lippmann.display import Display
+from lippmann.display.distortion import Distortion
+
+T = TypeVar("T")
 
 
 def upload(values: NDArray[Any]) -> Array:
@@ -62,6 +65,20 @@ def divide(number: UInt32, by: UInt32 | int) -> tuple[UInt32, UInt32]:
     """Quotient and remainder of whole numbers, by one division."""
     quotient = number // by
     return quotient, number - quotient * by
+
+
+def transform_vector(matrix: NDArray[np.floating], vector: Array) -> list[Float]:
+    """A vector by the linear part of an affine map, ``(4, 4)`` or some of its first three rows.
+
+    Opaque to the compiler, as :func:`transform_point` is: all pictures share a kernel, wherever their display stands.
+    """
+    return [sum(dr.opaque(mi.Float, float(m)) * a for m, a in zip(row[:3], vector, strict=True)) for row in matrix[:3]]
+
+
+def transform_point(matrix: NDArray[np.floating], point: Array) -> list[Float]:
+    """A point by an affine map, ``(4, 4)`` or some of its first three rows."""
+    turned = transform_vector(matrix, point)
+    return [value + dr.opaque(mi.Float, float(offset)) for value, offset in zip(turned, matrix[:3, 3], strict=True)]
 
 
 def binary_search(first: int, last: int, goes_on: Callable[[UInt32], Bool]) -> UInt32:
@@ -144,16 +161,40 @@ class DeviceOps:
     def where(self, condition: Bool, a: Array, b: Array, /) -> Array:
         return dr.select(condition, a, b)
 
-    def interpolate(self, values: tuple[float, ...], at: Array, /) -> Array:
-        # A sum of bends, of literals alone: recorded kernels cannot read an array that is made in them.
-        steps = [after - before for before, after in pairwise(values)]
-        result = values[0] + steps[0] * at
-        for k, (before, after) in enumerate(pairwise(steps), 1):
-            result = dr.fma(after - before, dr.maximum(at - k, 0.0), result)
-        return result
+    def interpolate(self, values: Array, at: Array, /) -> Array:
+        table, first = mi.Float64(values), dr.minimum(dr.floor(at), len(values) - 2.0)
+        low, high = (dr.gather(mi.Float64, table, mi.UInt32(first) + k) for k in (0, 1))
+        return dr.fma(at - first, high - low, low)
 
 
 DEVICE = DeviceOps()
+
+
+def upload_display(display: Display) -> Display:
+    """The display for formulas on the device: its numbers are arrays of width 1, opaque to the compiler.
+
+    As Python numbers they would be literals of every kernel, and each display and size of panel would compile all of
+    them anew. Its layout, the number of its sub-pixel cells and which tables it has still decide what is compiled.
+    """
+    # Derived before the numbers are arrays.
+    _ = display.lattice.axis, display.distortion and display.distortion.inverse_factors
+    return _upload(display)
+
+
+def _upload(value: T) -> T:
+    """A value with arrays in place of the numbers in it, and of those that it has derived."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return cast("T", dr.opaque(mi.Float64, value))
+    if isinstance(value, tuple):
+        return cast("T", tuple(_upload(part) for part in value))
+    if not is_dataclass(value):
+        return value
+    twin = object.__new__(type(value))
+    for name, part in vars(value).items():
+        # Factors are read by their indices.
+        is_table = isinstance(value, Distortion) and isinstance(part, tuple)
+        vars(twin)[name] = mi.Float64(list(part)) if is_table else _upload(part)
+    return cast("T", twin)
 
 
 def encode(linear: Color3f, coding: Coding) -> Color3f:

@@ -36,8 +36,8 @@ class ArrayOps(Protocol):
 
     def where(self, condition: Array, a: Array, b: Array, /) -> Array: ...
 
-    def interpolate(self, values: tuple[float, ...], at: Array, /) -> Array:
-        """``values`` between their indices, linearly; ``at`` lies from 0 to the last index."""
+    def interpolate(self, values: Array, at: Array, /) -> Array:
+        """``values``, two or more numbers, between their indices, linearly; ``at`` lies from 0 to the last index."""
         ...
 
 
@@ -54,7 +54,7 @@ class _NumpyOps:
     where = staticmethod(np.where)
 
     @staticmethod
-    def interpolate(values: tuple[float, ...], at: Array, /) -> Array:
+    def interpolate(values: Array, at: Array, /) -> Array:
         return np.interp(at, np.arange(len(values)), values)
 
 

@@ -335,7 +335,7 @@ class Display:
             return 0.0, 0.0
         array, diameter = self.lens_array, self.lens.diameter
         if array.layout == "lenticular":
-            return self.lattice.from_axes((t - 0.5) * (diameter or array.pitch), 0.0)
+            return self.lattice.from_axes((t - 0.5) * (array.pitch if diameter is None else diameter), 0.0)
         if diameter is not None:
             return _disc_point(diameter * (t - 0.5), diameter * (s - 0.5), ops)
         # A rectangle as large as a cell, of which each point belongs to its nearest lens.

@@ -11,6 +11,7 @@ from lippmann.display.array_ops import NUMPY, Array, ArrayOps
 from lippmann.display.panel import Panel
 from lippmann.display.validation import finite, positive
 from lippmann.errors import DisplayError
+from lippmann.runtime.engine_lock import cached_property
 
 Layout = Literal["lenticular", "square", "hexagonal"]
 LAYOUTS: tuple[Layout, ...] = get_args(Layout)
@@ -149,29 +150,30 @@ class Lattice:
         """Whether all rows of pixels see the same lens geometry, as under upright cylinders."""
         return self.layout == "lenticular" and self.slant == 0.0
 
-    @property
-    def _axis(self) -> tuple[float, float]:
+    @cached_property
+    def axis(self) -> tuple[float, float]:
+        """Sine and cosine of the slant."""
         angle = math.radians(self.slant)
         return math.sin(angle), math.cos(angle)
 
     def across(self, x: Array, y: Array) -> Array:
         """Coordinate of a point across slanted lenses, in millimetres."""
-        sin, cos = self._axis
+        sin, cos = self.axis
         return x * cos - y * sin
 
     def along(self, x: Array, y: Array) -> Array:
         """Coordinate of a point along slanted lenses, in millimetres."""
-        sin, cos = self._axis
+        sin, cos = self.axis
         return x * sin + y * cos
 
     def from_axes(self, across: Array, along: Array) -> tuple[Array, Array]:
         """The point with these coordinates across and along slanted lenses."""
-        sin, cos = self._axis
+        sin, cos = self.axis
         return across * cos + along * sin, along * cos - across * sin
 
     def axis_at(self, i: Array, y: Array) -> Array:
         """The x at which the axis of the lenticular lens ``i`` passes the height ``y`` of the lens plane."""
-        sin, cos = self._axis
+        sin, cos = self.axis
         return (self.origin_x + i * self.pitch + y * sin) / cos
 
     def lens_at(self, x: Array, y: Array, ops: ArrayOps) -> tuple[Array, Array]:

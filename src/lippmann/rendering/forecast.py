@@ -33,7 +33,7 @@ from lippmann.wording import depths_in_words, duration_in_words, html_table, sam
 if TYPE_CHECKING:
     from lippmann.display.panel import PixelWindow
     from lippmann.rendering.transport.integrator import Integrator
-    from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
+    from lippmann.rendering.transport.ray_source import DisplayRays
 
 #: Seconds that the probe traces for, compiling aside.
 PROBE_SECONDS = 2.0
@@ -168,11 +168,10 @@ def forecast(
     placement = session.place(display)
 
     from lippmann.rendering.methods import Job
-    from lippmann.rendering.transport.ray_source import WindowRays
 
     whole = session.rays(display, placement)
     window = find_window(session, display, placement)
-    source = whole if window is None else WindowRays(whole, window)
+    source = whole if window is None else whole.of_window(window)
     probe = _Probe(source, request.seed)
     panels = size[0] * size[1] / (width * height)
     samples = round(panels * source.width * source.height) * request.channels * request.samples
@@ -223,7 +222,7 @@ def forecast(
 
 
 def _list_choices(
-    session: Session, integrator: Integrator, source: DisplayRays | WindowRays, window: PixelWindow | None
+    session: Session, integrator: Integrator, source: DisplayRays, window: PixelWindow | None
 ) -> dict[str, dict[str, object]]:
     """Values and reasons of all choices by name, with the pilot's, the traced window and the wavefronts."""
     request = session.request
@@ -256,7 +255,7 @@ class _ProbeResult:
 class _Probe:
     """Times the samples of randomly chosen pixels of a picture, in runs of neighbours."""
 
-    def __init__(self, source: DisplayRays | WindowRays, seed: int) -> None:
+    def __init__(self, source: DisplayRays, seed: int) -> None:
         from lippmann.rendering.transport.ray_source import ChosenRays
 
         run = min(16, source.width)
@@ -327,7 +326,7 @@ def _count_at(samples: int, counts: list[tuple[int, int]]) -> float:
     return below + (samples - low) * (above - below) / (high - low)
 
 
-def _working_bytes(source: DisplayRays | WindowRays, session: Session) -> int:
+def _working_bytes(source: DisplayRays, session: Session) -> int:
     """Peak bytes of batches, wavefront and denoiser, see :mod:`~lippmann.rendering.film.sample_batches`."""
     request, limit = session.request, session.memory
     pixels = source.width * source.height * (3 if request.keeps_colors(source.display) else 1)

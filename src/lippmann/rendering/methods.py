@@ -11,7 +11,6 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.display import Display
 from lippmann.display.panel import PixelWindow
 from lippmann.options.choices import Method
 from lippmann.progress import ProgressCallback
@@ -31,7 +30,7 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.request.tuning import TUNING as REQUEST
 from lippmann.rendering.session import Session, read_choices
 from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator
-from lippmann.rendering.transport.ray_source import DisplayRays, OnePicture, QuiltRays, SubpixelRays, WindowRays
+from lippmann.rendering.transport.ray_source import DisplayRays, OnePicture, QuiltRays, SubpixelRays
 
 Floats = NDArray[np.float32]
 
@@ -75,7 +74,7 @@ class Job:
     def sample_source(self) -> OnePicture | QuiltRays:
         """The source whose samples are summed; for sub-pixels that are denoised, one that keeps all colours."""
         source = self.source
-        if not isinstance(source, DisplayRays | WindowRays) or not self.request.keeps_colors(source.display):
+        if not isinstance(source, DisplayRays) or not self.request.keeps_colors(source.display):
             return source
         return SubpixelRays(source)
 
@@ -277,16 +276,13 @@ def _make_denoised(job: Job, batches: BatchedRender, denoiser: GuidedDenoiser) -
 def _make_estimator(job: Job) -> PictureEstimator:
     """The error estimator of the picture, by micro-image for a display and by view for a quilt."""
     source = job.source
-    parts: Display | Parts
     if isinstance(source, QuiltRays):
         window, (width, height) = source.window, source.view_size
         known = width * height - window.pixels
         parts = Parts.views(source.columns, source.rows, (window.width, window.height), known)
-    elif isinstance(source, WindowRays):
-        parts = Parts.micro_images(source.display, source.window)
     else:
         assert isinstance(source, DisplayRays)
-        parts = source.display
+        parts = Parts.micro_images(source.display, source.window)
     return PictureEstimator(parts, is_among_mirrors(read_choices(job.integrator)))
 
 

@@ -64,13 +64,12 @@ def render_picture(
     from lippmann.image.integral_image import IntegralImage
     from lippmann.rendering.film.aov import plan_layers, trace_layers
     from lippmann.rendering.methods import Job, trace
-    from lippmann.rendering.transport.ray_source import WindowRays
 
     display_from_world = placement.display_from_world
     source = session.rays(display, placement)
     integrator = session.integrator(source, display_from_world, placement.exposure)
     window = find_window(session, display, placement)
-    part = source if window is None else WindowRays(source, window)
+    part = source if window is None else source.of_window(window)
 
     traced = trace(Job(session, integrator, part, display_from_world))
     frame = traced.frame

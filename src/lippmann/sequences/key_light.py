@@ -115,16 +115,14 @@ def light_of(job: Job) -> PreparedLight | None:
 def _find_views(job: Job) -> NearbyViews | None:
     """The views of a job's picture; None of micro-lens arrays whose sub-pixels have rays of their own."""
     from lippmann.display.nearby_views import CameraViews, LensViews
-    from lippmann.display.panel import PixelWindow
-    from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, WindowRays
+    from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays
 
     source = job.source
     if isinstance(source, QuiltRays):
         return CameraViews(source.display, source.columns, source.rows, source.view_size, source.window)
-    if not isinstance(source, DisplayRays | WindowRays) or job.sample_source.channels > 1:
+    if not isinstance(source, DisplayRays) or job.sample_source.channels > 1:
         return None
-    whole = PixelWindow(0, 0, source.width, source.height)
-    return LensViews(source.display, source.window if isinstance(source, WindowRays) else whole)
+    return LensViews(source.display, source.window)
 
 
 def count_columns(job: Job) -> int:

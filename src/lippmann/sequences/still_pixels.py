@@ -130,12 +130,12 @@ class StillPixels(KeyLight):
 
 def _find_window(job: Job) -> PixelWindow | None:
     """The window that a picture shows; None of those whose pixels have several sets of rays, or that have photons."""
-    from lippmann.rendering.transport.ray_source import QuiltRays, WindowRays
+    from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays
 
     light, source = light_of(job), job.source
     if light is None or light.photons is not None or job.sample_source.channels > 1:
         return None
-    if isinstance(source, QuiltRays | WindowRays):
+    if isinstance(source, DisplayRays | QuiltRays):
         return source.window
     return PixelWindow(0, 0, source.width, source.height)
 

@@ -23,7 +23,7 @@ from lippmann.rendering.methods import SAMPLES_LAYER, Job, trace
 from lippmann.rendering.request.preconditions import explain_missing_estimate
 from lippmann.rendering.session import Session, Stopwatch, open_session
 from lippmann.rendering.transport.integrator import Integrator
-from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
+from lippmann.rendering.transport.ray_source import DisplayRays
 from lippmann.runtime import engine as engines
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.placement import Placement
@@ -147,7 +147,7 @@ def _trace_window(prepared: Prepared, index: int) -> TracedTile:
         Job(
             prepared.session,
             prepared.integrator,
-            WindowRays(prepared.source, window),
+            prepared.source.of_window(window),
             prepared.placement.display_from_world,
             is_part=job.request.denoises,
         )

@@ -28,10 +28,10 @@ def integrator(engine):
 
 
 def rays(window=None, display=SHEET):
-    from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
+    from lippmann.rendering.transport.ray_source import DisplayRays
 
     whole = DisplayRays(display, np.diag([0.08, 0.08, 0.08, 1.0]), subpixels=True)
-    return whole if window is None else WindowRays(whole, window)
+    return whole if window is None else whole.of_window(window)
 
 
 @pytest.mark.slow

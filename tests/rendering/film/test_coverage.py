@@ -36,10 +36,10 @@ def session(engine):
 
 
 def rays(subpixels=False, window=None):
-    from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
+    from lippmann.rendering.transport.ray_source import DisplayRays
 
     whole = DisplayRays(SHEET, np.diag([0.12, 0.12, 0.12, 1.0]), subpixels=subpixels)
-    return whole if window is None else WindowRays(whole, window)
+    return whole if window is None else whole.of_window(window)
 
 
 def batches(session, source, samples, seed=3, window=None, for_denoiser=True):

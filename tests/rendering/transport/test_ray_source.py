@@ -49,7 +49,7 @@ def test_device_rays_equal_numpy_rays(display, subpixels):
     ray = source.rays(mi.UInt32(column), mi.UInt32(row), mi.UInt32(channel), mi.Point2f(jitter))
     dr.eval(ray.o, ray.d)  # by one kernel
 
-    u, v = column + jitter[0].astype(float), row + jitter[1].astype(float)
+    u, v = column + (0.5 if display.stereo else jitter[0].astype(float)), row + jitter[1].astype(float)
     if subpixels:
         u = column + 0.5 + (jitter[0].astype(float) - 0.5) / 3
         x, y = display.subpixel_point(u, v, channel)

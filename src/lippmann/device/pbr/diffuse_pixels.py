@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Coding
-from lippmann.device.kernel_ops import DEVICE, divide, encode, upload
+from lippmann.device.kernel_ops import DEVICE, divide, encode, transform_point, transform_vector, upload
 from lippmann.device.types import Array, Bool, Float, MitsubaScene, Normal3f, Point2f, Point3f, Ray3f, UInt32, Vector4f
 from lippmann.display.nearby_views import NearbyViews
 from lippmann.scene.matrices import inverse, rotation_of
@@ -85,13 +85,13 @@ class DiffusePixels:
 
     def point(self, pixel: UInt32, ray: Ray3f) -> Point3f:
         """The world-space points that pixels show."""
-        origin, direction = (_turn(self.frame_from_world[2:3], part)[0] for part in (ray.o, ray.d))
+        origin, direction = (transform_vector(self.frame_from_world[2:3], part)[0] for part in (ray.o, ray.d))
         offset = dr.opaque(mi.Float, self.frame_from_world[2, 3])
         return ray((dr.gather(mi.Float, self._height, pixel) - offset - origin) / direction)
 
     def normal(self, pixel: UInt32) -> Normal3f:
         """Mean normals of pixels in world space, at most of length 1."""
-        return mi.Normal3f(*_turn(self._rotation[:, :3], dr.gather(mi.Normal3f, self._normal, pixel)))
+        return mi.Normal3f(*transform_vector(self._rotation, dr.gather(mi.Normal3f, self._normal, pixel)))
 
     def albedo(self, pixel: UInt32) -> Array:
         """Albedo of pixels."""
@@ -134,7 +134,9 @@ class KeyPicture:
         pixel = dr.arange(mi.UInt32, colors.shape[0] * colors.shape[1])
         ray, normal = pixels.ray(pixel), pixels.normal(pixel)
         point = pixels.point(pixel, ray)
-        is_diffuse = pixels.is_diffuse(ray, normal, point, self._find_off_plane(_move(self._to_frame, point)[2]))
+        is_diffuse = pixels.is_diffuse(
+            ray, normal, point, self._find_off_plane(transform_point(self._to_frame, point)[2])
+        )
         # No normal of a surface is like the zero of pixels that show no diffuse surface.
         normal = dr.select(is_diffuse, dr.normalize(normal), 0)
         self._planes = dr.ravel(mi.Vector4f(*normal, dr.dot(normal, point)))
@@ -145,11 +147,11 @@ class KeyPicture:
         ray, normal = others.ray(pixel), others.normal(pixel)
         point, albedo = others.point(pixel, ray), others.albedo(pixel)
         to_key = self._to_frame
-        in_key = [mi.Float64(value) for value in _move(to_key, point)]
+        in_key = [mi.Float64(value) for value in transform_point(to_key, point)]
         off_plane = self._find_off_plane(mi.Float(in_key[2]))
         is_known = others.is_diffuse(ray, normal, point, off_plane)
         normal = dr.normalize(normal)
-        origin, direction = _move(to_key, ray.o), _turn(to_key[:3, :3], ray.d)
+        origin, direction = transform_point(to_key, ray.o), transform_vector(to_key, ray.d)
         slopes = [mi.Float64(direction[axis] / -direction[2]) for axis in (0, 1)]
         x, y = (mi.Float64(origin[axis]) + mi.Float64(origin[2]) * slopes[axis] for axis in (0, 1))
         phase = others.place(pixel)[0] % self._step if self._step > 1 else mi.UInt32(0)
@@ -211,14 +213,3 @@ class KeyPicture:
             light += weight * own_light
             albedo += weight * own_albedo
         return active & (total > 0), light / dr.maximum(albedo, 1e-6), least, most
-
-
-def _turn(rows: Matrix, vector: Array) -> list[Float]:
-    """A vector by the rows of a matrix, which are opaque to the compiler: all pictures share a kernel."""
-    return [sum(dr.opaque(mi.Float, float(m)) * a for m, a in zip(row[:3], vector, strict=True)) for row in rows]
-
-
-def _move(matrix: Matrix, point: Point3f) -> list[Float]:
-    """A point by an affine map."""
-    turned = _turn(matrix[:3, :3], point)
-    return [value + dr.opaque(mi.Float, float(offset)) for value, offset in zip(turned, matrix[:3, 3], strict=True)]

@@ -25,7 +25,7 @@ from lippmann.rendering.request.tuning import TUNING as REQUEST
 from lippmann.rendering.sharing.cross_lens import share_light
 from lippmann.rendering.sharing.cross_view import share_views
 from lippmann.rendering.sharing.tuning import TUNING as SHARING
-from lippmann.rendering.transport.ray_source import DisplayRays, OnePicture, QuiltRays, SubpixelRays, WindowRays
+from lippmann.rendering.transport.ray_source import DisplayRays, OnePicture, QuiltRays, SubpixelRays
 
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
@@ -124,13 +124,12 @@ class GuidedDenoiser:
     def _share(self, clean: Floats) -> Floats:
         """A denoised picture with the light shared between its micro-images."""
         source = self._source
-        assert isinstance(source, DisplayRays | WindowRays | SubpixelRays)
+        assert isinstance(source, DisplayRays | SubpixelRays)
         if self._lenses is None:
-            window = None if isinstance(source, DisplayRays) else source.window
             if isinstance(source, SubpixelRays):
-                self._lenses = lens_numbers_in_full_color(source.display, window)
+                self._lenses = lens_numbers_in_full_color(source.display, source.window)
             else:
-                self._lenses = lens_numbers(source.display, window, subpixels=source.channels == 3)
+                self._lenses = lens_numbers(source.display, source.window, subpixels=source.channels == 3)
         display, columns = source.display, 3 if isinstance(source, SubpixelRays) else 1
         return share_light(
             clean,

@@ -13,13 +13,12 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.kernel_ops import divide, to_numpy
+from lippmann.device.kernel_ops import divide, to_numpy, transform_point, transform_vector
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.memory_model import LAYERS as BYTES
 from lippmann.rendering.film.memory_model import Plan, Tile, cut_wavefronts
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import RaySource
-from lippmann.rendering.transport.surface_property import transform_vector
 from lippmann.scene.matrices import normal_matrix
 
 if TYPE_CHECKING:
@@ -93,14 +92,14 @@ def _trace_tile(
     surfaces: Surfaces, source: RaySource, tile: Tile, width: int, display_from_world: NDArray[np.float64]
 ) -> dict[str, FloatArray]:
     lanes = tile.rows * width
-    row, column = divide(dr.arange(mi.UInt32, lanes), width)
     # Opaque, so that one kernel serves all tiles.
+    row, column = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, width))
     row += dr.opaque(mi.UInt32, tile.first_row)
     ray = source.rays(column, row, mi.UInt32(1), mi.Point2f(0.5))  # the sub-pixel in the middle
     surface = surfaces.first_hit(ray)
-    position = transform_vector(display_from_world, surface.p) + mi.Vector3f(*display_from_world[:3, 3].tolist())
+    position = mi.Vector3f(transform_point(display_from_world, surface.p))
     position = dr.select(surface.hit, position, dr.nan)
-    normal = transform_vector(normal_matrix(display_from_world), surface.n)
+    normal = mi.Vector3f(transform_vector(normal_matrix(display_from_world), surface.n))
     values = {
         "depth": dr.select(surface.hit, position.z, -dr.inf),
         "normal": dr.select(surface.hit, dr.normalize(normal), 0),

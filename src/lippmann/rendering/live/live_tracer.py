@@ -120,7 +120,7 @@ class _PixelTracer:
 
     def __init__(self, display: Display, reads: object, subpixels: bool, box_filter: bool) -> None:
         self._source, self._box_filter = DisplayRays(display, np.eye(4), subpixels), box_filter
-        self.kernel = Frozen(self._sample_pixels, reads, changes=True)
+        self.kernel = Frozen(self._sample_pixels, [reads, self._source], changes=True)
         # In scenes of several emitters the first launches change the layout of arrays on the device.
         lanes = Lanes(window_pixels(display, PixelWindow(0, 0, 1, 1), subpixels=False), slice(None))
         for _ in range(_WARMING_LAUNCHES):
@@ -142,7 +142,7 @@ class _PixelTracer:
         rows: Rows,
         height_row: list[Float],
     ) -> tuple[Array, ...]:
-        number = (row * self._source.width + column) * self._source.channels + channel
+        number = self._source.number(column, row) * self._source.channels + channel
         stream = SampleStream.of_pixels(number, sample, seed, stream_of)
         jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
         ray = world_ray_by(rows, *self._source.light_rays(column, row, channel, jitter))

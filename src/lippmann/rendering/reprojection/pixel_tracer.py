@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.frozen_kernel import Frozen, align
-from lippmann.device.kernel_ops import divide
+from lippmann.device.kernel_ops import divide, transform_point
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Array, Float, Ray3f, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
@@ -54,9 +54,9 @@ class PixelTracer:
         self._samples = samples
         self._box_filter = box_filter
         self._pixels_per_call = max(1, most_lanes // samples)
-        self._height_row = np.asarray(display_from_world, dtype=np.float64)[2].tolist()
+        self._z_from_world = np.asarray(display_from_world, dtype=np.float64)[2:3]
         self._seed = dr.opaque(mi.UInt32, seed)
-        self._kernel = Frozen(self._sample, integrator)
+        self._kernel = Frozen(self._sample, [integrator, source])
         self.rays = RayTotals()
         self.seconds_compile = 0.0
         self.seconds_trace = 0.0
@@ -95,7 +95,7 @@ class PixelTracer:
         return tuple(np.asarray(part) for part in (*radiance, disparity, fragile))
 
     def _sample(self, pixel: UInt32, sample: UInt32, seed: UInt32) -> tuple[Array, ...]:
-        row, column = divide(pixel, self._source.width)
+        row, column = divide(pixel, mi.UInt32(self._source.uploaded.panel.width))
         number, of_stream = divide(sample, STREAMS)
         stream = SampleStream.of_pixels(pixel, number, seed, of_stream)
         ray = PixelRays(self._source, column, row, mi.UInt32(0), self._box_filter).ray(stream)
@@ -115,10 +115,9 @@ class PixelTracer:
         """Gap over the height of the point at ``distance`` along ``ray``."""
         hit = dr.isfinite(distance)
         p = ray(dr.select(hit, distance, 0))
-        a, b, c, d = self._height_row
-        z = a * p.x + b * p.y + c * p.z + d
+        (z,) = transform_point(self._z_from_world, p)
         z = dr.copysign(dr.maximum(dr.abs(z), 1e-6), z)  # heights of at least a nanometre keep disparities finite
-        return dr.select(hit, self._source.display.gap / z, BACKGROUND)
+        return dr.select(hit, mi.Float(self._source.uploaded.gap) / z, BACKGROUND)
 
 
 def _total(counts: IntArray) -> int:

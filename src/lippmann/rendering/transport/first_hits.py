@@ -14,6 +14,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import to_numpy
 from lippmann.device.pbr import BuiltScene
 from lippmann.display import Display
 from lippmann.display.view_cone import visible_size, zone_slopes
@@ -62,13 +63,14 @@ def first_hits(
     ``origins`` and ``directions`` are ``(..., 3)``, of shapes that broadcast to n rays.
     """
     origin, direction = (
-        tuple(mi.Float64(np.ascontiguousarray(axis)) for axis in values.reshape(-1, 3).T)
+        # By way of lists: arrays would be read where they lie, by a kernel for each alignment that they may have.
+        tuple(mi.Float64(axis) for axis in values.reshape(-1, 3).T.tolist())
         for values in np.broadcast_arrays(origins, directions)
     )
     hit, point = make_surfaces(built).first_point(world_ray(world_from_frame, origin, direction))
     point = dr.select(hit, point, 0)
     dr.eval(hit, point)
-    return np.array(hit, dtype=bool), np.array(point, dtype=np.float64).T
+    return np.array(hit, dtype=bool), to_numpy(point, len(hit)).astype(np.float64)
 
 
 SIDES = ("left", "right", "bottom", "top")

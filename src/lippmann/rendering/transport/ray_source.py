@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.kernel_ops import DEVICE
+from lippmann.device.kernel_ops import DEVICE, divide, upload_display
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
 from lippmann.device.types import Float64, Point2f, Ray3f, UInt32
 from lippmann.display import Display
@@ -51,7 +51,7 @@ class RaySource(Protocol):
 
         So a pixel has the same samples whichever part of the picture is rendered.
         """
-        return row * self.width + column
+        return row * dr.opaque(mi.UInt32, self.width) + column
 
 
 class PixelRays:
@@ -88,7 +88,7 @@ class OnePicture(RaySource):
 
 
 class DisplayRays(OnePicture):
-    """Rays along the light lines of a display's pixels or sub-pixels.
+    """Rays along the light lines of the pixels or sub-pixels of a display, or of a window of them.
 
     The samples of a pixel fill its square. Those of a sub-pixel fill a third of its width about the sub-pixel's own
     place. Before lenses with a profile they also fill the aperture of the lens, in parallel.
@@ -101,50 +101,51 @@ class DisplayRays(OnePicture):
         ``(4, 4)``, an affine map from the display's frame (mm) to the world.
     subpixels:
         Whether each colour has its own rays.
+    window:
+        The pixels, all by default. They have the random numbers of the whole picture.
     """
 
-    def __init__(self, display: Display, world_from_display: Matrix, subpixels: bool = False) -> None:
+    def __init__(
+        self,
+        display: Display,
+        world_from_display: Matrix,
+        subpixels: bool = False,
+        window: PixelWindow | None = None,
+    ) -> None:
         self.display = display
-        self.width = display.panel.width
-        self.height = display.panel.height
+        self.window = window or PixelWindow(0, 0, display.panel.width, display.panel.height)
+        #: The display on the device, for whatever reads its numbers in kernels.
+        self.uploaded = upload_display(display)
+        self.width, self.height = self.window.width, self.window.height
+        self._left, self._top = (dr.opaque(mi.UInt32, first) for first in (self.window.left, self.window.top))
         self.channels = 3 if subpixels else 1
         self.world_from_display = np.asarray(world_from_display, dtype=np.float64)
 
-    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
-        return world_ray(self.world_from_display, *self.light_rays(column, row, channel, jitter))
-
-    def light_rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> tuple[Triple, Triple]:
-        """Origins and unit directions of :meth:`rays` in the display's frame, mm."""
-        u = mi.Float64(column) + (0.5 if self.display.stereo else mi.Float64(jitter.x))
-        v = mi.Float64(row) + mi.Float64(jitter.y)
-        if self.channels == 3:
-            u = mi.Float64(column) + 0.5 + (mi.Float64(jitter.x) - 0.5) / 3
-            x, y = self.display.subpixel_point(u, v, mi.Float64(channel), DEVICE)
-        else:
-            x, y = self.display.panel_point(u, v)
-        (ox, oy, oz), direction = self.display.light_ray(x, y, DEVICE)
-        aside_x, aside_y = self.display.aperture_point(mi.Float64(jitter.x), mi.Float64(jitter.y), DEVICE)
-        return (ox + aside_x, oy + aside_y, oz), direction
-
-
-class WindowRays(OnePicture):
-    """Rays of a window of a display's pixels, with the random numbers of the whole picture."""
-
-    def __init__(self, source: DisplayRays, window: PixelWindow) -> None:
-        self.display = source.display
-        self.world_from_display = source.world_from_display
-        self.window = window
-        self.width, self.height, self.channels = window.width, window.height, source.channels
-        self._source = source
-        # Opaque to the compiler, so that all windows share a kernel.
-        self._left, self._top = (dr.opaque(mi.UInt32, first) for first in (window.left, window.top))
-
-    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
-        return self._source.rays(column + self._left, row + self._top, channel, jitter)
+    def of_window(self, window: PixelWindow) -> DisplayRays:
+        """The rays of a window of the display's pixels."""
+        return DisplayRays(self.display, self.world_from_display, self.channels == 3, window)
 
     def number(self, column: UInt32, row: UInt32) -> UInt32:
         """Index of pixels in the whole picture, row by row."""
-        return (row + self._top) * self._source.width + (column + self._left)
+        return (row + self._top) * mi.UInt32(self.uploaded.panel.width) + (column + self._left)
+
+    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
+        lines = self.light_rays(column + self._left, row + self._top, channel, jitter)
+        return world_ray(self.world_from_display, *lines)
+
+    def light_rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> tuple[Triple, Triple]:
+        """Origins and unit directions of :meth:`rays` in the display's frame, mm, by the panel's columns and rows."""
+        display = self.uploaded
+        u = mi.Float64(column) + (0.5 if display.stereo else mi.Float64(jitter.x))
+        v = mi.Float64(row) + mi.Float64(jitter.y)
+        if self.channels == 3:
+            u = mi.Float64(column) + 0.5 + (mi.Float64(jitter.x) - 0.5) / 3
+            x, y = display.subpixel_point(u, v, mi.Float64(channel), DEVICE)
+        else:
+            x, y = display.panel_point(u, v)
+        (ox, oy, oz), direction = display.light_ray(x, y, DEVICE)
+        aside_x, aside_y = display.aperture_point(mi.Float64(jitter.x), mi.Float64(jitter.y), DEVICE)
+        return (ox + aside_x, oy + aside_y, oz), direction
 
 
 class ChosenRays(OnePicture):
@@ -216,9 +217,9 @@ class SubpixelRays(OnePicture):
 
     channels = 1
 
-    def __init__(self, source: DisplayRays | WindowRays) -> None:
+    def __init__(self, source: DisplayRays) -> None:
         self.display = source.display
-        self.window = source.window if isinstance(source, WindowRays) else None
+        self.window = source.window
         self.width, self.height = 3 * source.width, source.height
         self._source = source
         #: Colours of the sub-pixels from left to right.
@@ -247,7 +248,7 @@ class SubpixelRays(OnePicture):
         return pixel, mi.UInt32(color)
 
 
-class QuiltRays:
+class QuiltRays(RaySource):
     """Rays of a quilt: views of cameras side by side in front of a lenticular display, each in a tile of the picture.
 
     Camera k of N = ``columns * rows`` stands at the viewing distance D, level with the centre of the display, at
@@ -289,13 +290,6 @@ class QuiltRays:
         self.width = columns * self.window.width
         self.height = rows * self.window.height
         self.world_from_display = np.asarray(world_from_display, dtype=np.float64)
-        # Opaque to the compiler, so that windows of all sizes share a kernel.
-        self._width, self._height = (dr.opaque(mi.UInt32, side) for side in (self.window.width, self.window.height))
-        self._left, self._top = (dr.opaque(mi.Float64, first) for first in (self.window.left, self.window.top))
-
-    def number(self, column: UInt32, row: UInt32) -> UInt32:
-        """Index of pixels in the traced picture, row by row."""
-        return row * (self.columns * self._width) + column
 
     @property
     def views(self) -> int:
@@ -312,19 +306,18 @@ class QuiltRays:
 
     def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
         del channel
-        width, height = self._width, self._height
-        right, above = column // width, self.rows - 1 - row // height
-        view = mi.Float64(above * self.columns + right)
-        panel_width, panel_height = self.display.size_mm
-        u = mi.Float64(column - right * width) + mi.Float64(jitter.x)
-        v = mi.Float64(row - row // height * height) + mi.Float64(jitter.y)
-        x = ((self._left + u) / self.view_size[0] - 0.5) * panel_width
-        y = (0.5 - (self._top + v) / self.view_size[1]) * panel_height
-        convergence = 1 / self.display.viewing_distance
-        side = ((2 * view + 1) / self.views - 1) * cone_tangent(self.display)
+        display, window = self.display, self.window
+        right, column = divide(column, dr.opaque(mi.UInt32, window.width))
+        below, row = divide(row, dr.opaque(mi.UInt32, window.height))
+        (columns, rows), (left, top) = opaque(self.columns, self.rows), opaque(window.left, window.top)
+        view = (rows - 1 - mi.Float64(below)) * columns + mi.Float64(right)
+        u, v = mi.Float64(column) + mi.Float64(jitter.x), mi.Float64(row) + mi.Float64(jitter.y)
+        (view_width, view_height), (width, height) = opaque(*self.view_size), opaque(*display.size_mm)
+        x, y = ((left + u) / view_width - 0.5) * width, (0.5 - (top + v) / view_height) * height
+        convergence, aperture = opaque(1 / display.viewing_distance, display.aperture_distance)
+        side = ((2 * view + 1) / (columns * rows) - 1) * dr.opaque(mi.Float64, cone_tangent(display))
         slope_x, slope_y = x * convergence - side, y * convergence
-        aperture = self.display.aperture_distance
-        origin = (x - slope_x * aperture, y - slope_y * aperture, dr.full(mi.Float64, aperture, dr.width(x)))
+        origin = x - slope_x * aperture, y - slope_y * aperture, aperture
         return world_ray(self.world_from_display, origin, (slope_x, slope_y, dr.full(mi.Float64, -1, dr.width(x))))
 
 
@@ -339,16 +332,17 @@ class CameraRays(OnePicture):
 
     def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
         del channel
-        x = (mi.Float64(column) + mi.Float64(jitter.x)) * (2 / self.height) - self.width / self.height
-        y = 1 - (mi.Float64(row) + mi.Float64(jitter.y)) * (2 / self.height)
+        camera = self.camera
+        half_size = np.tan(camera.fov_y / 2) if camera.fov_y is not None else (camera.height or 2.0) / 2
+        step, aspect, right, up, half = opaque(2 / self.height, self.width / self.height, *camera.shift, half_size)
+        x = (mi.Float64(column) + mi.Float64(jitter.x)) * step - aspect
+        y = 1 - (mi.Float64(row) + mi.Float64(jitter.y)) * step
         zero = dr.zeros(mi.Float64, dr.width(x))
-        right, up = self.camera.shift
-        if self.camera.fov_y is not None:
-            slope = float(np.tan(self.camera.fov_y / 2))
-            origin, direction = (zero, zero, zero), (x * slope + right, y * slope + up, zero - 1)
+        place = x * half + right, y * half + up
+        if camera.fov_y is not None:
+            origin, direction = (zero, zero, zero), (*place, zero - 1)
         else:
-            half = (self.camera.height or 2.0) / 2
-            origin, direction = (x * half + right, y * half + up, zero), (zero, zero, zero - 1)
+            origin, direction = (*place, zero), (zero, zero, zero - 1)
         return world_ray(_without_scale(self.camera.world_from_camera), origin, direction)
 
 
@@ -367,12 +361,17 @@ def world_ray(matrix: Matrix, origin: Triple, direction: Triple) -> Ray3f:
     return world_ray_by(opaque_rows(matrix), origin, direction)
 
 
+def opaque(*values: float) -> list[Float64]:
+    """Numbers on the device, opaque to the compiler: kernels do not hold them as literals."""
+    return [dr.opaque(mi.Float64, value) for value in values]
+
+
 def opaque_rows(matrix: Matrix) -> list[list[Float64]]:
     """The first three rows of a matrix ``(4, 4)`` on the device.
 
     Opaque to the compiler, so that a display that moves from frame to frame keeps its kernel.
     """
-    return [[dr.opaque(mi.Float64, value) for value in row] for row in np.asarray(matrix)[:3].tolist()]
+    return [opaque(*row) for row in np.asarray(matrix)[:3].tolist()]
 
 
 def world_ray_by(rows: list[list[Float64]], origin: Triple, direction: Triple) -> Ray3f:

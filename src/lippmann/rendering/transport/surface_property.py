@@ -7,8 +7,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import transform_point, transform_vector
 from lippmann.device.sobol import SampleStream
-from lippmann.device.types import Bool, Color3f, MitsubaScene, Ray3f, Vector3f
+from lippmann.device.types import Bool, Color3f, MitsubaScene, Ray3f
 from lippmann.rendering.transport.integrator import RayCounts
 from lippmann.scene.matrices import normal_matrix
 
@@ -42,15 +43,9 @@ class SurfaceIntegrator:
         if self.name == "albedo":
             value = mi.Color3f(si.bsdf(ray).eval_diffuse_reflectance(si, hit))
         elif self.name == "normal":
-            value = mi.Color3f(dr.normalize(transform_vector(normal_matrix(self._matrix), si.sh_frame.n)))
+            value = mi.Color3f(dr.normalize(mi.Vector3f(transform_vector(normal_matrix(self._matrix), si.sh_frame.n))))
         else:
-            point = transform_vector(self._matrix, si.p) + mi.Vector3f(self._matrix[:3, 3].tolist())
-            value = mi.Color3f(point) if self.name == "position" else mi.Color3f(point.z)
+            point = transform_point(self._matrix, si.p)
+            value = mi.Color3f(point if self.name == "position" else point[2])
         none = dr.zeros(mi.UInt32, dr.width(si.t))
         return dr.select(hit, value, mi.Color3f(0)), RayCounts(none, none)
-
-
-def transform_vector(matrix: NDArray[np.float64], vector: Vector3f) -> Vector3f:
-    """Transform a vector on the device by the linear part ``(3, 3)`` of ``matrix``."""
-    rows = matrix[:3, :3].tolist()
-    return mi.Vector3f(*(row[0] * vector.x + row[1] * vector.y + row[2] * vector.z for row in rows))

@@ -7,7 +7,7 @@ import mitsuba as mi
 
 from lippmann.device.sobol import hash32
 from lippmann.device.types import Float64, Point2f, Ray3f, UInt32, Vector3d
-from lippmann.rendering.transport.ray_source import OnePicture
+from lippmann.rendering.transport.ray_source import OnePicture, opaque
 from lippmann.scene.values.whitted_scene import ClassicCamera, Handedness
 
 
@@ -38,12 +38,13 @@ class WhittedCameraRays(OnePicture):
         """As :meth:`~lippmann.rendering.transport.ray_source.RaySource.rays`."""
         del channel
         camera = self.camera
-        left, right, bottom, top = camera.window(self.width, self.height)
+        left, right, bottom, top = opaque(*camera.window(self.width, self.height))
+        width, height, aperture = opaque(self.width, self.height, camera.aperture)
         shift = (0.5, -0.5) if camera.pixel_point == "upper-right" else (0.0, 0.0)
-        x = left + (mi.Float64(column) + mi.Float64(jitter.x) + shift[0]) * ((right - left) / self.width)
-        y = top - (mi.Float64(row) + mi.Float64(jitter.y) + shift[1]) * ((top - bottom) / self.height)
-        across, up, view = (mi.Vector3d(*axis.tolist()) for axis in camera.frame())
-        o = mi.Vector3d(*camera.center) + mi.Vector3d(dr.zeros(mi.Float64, dr.width(x)))
+        x = left + (mi.Float64(column) + mi.Float64(jitter.x) + shift[0]) * ((right - left) / width)
+        y = top - (mi.Float64(row) + mi.Float64(jitter.y) + shift[1]) * ((top - bottom) / height)
+        center, across, up, view = (mi.Vector3d(opaque(*axis)) for axis in (camera.center, *camera.frame()))
+        o = center + mi.Vector3d(dr.zeros(mi.Float64, dr.width(x)))
         if camera.projection == "orthographic":
             o += across * x + up * y
             d = view + mi.Vector3d(dr.zeros(mi.Float64, dr.width(x)))
@@ -51,7 +52,7 @@ class WhittedCameraRays(OnePicture):
             d = (view * dr.cos(x) + across * dr.sin(x)) * dr.cos(y) + up * dr.sin(y)
         elif camera.projection == "perspective-dof":
             a, b = _lens_point(column, row, jitter)
-            x0, y0 = a * (camera.aperture * (right - left)), b * (camera.aperture * (top - bottom))
+            x0, y0 = a * (aperture * (right - left)), b * (aperture * (top - bottom))
             o += across * x0 + up * y0
             d = dr.normalize(view + across * (x - x0) + up * (y - y0))
         else:
