@@ -141,6 +141,11 @@ class TestOutputsThatNobodyNamed:
         assert output_of(None, "photo.png", ".png") == Path("photo-native.png")
         assert output_of(None, "elsewhere/photo.png", "-seen.png") == Path("photo-seen.png")
 
+    def test_a_folders_name_has_no_ending_but_that_of_a_picture(self, tmp_path):
+        for name, expected in (("cup_qs8x6a0.75-views", "cup_qs8x6a0.75-views-native.png"), ("a.zarr", "a-native.png")):
+            (tmp_path / name).mkdir()
+            assert output_of(None, tmp_path / name, "-native.png") == Path(expected)
+
 
 def test_a_picture_is_opened_once_it_is_written(lippmann, engine, tmp_path, monkeypatch):
     from lippmann.cli.commands import view

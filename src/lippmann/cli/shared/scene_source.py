@@ -154,7 +154,9 @@ def output_of(given: Path | None, source: str | Path, ending: str) -> Path:
     """
     if given is not None:
         return given
-    stem = Path(source).stem or "picture"
+    name = Path(source)
+    # Folders of views are named after their quilts, such as chair_qs8x6a0.75-views.
+    stem = (name.name if name.is_dir() and name.suffix != ".zarr" else name.stem) or "picture"
     # A dot would make the folder's name that of a file.
     path = Path(f"{stem.replace('.', '-') if ending == '-frames' else stem}{ending}")
     # With a word in its name the file is this program's; a model's plain name may be that of its texture.
