@@ -96,31 +96,6 @@ def test_a_single_frame_may_have_a_plain_name(engine, lippmann, moving_ball, cut
     assert (tmp_path / "seven.png").exists()
 
 
-@pytest.mark.long
-def test_frames_on_a_cluster_are_the_same(engine, lippmann, moving_ball, tmp_path):
-    pytest.importorskip("distributed")
-    for place, more in (("here", ()), ("there", ("--cluster", "local:2", "--video", tmp_path / "film.mp4"))):
-        done = lippmann(
-            "render",
-            moving_ball,
-            "--frames",
-            "0:2",
-            "-o",
-            tmp_path / place,
-            *QUICK,
-            "--method",
-            "full",
-            "--denoise",
-            "none",
-            *more,
-        )
-        assert done.code == 0, done.err
-    for name in ("frame_0000.png", "frame_0001.png"):
-        here, there = (read_picture(tmp_path / place / name) for place in ("here", "there"))
-        assert np.array_equal(here.pixels, there.pixels)
-    assert len(frames_of(tmp_path / "film.mp4")[1]) == 2
-
-
 SMALL_QUILT = ("--views", "3x2", "--size", "384x288", *QUICK)
 
 

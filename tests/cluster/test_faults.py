@@ -91,6 +91,26 @@ def test_all_workers_gone_and_new_ones_come(lab, render, here, until):
 
 
 @pytest.mark.long
+def test_a_film_whose_first_worker_dies_and_whose_second_comes_late(lab, until, cut_display, tmp_path):
+    """The same files as here, though the frames after a key frame are rendered by three processes."""
+    words = ("render", "teapot", "--turntable", "9", "--swing", "20", "-d", cut_display(96, 56), "--quiet", "--threads")
+    program = [sys.executable, "-c", "from lippmann.cli import main; main()", *map(str, words), "1"]
+    lab.start_scheduler()
+    lab.fail("kill", 2)
+    there = [*program, "--cluster", lab.address, "-o", tmp_path / "there", "--video", tmp_path / "film.png"]
+    begun = subprocess.Popen(there)
+    lab.start_worker()
+    until(lambda: 2 in lab.begun())
+    lab.start_worker()
+    subprocess.run([*program, "-o", tmp_path / "here"], check=True)
+    assert begun.wait(120) == 0
+    assert not (lab.faults / "kill-2").exists()
+    for path in sorted((tmp_path / "here").iterdir()):
+        assert path.read_bytes() == (tmp_path / "there" / path.name).read_bytes()
+    assert (tmp_path / "film.png").exists()
+
+
+@pytest.mark.long
 def test_a_restarted_scheduler_is_told_and_resumed_from(lab, render, here, until):
     scheduler = lab.start_scheduler()
     lab.start_worker()

@@ -12,6 +12,9 @@ from lippmann.display import load_display
 from lippmann.errors import ClusterError, UsageError
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.readers.load import load_scene
+from lippmann.sequences.cuts import Moment
+from lippmann.sequences.forms import INTEGRAL
+from lippmann.sequences.windows import Window
 from lippmann.tiles.job import make_job
 
 XML = """<scene version="3.0.0">
@@ -77,6 +80,20 @@ def test_the_files_of_a_mitsuba_scene_travel_too(xml, tmp_path):
     assert str(xml.parent) not in again.scene.description.content.text()
     assert (folder / "parts" / "box.obj").read_bytes() == (xml.parent / "parts" / "box.obj").read_bytes()
     assert again.scene_hash == job.scene_hash
+
+
+def test_frames_share_what_their_scenes_share_and_read_its_files_at_once(engine, xml, tmp_path, monkeypatch):
+    folder, scene, loaded = tmp_path / "there", load_scene(xml), []
+    moments = {frame: Moment(frame, scene.with_light_moved(np.eye(4)), None) for frame in (0, 1)}
+    request = RenderRequest(device="cpu")
+    window = Window((0, 1), {}, moments, load_display("seed-lenticular"), request, INTEGRAL, None, None)
+    again = unpacked(pack(window), folder)
+    first, second = (again.moments[frame].scene.description for frame in (0, 1))
+    assert first is second
+    assert dict(first.content.files) == {"parts/box.obj": folder / "parts" / "box.obj"}
+    monkeypatch.setattr(type(first), "scene", lambda source: loaded.append(source))
+    again.open(None)
+    assert loaded[0] is first
 
 
 @pytest.mark.parametrize(

@@ -52,9 +52,7 @@ def begun(engine, moving_ball, display, tmp_path_factory):
     return folder
 
 
-def run(
-    scene, display, folder, *, frames=FRAMES, most=99, resume=False, motion=None, bits=None, runner=None, **changes
-):
+def run(scene, display, folder, *, frames=FRAMES, most=99, resume=False, motion=None, bits=None, **changes):
     """Render frames, at most so many of them; those that came."""
     moving = motion or open_motion(scene)
     came = []
@@ -64,9 +62,7 @@ def run(
         return folder / f"f_{number:02}.png"
 
     request = replace(QUICK, **changes)
-    with save_sequence(
-        moving, name, path_of, display, frames, request, resume=resume, bits=bits, runner=runner
-    ) as saved:
+    with save_sequence(moving, name, path_of, display, frames, request, resume=resume, bits=bits) as saved:
         for frame in saved:
             came.append(frame)
             if len(came) == most:
@@ -191,22 +187,6 @@ def test_more_or_fewer_frames_may_be_asked_for(unbroken, moving_ball, display, t
     frames = run(moving_ball, display, tmp_path, frames=range(7), most=5, resume=True)
     assert [frame.resumed for frame in frames] == [True, False, False, True, False]
     assert all(contents(tmp_path)[name] == unbroken[name] for name in ("f_00.png", "f_03.png"))
-
-
-@pytest.mark.long
-def test_frames_that_are_rendered_in_tiles_are_kept_too(engine, moving_ball, display, tmp_path):
-    from lippmann.tiles.tiled_render import render_here
-
-    whole, broken = tmp_path / "whole", tmp_path / "broken"
-    whole.mkdir()
-    broken.mkdir()
-    tiles = {"frames": range(0, 6, 3), "runner": render_here, "method": "full", "denoise": "none"}
-    run(moving_ball, display, whole, **tiles)
-    run(moving_ball, display, broken, most=1, **tiles)
-    with pytest.raises(PictureError, match="frames are rendered"):
-        run(moving_ball, display, broken, resume=True, **tiles | {"runner": None})
-    assert [frame.resumed for frame in run(moving_ball, display, broken, resume=True, **tiles)] == [True, False]
-    assert contents(broken) == contents(whole)
 
 
 def command(scene, folder, *more):

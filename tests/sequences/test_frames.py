@@ -22,7 +22,6 @@ from lippmann.sequences.frames import (
     render_frames,
     render_quilt_sequence,
     render_sequence,
-    sequence_to_files,
 )
 from lippmann.sequences.motion import open_motion
 from lippmann.sequences.turntable import open_turntable
@@ -123,20 +122,6 @@ def test_a_frame_alone_is_the_same_as_among_others(engine, moving_ball):
     assert np.array_equal(among[2].pixels, alone.pixels)
     assert not np.array_equal(among[2].pixels, among[0].pixels)
     assert among[2].provenance.options["frame"] == 2
-
-
-@pytest.mark.slow
-def test_frames_are_rendered_in_tiles_too(engine, moving_ball, tmp_path):
-    motion = open_motion(moving_ball)
-    options = {"integrator": "direct", "method": "full", "spp": 1, "device": "cpu", "tone_map": "none"}
-    (whole,) = (image for _, image in render_sequence(motion, frames=[3], **options))
-    made = dict(sequence_to_files(motion, lambda frame: tmp_path / f"{frame}.exr", frames=[3], bits=32, **options))
-    assert made[3].tiles > 1
-    from lippmann.image import read_picture
-
-    read = read_picture(tmp_path / "3.exr")
-    assert np.array_equal(read.pixels, whole.pixels)
-    assert np.array_equal(read.world_from_display, whole.world_from_display)
 
 
 @pytest.mark.slow

@@ -18,9 +18,10 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.values.whitted_scene import CameraPose
 from lippmann.sequences.cuts import Moment
 from lippmann.sequences.frames import place_frames, render_frames, render_sequence
-from lippmann.sequences.key_frames import KeyFrames, estimate_next, find_frame_before
+from lippmann.sequences.key_frames import KeyFrames, estimate_next, list_frames_before
 from lippmann.sequences.key_light import LightOfSurfaces
 from lippmann.sequences.motion import Flight
+from lippmann.sequences.still_pixels import StillPixels
 from lippmann.sequences.turntable import open_turntable
 
 ESTIMATE = {"psnr": 40.0, "psnr_low": 38.0, "psnr_high": 43.0, "by_chance": 46.0}
@@ -51,9 +52,12 @@ def asked_of(motion, display, frames, estimate=ESTIMATE, **options):
     return asked
 
 
-def test_frames_between_follow_a_key_frame_or_one_that_passes_on_its_light():
-    assert [find_frame_before(frame, 4, 4) for frame in range(9)] == [None, 0, 0, 0, None, 4, 4, 4, None]
-    assert [find_frame_before(frame, 2, 8) for frame in range(1, 10)] == [0, 0, 2, 2, 4, 4, 6, None, 8]
+def test_frames_between_follow_a_key_frame_or_those_that_pass_on_its_light():
+    every, own = RenderRequest(), RenderRequest(spp=4)
+    assert [list_frames_before(frame, every, None) for frame in range(6)] == [[], [0], [0], [0], [], [4]]
+    assert list_frames_before(39, every, LightOfSurfaces()) == [38, 36, 34, 32]
+    assert list_frames_before(39, every, StillPixels()) == [36, 32]
+    assert [list_frames_before(39, own, kind) for kind in (None, StillPixels())] == [[], []]
 
 
 def test_frames_after_a_key_frame_take_three_quarters_of_its_samples_in_one_stream(motion, display):

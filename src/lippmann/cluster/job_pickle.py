@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import copyreg
 import hashlib
 import io
 import pickle
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -16,14 +17,15 @@ from numpy.typing import NDArray
 from lippmann.errors import ClusterError, UsageError
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.mitsuba_xml import MitsubaXml
+from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import SceneDescription
-from lippmann.tiles.job import TileJob
+from lippmann.tiles.job import TileJob, find_xml
 
 #: Arrays with fewer bytes stay in the outline.
 SMALLEST_PART = 4096
 
 _HASH = hashlib.sha256
-_INCOMPLETE = "a part of the scene was lost in transit"
+_REDUCED = (TileJob, Scene, SceneDescription, MitsubaSource, MitsubaXml)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +50,8 @@ class Parcel:
     parts: Mapping[str, NDArray[np.generic]]
 
 
-def pack(job: TileJob) -> Parcel:
-    """Serialize a job in parts.
+def pack(job: object) -> Parcel:
+    """Serialize a job in parts: any value that can be pickled, of the kinds of :mod:`lippmann.cluster.tasks`.
 
     Raises
     ------
@@ -57,16 +59,8 @@ def pack(job: TileJob) -> Parcel:
         If the scene is a Mitsuba object, or a Mitsuba file refers to files outside its own folder.
     """
     parts: dict[str, NDArray[np.generic]] = {}
-    files = _scene_files(job, parts)
     stream = io.BytesIO()
-    # Fresh copies drop cached values (a scene's bounds, its hash), by which equal jobs would differ.
-    description = job.scene.description
-    if isinstance(description, SceneDescription):
-        description = replace(description)
-    plain = replace(job, scene=replace(job.scene, description=description))
-    if files is not None:
-        plain = _with_files(plain, {})
-    _Packer(stream, parts).dump((plain, files))
+    _Packer(stream, parts).dump(job)
     outline = stream.getvalue()
     names = tuple(sorted(parts))
     return Parcel(_HASH(outline).hexdigest(), np.frombuffer(outline, np.uint8), names, parts)
@@ -74,7 +68,7 @@ def pack(job: TileJob) -> Parcel:
 
 def unpack(
     key: str, outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDArray[np.generic]], folder: Path
-) -> TileJob:
+) -> Any:
     """Restore a job that :func:`pack` serialized.
 
     Parameters
@@ -102,18 +96,7 @@ def unpack(
     for name, part in by_name.items():
         if content_name(part) != name:
             raise ClusterError("a part of the scene was damaged in transit")
-    job, files = _Unpacker(io.BytesIO(outline.tobytes()), by_name).load()
-    assert isinstance(job, TileJob)
-    if files is None:
-        return job
-    if not by_name.keys() >= set(files.values()):
-        raise ClusterError(_INCOMPLETE)
-    paths = {}
-    for key, name in files.items():
-        paths[key] = path = folder.joinpath(*PurePosixPath(key).parts)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(by_name[name].tobytes())
-    return _with_files(job, paths)
+    return _Unpacker(io.BytesIO(outline.tobytes()), by_name, folder).load()
 
 
 def content_name(array: NDArray[np.generic]) -> str:
@@ -123,35 +106,12 @@ def content_name(array: NDArray[np.generic]) -> str:
     return digest.hexdigest()
 
 
-def _scene_files(job: TileJob, parts: dict[str, NDArray[np.generic]]) -> dict[str, str] | None:
-    """Content hashes of the files that a Mitsuba scene reads, by key; None for other scenes. Fills ``parts``."""
-    described = job.scene.description
-    if not isinstance(described, MitsubaSource):
-        return None
-    job.scene_hash  # noqa: B018 - raises UsageError for Mitsuba objects
-    assert isinstance(described.content, MitsubaXml)
-    names: dict[str, str] = {}
-    for key, path in described.content.files.items():
-        if PurePosixPath(key).is_absolute() or ".." in PurePosixPath(key).parts:
-            raise UsageError(
-                f"the scene names '{path}', which lies outside its folder",
-                parameter="cluster",
-                rule="only files of the scene's own folder are sent",
-                fix="move it there",
-            )
-        content = np.frombuffer(path.read_bytes(), np.uint8)
-        names[key] = name = content_name(content)
-        parts[name] = content
-    return names
+@dataclass(frozen=True)
+class _SceneFile:
+    """A file that a Mitsuba scene reads: its path from the scene's folder, and where it lies."""
 
-
-def _with_files(job: TileJob, files: Mapping[str, Path]) -> TileJob:
-    """The job with other paths of the files of its Mitsuba scene, which is not loaded yet."""
-    described = job.scene.description
-    assert isinstance(described, MitsubaSource)
-    assert isinstance(described.content, MitsubaXml)
-    described = replace(described, content=replace(described.content, files=files), _loaded={})
-    return replace(job, scene=replace(job.scene, description=described))
+    key: str
+    path: Path
 
 
 class _Packer(pickle.Pickler):
@@ -159,20 +119,57 @@ class _Packer(pickle.Pickler):
         super().__init__(stream, protocol=5)
         self._parts = parts
 
-    def persistent_id(self, value: Any) -> str | None:
+    def persistent_id(self, value: Any) -> object:
+        if isinstance(value, _SceneFile):
+            return value.key, self._add(np.frombuffer(value.path.read_bytes(), np.uint8))
         if type(value) is not np.ndarray or value.dtype.hasobject or value.nbytes < SMALLEST_PART:
             return None
-        name = content_name(value)
-        self._parts.setdefault(name, np.ascontiguousarray(value))
+        return self._add(value)
+
+    def reducer_override(self, value: Any) -> Any:
+        """Scenes without what was derived of them (bounds, hashes), by which equal jobs would differ."""
+        state = {part.name: getattr(value, part.name) for part in fields(value)} if type(value) in _REDUCED else {}
+        if isinstance(value, Scene):
+            # Forms of the same scene: whether several frames share them decides what is built anew.
+            state |= {form: vars(value)[form] for form in ("classic", "physical") if form in vars(value)}
+        elif isinstance(value, MitsubaSource):
+            state |= {"content": find_xml(value), "_loaded": {}}
+        elif isinstance(value, MitsubaXml):
+            state["files"] = {key: _check_inside(key, path) for key, path in value.files.items()}
+        return (copyreg.__newobj__, (type(value),), state) if state else NotImplemented
+
+    def _add(self, array: NDArray[np.generic]) -> str:
+        name = content_name(array)
+        self._parts.setdefault(name, np.ascontiguousarray(array))
         return name
 
 
+def _check_inside(key: str, path: Path) -> _SceneFile:
+    if PurePosixPath(key).is_absolute() or ".." in PurePosixPath(key).parts:
+        raise UsageError(
+            f"the scene names '{path}', which lies outside its folder",
+            parameter="cluster",
+            rule="only files of the scene's own folder are sent",
+            fix="move it there",
+        )
+    return _SceneFile(key, path)
+
+
 class _Unpacker(pickle.Unpickler):
-    def __init__(self, stream: io.BytesIO, parts: Mapping[str, NDArray[np.generic]]) -> None:
+    """Restores a job; the files of Mitsuba scenes are written into a folder."""
+
+    def __init__(self, stream: io.BytesIO, parts: Mapping[str, NDArray[np.generic]], folder: Path) -> None:
         super().__init__(stream)
         self._parts = parts
+        self._folder = folder
 
-    def persistent_load(self, name: Any) -> NDArray[np.generic]:
+    def persistent_load(self, name: Any) -> NDArray[np.generic] | Path:
+        key, name = name if isinstance(name, tuple) else (None, name)
         if name not in self._parts:
-            raise ClusterError(_INCOMPLETE)
-        return self._parts[name]
+            raise ClusterError("a part of the scene was lost in transit")
+        if key is None:
+            return self._parts[name]
+        path = self._folder / key
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(self._parts[name].tobytes())
+        return path

@@ -1,13 +1,13 @@
-"""Tasks that run in a worker's process: its versions, the start of the engine, and a tile of a picture."""
+"""Tasks that run in a worker's process: its versions, the start of the engine, and a part of a job."""
 
 from __future__ import annotations
 
 import os
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +18,61 @@ from lippmann.journal.tile_file import encode
 from lippmann.runtime.atomic_write import scratch_folder
 
 if TYPE_CHECKING:
-    from lippmann.tiles.tile_render import Prepared
+    from lippmann.tiles.job import TileJob
 
 #: Environment variable with the number of the engine's threads in a worker.
 THREADS_VARIABLE = "LIPPMANN_WORKER_THREADS"
 
+#: Does the engine's share of a part, and returns a function that does the rest and gives the part.
+Render = Callable[[int], Callable[[], Any]]
+
 # One kernel at a time fills all threads of a worker, and the engine's state belongs to the whole process.
 _engine = threading.Lock()
-_current: dict[str, Prepared] = {}
+_current: dict[str, Render] = {}
+
+
+class Job(Protocol):
+    """Work that is done part by part, anywhere and in any order. It can be pickled."""
+
+    def name(self, index: int) -> str:
+        """A part's name for people."""
+
+    def open(self, threads: int | None) -> Render:
+        """Begin the work, with so many threads of the engine; files of the scene are there until this returns."""
+
+
+class FrameJob(Job, Protocol):
+    """Frames of a film, which follow others that their worker has to render before them."""
+
+    @property
+    def frames(self) -> Sequence[int]:
+        """Their numbers."""
+
+    def count_before(self, index: int) -> int:
+        """How many frames a worker renders before a frame if it has rendered none."""
+
+
+@dataclass(frozen=True)
+class PictureJob:
+    """The tiles of a picture."""
+
+    job: TileJob
+
+    def name(self, index: int) -> str:
+        """A tile's row and column."""
+        return self.job.grid.name(index)
+
+    def open(self, threads: int | None) -> Render:
+        """Build the scene; tiles come as :func:`lippmann.journal.tile_file.encode` encodes them."""
+        from lippmann.tiles.tile_render import pack, prepare, trace_tile
+
+        prepared = prepare(replace(self.job, request=replace(self.job.request, threads=threads)))
+
+        def trace(index: int) -> Callable[[], bytes]:
+            traced = trace_tile(prepared, index)
+            return lambda: encode(pack(prepared, traced))
+
+        return trace
 
 
 def own_versions() -> dict[str, str]:
@@ -65,37 +112,31 @@ def make_version_query() -> Callable[[], dict[str, str]]:
 
 def render_part(
     key: str, index: int, outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDArray[np.generic]]
-) -> bytes:
-    """Render one tile of a serialized job.
+) -> Any:
+    """Render one part of a serialized job: a tile, or a frame.
 
     Parameters
     ----------
     key:
-        SHA-256 of the job; the scene is built once for all tiles of one key.
+        SHA-256 of the job; the scene is built once for all parts of one key.
     index:
-        Number of the tile.
+        Number of the part.
     outline, names, parts:
         The job, for :func:`lippmann.cluster.job_pickle.unpack`.
 
     Returns
     -------
-    The tile as :func:`lippmann.journal.tile_file.encode` encodes it.
+    The part as the :class:`Job` gives it.
 
     Raises
     ------
     ClusterError
         With the text of any error: not every error can be pickled.
     """
-    from lippmann.runtime import engine
-    from lippmann.tiles.tile_render import pack, trace_tile
-
     try:
         with _engine:
-            prepared = _prepared(key, outline, names, parts)
-            request = prepared.job.request
-            engine.start(request.device, request.threads)  # each thread of a worker chooses its variant
-            traced = trace_tile(prepared, index)
-        return encode(pack(prepared, traced))
+            finish = _opened(key, outline, names, parts)(index)
+        return finish()
     except Exception as error:  # noqa: BLE001 - every error has to reach the client
         raise ClusterError(f"{type(error).__name__}: {error}") from None
 
@@ -120,15 +161,9 @@ def engine_threads() -> int | None:
         return None
 
 
-def _prepared(
-    key: str, outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDArray[np.generic]]
-) -> Prepared:
+def _opened(key: str, outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDArray[np.generic]]) -> Render:
     if key not in _current:
-        from lippmann.tiles.tile_render import prepare
-
         _current.clear()  # one scene at a time
         with scratch_folder("lippmann-scene-") as folder:
-            job = unpack(key, outline, names, parts, Path(folder))
-            job = replace(job, request=replace(job.request, threads=engine_threads()))
-            _current[key] = prepare(job)
+            _current[key] = unpack(key, outline, names, parts, Path(folder)).open(engine_threads())
     return _current[key]

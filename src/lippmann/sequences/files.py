@@ -4,27 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lippmann.display import Display
+from lippmann.image.encoding import FormatName
 from lippmann.image.metadata import Provenance
-from lippmann.image.write import format_for
+from lippmann.image.write import format_for, replacing_output
 from lippmann.journal.fingerprint import content_hash, in_words
 from lippmann.journal.frame_journal import ENDING, FrameJournal
 from lippmann.journal.tile_journal import sweep_beside
-from lippmann.progress import ProgressCallback, silent
+from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import engine
 from lippmann.scene.placement import options_of_sequence
 from lippmann.sequences.forms import INTEGRAL, Form
-from lippmann.sequences.frames import FramePlacements, place_frames, render_frames, render_tiled_frames
+from lippmann.sequences.frames import FramePlacements, place_frames, render_frames
 from lippmann.sequences.motion import Motion
+from lippmann.sequences.windows import RenderedFrame, Window, WindowRunner, cut_windows
 
 if TYPE_CHECKING:
     from lippmann.quilts.quilt import Quilt
-    from lippmann.tiles.tiled_render import Runner
 
 #: What of a request changes nothing in the pictures, or is told apart.
 _IMMATERIAL = ("device", "threads", "plan", "placement")
@@ -70,7 +71,7 @@ def save_sequence(
     form: Form[Any] = INTEGRAL,
     resume: bool = False,
     bits: int | None = None,
-    runner: Runner | None = None,
+    runner: WindowRunner | None = None,
     progress: ProgressCallback = silent,
 ) -> Iterator[Iterator[SavedFrame]]:
     """Render one file a frame; a journal beside them tells which are finished.
@@ -92,10 +93,10 @@ def save_sequence(
         Keep the frames that an interrupted run finished, if there are any: those whose files are as they were then. All
         frames together are the same, byte for byte, as those of an unbroken run.
     runner:
-        Renders the frames in tiles, as of :func:`lippmann.sequences.frames.sequence_to_files`; without one they are
-        rendered whole, as of :func:`lippmann.sequences.frames.render_sequence`.
+        Renders the frames elsewhere, all before the first is yielded; the files are the same, byte for byte. By default
+        this process.
     bits:
-        As there.
+        See :func:`lippmann.image.write.format_for`.
 
     Yields
     ------
@@ -126,7 +127,6 @@ def save_sequence(
         **form.settings,
         "the format": name,
         "values": stored,
-        "frames are rendered": "whole" if runner is None else "in tiles",
         "the first frame": str(frames[0]),
     }
     where = place_frames(motion, display, placement)
@@ -135,11 +135,12 @@ def save_sequence(
         if missing:
             sweep_beside(path_of(missing[0]))  # which an interrupted run may have left half written
         if runner is None:
-            made = _render_whole(motion, display, missing, where, path_of, bits, progress, request, form)
+            made = _render_here(motion, display, missing, where, path_of, bits, progress, request, form, journal)
         else:
-            files = render_tiled_frames(motion, display, missing, where, path_of, request, runner, bits, progress)
-            made = (SavedFrame(number, path_of(number), written.provenance) for number, written in files)
-        yield _order_frames(frames, missing, path_of, made, journal, form)
+            request = replace(request, device="gpu" if started.gpu_name else "cpu", threads=None)
+            windows = cut_windows(motion, display, missing, where, path_of, request, form, bits)
+            made = _render_there(windows, missing, path_of, name, runner, progress, journal)
+        yield _order_frames(frames, missing, path_of, made, form)
         if all(number in journal for number in frames):
             journal.finish()
 
@@ -149,23 +150,19 @@ def _order_frames(
     missing: Sequence[int],
     path_of: Callable[[int], Path],
     made: Iterator[SavedFrame],
-    journal: FrameJournal,
     form: Form[Any],
 ) -> Iterator[SavedFrame]:
-    """The frames that lie there and those that are ``made``; the latter are written down."""
+    """The frames that lie there and those that are ``made``."""
     absent = set(missing)
     for number in frames:
-        path = path_of(number)
-        if number not in absent:
+        if number in absent:
+            yield next(made)
+        else:
+            path = path_of(number)
             yield SavedFrame(number, path, form.provenance(path), resumed=True)
-            continue
-        frame = next(made)
-        journal.add(number, path)
-        yield frame
-        del frame  # while the next is rendered
 
 
-def _render_whole(
+def _render_here(
     motion: Motion,
     display: Display,
     frames: Sequence[int],
@@ -175,11 +172,42 @@ def _render_whole(
     progress: ProgressCallback,
     request: RenderRequest,
     form: Form[Any],
+    journal: FrameJournal,
 ) -> Iterator[SavedFrame]:
-    """Frames rendered in one piece, and saved."""
+    """Frames rendered by this process, saved, and written down."""
     for number, image in render_frames(motion, display, frames, where, request, form, progress):
         path = path_of(number)
         frame = SavedFrame(number, path, image.provenance, quilt=form.write(image, path, bits))
         del image  # while the next is rendered
+        journal.add(number, path)
         yield frame
         del frame  # likewise
+
+
+def _render_there(
+    windows: Iterator[Window],
+    frames: Sequence[int],
+    path_of: Callable[[int], Path],
+    name: FormatName,
+    runner: WindowRunner,
+    progress: ProgressCallback,
+    journal: FrameJournal,
+) -> Iterator[SavedFrame]:
+    """Frames rendered by a runner, saved and written down as they come."""
+    saved: dict[int, SavedFrame] = {}
+
+    def save(frame: RenderedFrame) -> None:
+        path = path_of(frame.number)
+        with replacing_output(path, name) as temporary:
+            for part, content in frame.files.items():
+                place = temporary / part
+                place.parent.mkdir(parents=True, exist_ok=True)
+                place.write_bytes(content)
+        journal.add(frame.number, path)
+        saved[frame.number] = SavedFrame(frame.number, path, frame.provenance)
+        progress(Progress("sequence", len(saved), len(frames), f"frame {len(saved)} of {len(frames)}"))
+
+    if frames:
+        progress(Progress("sequence", 0, len(frames)))
+        runner(windows, len(frames), save)
+    yield from (saved[number] for number in frames)

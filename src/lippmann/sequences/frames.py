@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from lippmann.image import IntegralImage
     from lippmann.image.metadata import Provenance
     from lippmann.quilts.quilt import Quilt
-    from lippmann.tiles.tiled_render import Rendered, Runner
 
 
 @checked
@@ -271,46 +270,6 @@ def render_quilt_sequence(
     return render_frames(motion, target, numbers, where, RenderRequest.of(options), form, progress)
 
 
-def sequence_to_files(
-    motion: Motion,
-    path_of: Callable[[int], Path],
-    display: Display | str | Path = "seed-lenticular",
-    frames: FrameRange | Sequence[int] = FrameRange(),
-    *,
-    placement: PlacementOptions | Mapping[str, object] | None = None,
-    runner: Runner | None = None,
-    bits: int | None = None,
-    progress: ProgressCallback = silent,
-    **options: object,
-) -> Iterator[tuple[int, Rendered]]:
-    """Render one file a frame in tiles, which a ``runner`` may spread over a cluster.
-
-    What an interrupted run left of a frame is gone on with.
-
-    Parameters
-    ----------
-    path_of:
-        The file of each frame.
-    runner, bits:
-        As of :func:`lippmann.api.render_to_file`.
-    **options:
-        As there; the others as of :func:`render_sequence`.
-
-    Yields
-    ------
-    int, Rendered
-        A frame's number, and what was written.
-
-    Raises
-    ------
-    LippmannError
-        As :func:`lippmann.api.render_to_file`.
-    """
-    target, numbers, where = _begin(motion, display, frames, placement)
-    request = RenderRequest.of(options)
-    return render_tiled_frames(motion, target, numbers, where, path_of, request, runner, bits, progress)
-
-
 def _begin(
     motion: Motion,
     display: Display | str | Path,
@@ -334,9 +293,40 @@ def render_frames(
     """The frames of :func:`render_sequence`, in any form, once it is known where the display stands."""
     kept = KeptScene()
     request = hold_exposure(request, motion, display, where, kept.build)
+    shared = choose_key_light(motion, where)
+    render = make_frame_renderer(
+        lambda frame: Moment(frame, motion.scene(frame), where(frame)), display, request, form, shared, kept
+    )
+    for position, frame in enumerate(frames):
+        yield frame, render(frame, _report_frame(progress, position, len(frames)))
+        return_freed_memory()  # else the next begins with the holes that the last one left
+
+
+def make_frame_renderer(
+    read_moment: Callable[[int], Moment],
+    display: Display,
+    request: RenderRequest,
+    form: Form[Output],
+    shared: KeyLight | None,
+    kept: KeptScene,
+) -> Callable[[int, ProgressCallback], Output]:
+    """A function that renders frames by their numbers, best in their order: it keeps what the next one follows.
+
+    Parameters
+    ----------
+    read_moment:
+        Returns a frame by its number; also called for frames that others follow.
+    request:
+        With the exposure of all frames, see :func:`hold_exposure`.
+    shared:
+        Takes the light of key frames for those after them; None where all frames are traced.
+    kept:
+        The scene on the device.
+    """
 
     def moment(frame: int) -> Moment:
-        return Moment(frame, kept.known(motion.scene(frame)), where(frame))
+        now = read_moment(frame)
+        return now._replace(scene=kept.known(now.scene))
 
     def trace(now: Moment, request: RenderRequest, report: ProgressCallback) -> Output:
         return form.render(now.scene, display, replace(request, placement=now.placement), report, kept.build)
@@ -344,14 +334,13 @@ def render_frames(
     def render_key(key: Moment, own: RenderRequest, noise_of: int) -> Provenance:
         return trace(key, give_seed(own, noise_of), silent).provenance
 
-    shared = _choose_key_light(motion, where)
     keys = KeyFrames(display, moment, render_key, shared)
 
-    def render(position: int, frame: int) -> Output:
+    def render(frame: int, report: ProgressCallback) -> Output:
         now = moment(frame)
         key = keys.before(now, request)
         own = keys.make_request(give_seed(request, keys.noise_of(frame, request)), now, key)
-        image = trace(now, own, _report_frame(progress, position, len(frames)))
+        image = trace(now, own, report)
         made = image.provenance
         keys.add(now, made, key)
         estimate = keys.estimate(made, key)
@@ -361,40 +350,7 @@ def render_frames(
             estimate = add_flicker(estimate, made.pixel_shares.get("traced", 1.0), stays=stays)
         return replace(image, provenance=replace(made, options={**made.options, "frame": frame}, estimate=estimate))
 
-    for position, frame in enumerate(frames):
-        yield frame, render(position, frame)  # which no variable holds while the next is rendered
-        return_freed_memory()  # else the next begins with the holes that the last one left
-
-
-def render_tiled_frames(
-    motion: Motion,
-    display: Display,
-    frames: Sequence[int],
-    where: FramePlacements,
-    path_of: Callable[[int], Path],
-    request: RenderRequest,
-    runner: Runner | None,
-    bits: int | None,
-    progress: ProgressCallback,
-) -> Iterator[tuple[int, Rendered]]:
-    """The files of :func:`sequence_to_files`, once it is known where the display stands."""
-    from lippmann.tiles.tiled_render import render_to_file
-
-    request = hold_exposure(request, motion, display, where)
-    for position, frame in enumerate(frames):
-        yield (
-            frame,
-            render_to_file(
-                motion.scene(frame),
-                display,
-                replace(give_seed(request, frame), placement=where(frame)),
-                path_of(frame),
-                bits=bits,
-                resume=True,
-                runner=runner,
-                progress=_report_frame(progress, position, len(frames)),
-            ),
-        )
+    return render
 
 
 def hold_exposure(
@@ -410,7 +366,7 @@ def hold_exposure(
     return replace(request, exposure=choose_exposure(scene, display, still, build))
 
 
-def _choose_key_light(motion: Motion, where: FramePlacements) -> KeyLight | None:
+def choose_key_light(motion: Motion, where: FramePlacements) -> KeyLight | None:
     """How frames reuse a key frame's light; None where the display takes the light along, as on turntables."""
     if where.first_pose is not None:
         return LightOfSurfaces()
@@ -434,7 +390,7 @@ def _report_frame(progress: ProgressCallback, position: int, frames: int) -> Pro
 
     def report(inner: Progress) -> None:
         nonlocal done
-        if inner.stage in ("trace", "tiles"):
+        if inner.stage == "trace":
             done = max(done, position + inner.done / inner.total)
         progress(Progress("sequence", done, frames, f"frame {position + 1} of {frames}"))
 
@@ -452,5 +408,4 @@ __all__ = [
     "place_frames",
     "render_quilt_sequence",
     "render_sequence",
-    "sequence_to_files",
 ]

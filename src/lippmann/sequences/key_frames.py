@@ -68,7 +68,7 @@ class KeyFrames:
         self._moment = moment
         self._render = render
         self._shared = shared
-        self._step = TUNING.frames_of_key if shared is None else shared.frames_of_link
+        self._step = _count_frames_of_link(shared)
         self._last: tuple[Moment, Key] | None = None  # the last frame that others follow, and its key frame
         self._light = KeptLight()
         self._variances = {"key": 0.0, "next": 0.0}  # of one sample of the last frame of either kind
@@ -130,9 +130,8 @@ class KeyFrames:
         where the key frame's picture is no denoised one, and after a cut. A frame to follow that is missing is
         rendered.
         """
-        halves = TUNING.frames_of_key if self._shared is None else TUNING.frames_of_light
-        number = find_frame_before(moment.number, self._step, halves)
-        if number is None or not _is_open(request):
+        number = next(iter(list_frames_before(moment.number, request, self._shared)), None)
+        if number is None:
             return None
         kept = self._last if self._last is not None and self._last[0].number == number else None
         last = self._moment(number) if kept is None else kept[0]
@@ -152,9 +151,19 @@ class KeyFrames:
         return key if has_estimate and not (may_have_halves and is_cut(key.moment, moment, self._display)) else None
 
 
-def find_frame_before(frame: int, step: int, halves: int) -> int | None:
-    """The frame that a frame follows, one of every ``step``; None of every ``halves``, which always have them."""
-    return (frame - 1) // step * step if frame % halves else None
+def list_frames_before(frame: int, request: RenderRequest, shared: KeyLight | None) -> list[int]:
+    """The frames that a frame follows by their numbers, from the one before it back to the key frame; cuts aside."""
+    before: list[int] = []
+    step, halves = _count_frames_of_link(shared), TUNING.frames_of_key if shared is None else TUNING.frames_of_light
+    while _is_open(request) and frame % halves:
+        frame = (frame - 1) // step * step
+        before.append(frame)
+    return before
+
+
+def _count_frames_of_link(shared: KeyLight | None) -> int:
+    """Every so many frames one is followed by others."""
+    return TUNING.frames_of_key if shared is None else shared.frames_of_link
 
 
 def estimate_next(key: Figures, noise: float) -> Figures:

@@ -108,13 +108,7 @@ class TileJob:
         described = self.scene.description
         if not isinstance(described, MitsubaSource):
             return content_hash(self.scene)
-        if not isinstance(described.content, MitsubaXml):
-            raise UsageError(
-                f"the scene '{self.scene.name}' is an object of Mitsuba's",
-                rule="what it holds cannot be compared after an interruption",
-                fix="save it as an XML file",
-            )
-        xml = described.content
+        xml = find_xml(described)
         known = xml.outline(), xml.files, described.environment, described.background
         return content_hash([*known, self.scene.studio, self.scene.light])
 
@@ -147,6 +141,23 @@ class TileJob:
         if around is None:
             return {}
         return {"the tiles": f"{self.side} pixels and {around.margin} around, each with {self.tile_memory} bytes"}
+
+
+def find_xml(source: MitsubaSource) -> MitsubaXml:
+    """The file that a scene of Mitsuba's was read from.
+
+    Raises
+    ------
+    UsageError
+        If it is an object of Mitsuba's.
+    """
+    if not isinstance(source.content, MitsubaXml):
+        raise UsageError(
+            f"the scene '{source.name}' is an object of Mitsuba's",
+            rule="what it holds can neither be compared after an interruption nor sent",
+            fix="save it as an XML file",
+        )
+    return source.content
 
 
 def make_job(

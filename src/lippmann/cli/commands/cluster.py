@@ -16,7 +16,8 @@ from lippmann.options.outputs import ClusterOptions
 from lippmann.options.quality import MachineOptions
 
 if TYPE_CHECKING:
-    from lippmann.cluster import TlsFiles
+    from lippmann.cluster import Cluster, TlsFiles
+    from lippmann.sequences.windows import WindowRunner
     from lippmann.tiles.tiled_render import Runner
 
 
@@ -31,15 +32,37 @@ def runner_of(asked: ClusterOptions, console: Console, threads: int | None) -> I
     ClusterError
         If the cluster cannot be reached.
     """
+    with _connected(asked, console, threads) as cluster:
+        if cluster is None:
+            yield None
+        else:
+            from lippmann.cluster.runner import runner_on
+
+            yield runner_on(cluster)
+
+
+@contextmanager
+def frame_runner_of(asked: ClusterOptions, console: Console, threads: int | None) -> Iterator[WindowRunner | None]:
+    """As :func:`runner_of`, of the frames of a film."""
+    with _connected(asked, console, threads) as cluster:
+        if cluster is None:
+            yield None
+        else:
+            from lippmann.cluster.runner import frame_runner_on
+
+            yield frame_runner_on(cluster)
+
+
+@contextmanager
+def _connected(asked: ClusterOptions, console: Console, threads: int | None) -> Iterator[Cluster | None]:
     if not asked.cluster:
         yield None
         return
     from lippmann.cluster import connect, parse_target
-    from lippmann.cluster.runner import runner_on
 
     target = parse_target(asked.cluster)
     with connect(target, _tls_files(asked), threads=threads, remark=console.remark) as cluster:
-        yield runner_on(cluster)
+        yield cluster
 
 
 def _tls_files(asked: ClusterOptions) -> TlsFiles:

@@ -105,11 +105,11 @@ def render(
         if moving or maps is not None:
             _refuse_correction("frames" if moving else "--maps", "leave one of them out")
     if moving:
-        from lippmann.cli.commands.cluster import runner_of
+        from lippmann.cli.commands.cluster import frame_runner_of
         from lippmann.cli.commands.sequence import Files, render_frames
 
         files = Files(output, bits, maps, resume)
-        with runner_of(on, console, machine.threads) as runner:
+        with frame_runner_of(on, console, machine.threads) as runner:
             render_frames(source, target, request, moving, files, console, runner=runner)
         if opens and moving.video is not None:
             from lippmann.cli.commands.view import open_file

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from lippmann.sequences.forms import Form
     from lippmann.sequences.frames import FrameRange
     from lippmann.sequences.motion import Motion
-    from lippmann.tiles.tiled_render import Runner
+    from lippmann.sequences.windows import WindowRunner
 
 _NUMBER = re.compile(r"%(?:0(\d{1,2}))?d")
 _NUMERAL = re.compile(r"\([^()]*\)|[\d.]+")
@@ -51,7 +51,7 @@ def render_frames(
     console: Console,
     *,
     form: Form[Any] | None = None,
-    runner: Runner | None = None,
+    runner: WindowRunner | None = None,
 ) -> None:
     """Render and write all frames: quilts of a given ``form``, or without one integral images."""
     from lippmann.image.write import format_for
