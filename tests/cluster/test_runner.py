@@ -11,6 +11,7 @@ import pytest
 pytest.importorskip("distributed")
 
 from lippmann.cluster import runner
+from lippmann.errors import UsageError
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,9 @@ class Flight:
 
     def count_before(self, index):
         return (index % 32 + 1) // 2
+
+    def open(self, threads):
+        raise UsageError("no such picture")
 
 
 class Task(Future):
@@ -100,3 +104,22 @@ def test_every_frame_comes_once_and_in_time(monkeypatch, presence, frames, longe
     assert sorted(cluster.came) == list(frames)
     assert all(frames == sorted(frames) for frames in cluster.rendered.values())
     assert cluster.now <= longest
+
+
+def test_what_cannot_be_rendered_anywhere_is_said_at_once():
+    class Refusing(Played):
+        def submit(self, call, *words, key, pure, workers=()):
+            task = super().submit(call, *words, key=key, pure=pure)
+            if not workers:
+                task.set_result(words[0])
+                return task
+            name, index, outline, names, parts = words
+            try:
+                call(name, index, outline.result(), names, parts)
+            except UsageError as error:
+                task.status = "error"
+                task.set_exception(error)
+            return task
+
+    with pytest.raises(UsageError, match="no such picture"):
+        runner.frame_runner_on(Refusing({"a": (0, 9)}))(iter([Flight(range(9))]), 9, print)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from lippmann.cluster.connection import Cluster
 from lippmann.cluster.job_pickle import pack
 from lippmann.cluster.tasks import FrameJob, Job, PictureJob, render_part
-from lippmann.errors import ClusterError
+from lippmann.errors import ClusterError, UsageError
 from lippmann.journal.tile_file import DamagedTile, TileResult, decode
 
 if TYPE_CHECKING:
@@ -244,7 +244,10 @@ class _Run(ABC):
             part.fetch.add_done_callback(lambda _: self.news.put(key))
         elif part.future.status == "error":
             del self.in_flight[key]
-            self._note_failure(part, part.future.exception())
+            error = part.future.exception()
+            if isinstance(error, UsageError):
+                raise error  # the same on all workers
+            self._note_failure(part, error)
         else:
             raise self._lost()
 

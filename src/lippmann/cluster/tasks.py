@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.cluster.job_pickle import unpack
-from lippmann.errors import ClusterError
+from lippmann.errors import ClusterError, UsageError
 from lippmann.journal.tile_file import encode
 from lippmann.runtime.atomic_write import scratch_folder
 
@@ -130,13 +130,17 @@ def render_part(
 
     Raises
     ------
+    UsageError
+        What was asked for cannot be rendered, here or elsewhere.
     ClusterError
-        With the text of any error: not every error can be pickled.
+        With the text of any other error: not every error can be pickled.
     """
     try:
         with _engine:
             finish = _opened(key, outline, names, parts)(index)
         return finish()
+    except UsageError:
+        raise
     except Exception as error:  # noqa: BLE001 - every error has to reach the client
         raise ClusterError(f"{type(error).__name__}: {error}") from None
 
