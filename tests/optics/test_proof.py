@@ -87,6 +87,8 @@ def test_prints_have_tolerances():
     assert tolerances.dot_gain > 0.25
     assert prove(load_display("panel-4k")).tolerances is None
     assert is_print(load_display("print-60lpi"))
+    unknown = prove(load_display(SHORT.replace(",thickness=26mil", ""))).in_words()
+    assert unknown["strips"] == "an ideal lens shows any number apart"
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ VISIBLE, ANNOYING = 0.01, 0.058
 _PLACES = 480
 
 #: Most strips a lens that are tried.
-_MOST_STRIPS = 200
+MOST_STRIPS = 200
 
 
 def crosstalk(display: Display, slope: float, strips: float | None = None) -> float:
@@ -82,7 +82,7 @@ def independent_directions(display: Display) -> float:
 def most_strips(display: Display, limit: float = ANNOYING) -> int:
     """The largest number of strips a lens, of two or more, up to which crosstalk straight ahead keeps to a limit."""
     strips = 1
-    while strips < _MOST_STRIPS and crosstalk(display, 0.0, strips + 1) <= limit:
+    while strips < MOST_STRIPS and crosstalk(display, 0.0, strips + 1) <= limit:
         strips += 1
     return strips
 

@@ -14,7 +14,7 @@ from lippmann.display.validation import INCH
 from lippmann.display.view_cone import visible_size
 from lippmann.errors import DisplayError
 from lippmann.json_values import JsonObject, JsonValue
-from lippmann.optics.crosstalk import ANNOYING, VISIBLE, crosstalk, independent_directions, most_strips
+from lippmann.optics.crosstalk import ANNOYING, MOST_STRIPS, VISIBLE, crosstalk, independent_directions, most_strips
 from lippmann.optics.directions import true_directions
 from lippmann.optics.first_order import extreme_ray_field, rule_of_depth
 from lippmann.optics.fitting import fit_profile, gap_of
@@ -312,9 +312,10 @@ def _ghost(share: float) -> str:
 
 
 def _tolerances_in_words(tolerances: PrintTolerances) -> dict[str, str]:
+    best, invisible = tolerances.best_strips, tolerances.invisible_strips
+    strips = f"up to {best} a lens are not annoying (5.8 %), up to {invisible} not seen (1 %)"
     return {
-        "strips": f"up to {tolerances.best_strips} a lens are not annoying (5.8 %), "
-        f"up to {tolerances.invisible_strips} not seen (1 %)",
+        "strips": strips if invisible < MOST_STRIPS else "an ideal lens shows any number apart",
         "dot gain": f"of half a pixel: crosstalk {_ghost(tolerances.dot_gain)}",
         "register": f"an ink one pixel off is turned by {tolerances.misregistration:.2g} deg, "
         f"{tolerances.misregistration_depth:.2g} mm at the usable depth",
