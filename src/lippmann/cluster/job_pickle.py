@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copyreg
 import hashlib
 import io
 import pickle
@@ -136,7 +135,7 @@ class _Packer(pickle.Pickler):
             state |= {"content": find_xml(value), "_loaded": {}}
         elif isinstance(value, MitsubaXml):
             state["files"] = {key: _check_inside(key, path) for key, path in value.files.items()}
-        return (copyreg.__newobj__, (type(value),), state) if state else NotImplemented
+        return (object.__new__, (type(value),), state) if state else NotImplemented
 
     def _add(self, array: NDArray[np.generic]) -> str:
         name = content_name(array)
@@ -163,13 +162,14 @@ class _Unpacker(pickle.Unpickler):
         self._parts = parts
         self._folder = folder
 
-    def persistent_load(self, name: Any) -> NDArray[np.generic] | Path:
-        key, name = name if isinstance(name, tuple) else (None, name)
-        if name not in self._parts:
+    def persistent_load(self, pid: Any) -> NDArray[np.generic] | Path:
+        key, name = pid if isinstance(pid, tuple) else (None, pid)
+        part = self._parts.get(name)
+        if part is None:
             raise ClusterError("a part of the scene was lost in transit")
         if key is None:
-            return self._parts[name]
-        path = self._folder / key
+            return part
+        path: Path = self._folder / key
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(self._parts[name].tobytes())
+        path.write_bytes(part.tobytes())
         return path
