@@ -126,20 +126,21 @@ def test_a_frame_is_the_same_alone_and_after_others(frames, display):
     np.testing.assert_array_equal(alone.pixels, frames[5].pixels)
 
 
-def test_two_probes_that_change_leave_no_patch_but_an_even_change_is_found():
+def test_two_probes_that_change_leave_no_patch_but_an_even_change_and_a_narrow_one_are_found():
     from lippmann.rendering.film.wavefront import Coverage
     from lippmann.sequences.still_pixels import _find_still, _Picture
 
-    whole = Coverage(np.ones((64, 64, 1), np.float32), 6)
+    coverage = Coverage(np.ones((64, 64, 1), np.float32), 6)
     job = SimpleNamespace(
-        denoiser=SimpleNamespace(coverage=lambda: (whole, whole)),
+        denoiser=SimpleNamespace(coverage=lambda: (coverage, coverage)),
         session=SimpleNamespace(engine=SimpleNamespace(threads=1)),
         source=SimpleNamespace(width=64),
         sample_source=SimpleNamespace(width=64),
     )
     row, column = np.indices((64, 64))
-    probes = np.where(((row + 2 * column) % 4 == 0)[..., None], np.ones(3), np.nan)
-    key = _Picture(PixelWindow(0, 0, 64, 64), probes, np.zeros((64, 64)), probes)
+    whole = np.ones((64, 64, 3))
+    probes = np.where(((row + 2 * column) % 4 == 0)[..., None], whole, np.nan)
+    key = _Picture(PixelWindow(0, 0, 64, 64), probes, np.zeros((64, 64)), probes, whole)
     few = probes.copy()
     few[32, 32] = few[28, 30] = 0
     assert _find_still(key, replace(key, probes=few), job).all()
@@ -150,13 +151,19 @@ def test_two_probes_that_change_leave_no_patch_but_an_even_change_is_found():
     is_still = _find_still(key, replace(key, features=np.where(column < 20, 1.0, 0.0)), job)
     assert not is_still[:, :28].any()
     assert is_still[:, 28:].all()
+    # The shadow of a wire, which takes half of the light from one row, and which no probe of whole paths meets.
+    shadow = np.where(row == 33, 0.5, 1)[..., None]
+    is_still = _find_still(key, replace(key, probes=shadow * probes, direct=shadow * whole), job)
+    assert not is_still[33].any()
+    assert is_still[:31].all()
+    assert is_still[36:].all()
 
 
 def test_another_window_finds_each_pixels_own_sub_pixels():
     from lippmann.sequences.still_pixels import _Picture
 
     whole = np.arange(6.0 * 3 * 8).reshape(6, 24)  # 8 pixels of 3 sub-pixels in a row
-    key = _Picture(PixelWindow(10, 20, 8, 6), np.repeat(whole[..., None], 3, axis=2), whole, whole[..., None])
+    key = _Picture(PixelWindow(10, 20, 8, 6), np.repeat(whole[..., None], 3, axis=2), whole, *2 * [whole[..., None]])
     part = key.crop(PixelWindow(13, 18, 7, 4), 3)
     assert part.features.shape == (4, 21)
     assert np.isnan(part.features[:2]).all()

@@ -7,7 +7,8 @@ knowledge of what has moved:
 * Their feature buffers are the key frame's, bit for bit. All frames trace them along the same rays.
 * Where a surface is seen, *probes* of the key frame and of this one agree around the pixel: single paths of every
   fourth pixel with the same random numbers, which differ only where they meet another surface or another shadow (the
-  temporal gradient of Schied et al. 2018, "Gradient Estimation for Real-Time Adaptive Temporal Filtering").
+  temporal gradient of Schied et al. 2018, "Gradient Estimation for Real-Time Adaptive Temporal Filtering"). Narrow
+  shadows, which few of these meet, are found by paths of every pixel that end at the first surface.
 
 Probes know no caustics, which paths hardly find: pictures with photons are traced whole.
 """
@@ -54,12 +55,15 @@ class _Picture:
         ``(H, columns W)``: numbers that tell the feature buffers.
     probes:
         ``(H, columns W, 3)`` linear, NaN where there are none.
+    direct:
+        ``(H, columns W, 3)``: those of direct light, likewise.
     """
 
     window: PixelWindow
     pixels: Floats
     features: NDArray[np.float64]
     probes: Floats
+    direct: Floats
 
     def crop(self, window: PixelWindow, columns: int) -> _Picture:
         """The part that another window of the panel shows; NaN where it shows more."""
@@ -73,7 +77,7 @@ class _Picture:
                 there[_locate(common, window, columns)] = values[_locate(common, self.window, columns)]
             return there
 
-        return _Picture(window, part(self.pixels), part(self.features), part(self.probes))
+        return _Picture(window, part(self.pixels), part(self.features), part(self.probes), part(self.direct))
 
 
 def _locate(part: PixelWindow, window: PixelWindow, columns: int) -> tuple[slice, slice]:
@@ -101,8 +105,8 @@ class StillPixels(KeyLight):
         if self._key is None or window is None:
             return trace(job)
         key = self._key.crop(window, columns)
-        probes, rays = _trace_probes(job, window)
-        self._own = own = _Picture(window, key.pixels, _hash_features(job), probes)
+        probes, direct, rays = _trace_probes(job, window)
+        self._own = own = _Picture(window, key.pixels, _hash_features(job), probes, direct)
         is_known = _find_still(key, own, job)
         if not is_known.any():
             return trace(job)
@@ -110,7 +114,8 @@ class StillPixels(KeyLight):
         traced.frame.rays += rays
         # Changes count from the frame whose samples a pixel shows.
         is_kept = np.repeat(is_known, columns, axis=1)[..., None]
-        self._own = replace(own, probes=np.where(is_kept, key.probes, probes))
+        shown = {"probes": np.where(is_kept, key.probes, probes), "direct": np.where(is_kept, key.direct, direct)}
+        self._own = replace(own, **shown)
         return traced
 
     def holds(self, key: Moment, moment: Moment) -> bool:
@@ -121,7 +126,7 @@ class StillPixels(KeyLight):
         if self._own is not None:
             self._key = replace(self._own, pixels=pixels)
         elif window is not None:
-            self._key = _Picture(window, pixels, _hash_features(job), _trace_probes(job, window)[0])
+            self._key = _Picture(window, pixels, _hash_features(job), *_trace_probes(job, window)[:2])
         self._own = None
 
     def _forget(self) -> None:
@@ -150,48 +155,59 @@ def _hash_features(job: Job) -> NDArray[np.float64]:
     )
 
 
-def _trace_probes(job: Job, window: PixelWindow) -> tuple[Floats, RayTotals]:
-    """Probes ``(H, columns W, 3)`` of a picture, and the rays traced for them."""
+def _trace_probes(job: Job, window: PixelWindow) -> tuple[Floats, Floats, RayTotals]:
+    """Probes ``(H, columns W, 3)`` of a picture, those of its direct light, and the rays traced for them."""
     from lippmann.device.sobol import named_seed
     from lippmann.rendering.film.memory_model import cut_wavefronts
     from lippmann.rendering.film.wavefront import RayTotals, trace_frame
     from lippmann.rendering.transport.path import PathIntegrator, PreparedLight
 
     assert isinstance(job.integrator, PathIntegrator)
-    source = job.sample_source
-    probes = np.full((source.height, source.width, 3), np.nan, np.float32)
+    source, rays = job.sample_source, RayTotals()
     row, column = np.indices((source.height, source.width))
     column += count_columns(job) * window.left
-    is_probed = ((row + window.top + 2 * column) % TUNING.pixels_of_probe == 0) & (sum_coverage(job) > 0)
+    is_surface = sum_coverage(job) > 0
+    is_probed = is_surface & ((row + window.top + 2 * column) % TUNING.pixels_of_probe == 0)
     # Light that was prepared for one scene would make other paths in another.
-    plain, rays = job.integrator.lit_by(PreparedLight()), RayTotals()
-    for few, places in rays_of(source, is_probed):
-        plan = cut_wavefronts(few.width, few.height, 1, channels=1, memory=job.session.memory)
-        frame = trace_frame(plain, few, plan, seed=named_seed("probes"), box_filter=job.request.box_filter)
-        probes[places] = frame.pixels[0]
-        rays += frame.rays
-    return probes, rays
+    plain = job.integrator.lit_by(PreparedLight())
+    found = []
+    for integrator, is_chosen in ((plain, is_probed), (plain.with_depth(1), is_surface)):
+        probes = np.full((source.height, source.width, 3), np.nan, np.float32)
+        for few, places in rays_of(source, is_chosen):
+            plan = cut_wavefronts(few.width, few.height, 1, channels=1, memory=job.session.memory)
+            seed = named_seed("probes")
+            frame = trace_frame(integrator, few, plan, seed=seed, box_filter=job.request.box_filter)
+            probes[places] = frame.pixels[0]
+            rays += frame.rays
+        found.append(probes)
+    return found[0], found[1], rays
 
 
 def _find_still(key: _Picture, own: _Picture, job: Job) -> Mask:
     """The pixels ``(H, W)`` that show the same light in both pictures."""
+    is_same = key.features == own.features
+    is_agreed = _find_agreed(key.probes, own.probes, is_same, TUNING.probe_reach, job)
+    is_agreed &= _find_agreed(key.direct, own.direct, is_same, TUNING.direct_reach, job)
+    is_still = is_same & (is_agreed | (sum_coverage(job) == 0))
+    return np.asarray(is_still.reshape(len(is_still), -1, count_columns(job)).all(axis=2))
+
+
+def _find_agreed(key: Floats, own: Floats, is_same: Mask, reach: int, job: Job) -> Mask:
+    """Where probes ``(H, columns W, 3)`` agree in the mean over ``reach`` pixels to either side."""
     from lippmann.rendering.denoise.noisy_blend import mean_around
     from lippmann.runtime.row_threads import Bands
 
-    is_same = key.features == own.features
-    change, light = np.abs(own.probes - key.probes).sum(axis=2), (own.probes + key.probes).sum(axis=2)
+    change, light = np.abs(own - key).sum(axis=2), (own + key).sum(axis=2)
     is_probed, is_lit = ~np.isnan(light), light > 0
     # Beside another surface light is taken to change, too.
     change = np.where(is_same, np.divide(change, light, out=np.zeros_like(light), where=is_lit), is_lit)
     bands = Bands(job.session.engine.threads)
     parts = change, np.square(change), is_lit, is_probed
-    change, squares, lit, probed = (mean_around(part.astype(np.float32), TUNING.probe_reach, bands) for part in parts)
+    change, squares, lit, probed = (mean_around(part.astype(np.float32), reach, bands) for part in parts)
     # Less its standard error: a few long paths that meet what moves would leave patches of grain on clean surfaces.
-    change -= np.sqrt(squares) / (2 * TUNING.probe_reach + 1)
+    change -= np.sqrt(squares) / (2 * reach + 1)
     # Where no probe finds light in either frame, such as on the outer side of a wall, there is none to change.
-    is_agreed = (probed > 0) & (change <= TUNING.largest_change * lit)
-    is_still = is_same & (is_agreed | (sum_coverage(job) == 0))
-    return np.asarray(is_still.reshape(len(is_still), -1, count_columns(job)).all(axis=2))
+    return np.asarray((probed > 0) & (change <= TUNING.largest_change * lit))
 
 
 __all__ = ["StillPixels"]

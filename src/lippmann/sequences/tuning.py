@@ -26,6 +26,8 @@ class FilmTuning:
         Of so many pixels one has a probe.
     probe_reach:
         Pixels to either side whose probes are averaged.
+    direct_reach:
+        Likewise, of those of direct light.
     largest_change:
         Largest mean change of probes, less its standard error, as a share of the light of both.
     least_traced:
@@ -43,6 +45,7 @@ class FilmTuning:
     farthest: float = 1 / 3
     pixels_of_probe: int = 4
     probe_reach: int = 8
+    direct_reach: int = 2
     largest_change: float = 0.02
     least_traced: float = 0.01
     moments: int = 65

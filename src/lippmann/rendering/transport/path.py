@@ -174,6 +174,10 @@ class PathIntegrator:
         """The same integrator with other prepared light."""
         return PathIntegrator(self.scene, self.features, self.depth, self.name, light, self.shadow_rays)
 
+    def with_depth(self, depth: int) -> PathIntegrator:
+        """The same integrator for paths of up to ``depth`` surfaces, without prepared light."""
+        return PathIntegrator(self.scene, self.features, depth, self.name, shadow_rays=self.shadow_rays)
+
     def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Spectrum, RayCounts]:
         """Radiance along ``ray``, and the rays traced for it."""
         radiance, counts, _ = self.sample_with_hit(ray, stream, active)
