@@ -114,8 +114,8 @@ class StillPixels(KeyLight):
         traced.frame.rays += rays
         # Changes count from the frame whose samples a pixel shows.
         is_kept = np.repeat(is_known, columns, axis=1)[..., None]
-        shown = {"probes": np.where(is_kept, key.probes, probes), "direct": np.where(is_kept, key.direct, direct)}
-        self._own = replace(own, **shown)
+        probes, direct = (np.where(is_kept, *pair) for pair in ((key.probes, probes), (key.direct, direct)))
+        self._own = replace(own, probes=probes, direct=direct)
         return traced
 
     def holds(self, key: Moment, moment: Moment) -> bool:
