@@ -28,7 +28,11 @@ def export(
     ] = None,
     distance: Annotated[
         float | None,
-        typer.Option("--distance", help="Distance of the cameras in mm, for hci and displays of parallel views."),
+        typer.Option(
+            "--distance",
+            help="Distance of the cameras in mm, for hci and displays of parallel views. Default: 100 times the depth "
+            "that the display resolves.",
+        ),
     ] = None,
     bits: Annotated[
         int | None,

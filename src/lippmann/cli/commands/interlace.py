@@ -81,7 +81,10 @@ def interlace(
     printed: PrintOptions,
     finishing: Annotated[FinishOptions, without("icc")],
 ) -> None:
-    """Interlace photographs or frames for a lenticular print or display."""
+    """Interlace photographs or frames for a lenticular print or display.
+
+    A print needs --lpi (or --print-lpi), --ppi and --size; a panel --display alone.
+    """
     from lippmann.calibration.finish import NO_FINISH
     from lippmann.quilts.interlace import check_interlaced_path, view_size, write_interlaced
     from lippmann.quilts.photos import natural_order, read_photos

@@ -117,7 +117,10 @@ def pitch_test(
     *,
     printed: PrintOptions,
 ) -> None:
-    """Write a pitch test: strips at slightly different print pitches, to find the sheet's."""
+    """Write a pitch test: strips at slightly different print pitches, to find the sheet's.
+
+    It needs --lpi (or --print-lpi), --ppi and --size.
+    """
     from lippmann.calibration.pitch_strips import PitchTest
     from lippmann.codecs.tiff_strips import write_tiff_bands
     from lippmann.display.panel import PixelWindow
