@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lippmann.display import load_display
+from lippmann.display import Display, LensArray, Panel, load_display
 from lippmann.errors import OutputError, PictureError
-from lippmann.image import read_picture
+from lippmann.image import IntegralImage, read_picture
 from lippmann.quilts.quilt import Quilt, QuiltLayout
+from lippmann.quilts.weave import view_fraction
 from lippmann.viewing.replay import default_eye, replay
 from lippmann.viewing.video_frames import WIDEST_QUILT, projection_of, quilt_of, quilt_of_video, view_toward
 
@@ -44,6 +45,17 @@ def test_the_views_of_a_quilt_go_from_left_to_right_across_the_field(image):
     for number, place in enumerate((-1 / 3, 0, 1 / 3)):
         assert np.array_equal(quilt.view(number), replay(image, (x + place * reach, y, z), size=size))
     assert not np.array_equal(quilt.view(0), quilt.view(2))
+
+
+def test_the_views_of_a_slanted_panels_quilt_are_those_of_its_cone():
+    """Level eyes cross the slanted lenses by the cosine of what they move: at 30 degrees 2 of 20 views were missing."""
+    panel = Panel(240, 90, 0.1)
+    display = Display("d", panel, LensArray("lenticular", 4.8, slant=30.0), 6.0, viewing_distance=300.0)
+    x, y = display.panel_point(*np.meshgrid(np.arange(240) + 0.5, np.arange(90) + 0.5))
+    numbers = np.repeat(20 * view_fraction(display, x, y)[..., None], 3, axis=-1)
+    quilt = quilt_of(IntegralImage(numbers, display), QuiltLayout(20, 1, None))
+    for number in (0, 9, 19):
+        assert np.median(quilt.view(number)) == pytest.approx(number + 0.5, abs=0.2)
 
 
 def test_what_a_quilt_leaves_free_on_the_right_and_on_top_is_left_out():

@@ -127,7 +127,7 @@ def _resize(pixels: FloatArray, width: int, height: int) -> FloatArray:
 
 
 def quilt_of(image: IntegralImage, layout: QuiltLayout, eye: Eye | None = None) -> Quilt:
-    """Quilt of replays from equally spaced eyes across the display's field of view.
+    """Quilt of replays from equally spaced eyes on a level line across the display's view cone.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def quilt_of(image: IntegralImage, layout: QuiltLayout, eye: Eye | None = None) 
         Position ``(x, y, z)`` of the central eye in the display frame in mm. None: the centre of the viewing zone.
     """
     x, y, z = default_eye(image.display) if eye is None else eye
-    reach = 2 * z * math.tan(math.radians(image.display.field_of_view / 2))
+    reach = 2 * z * cone_tangent(image.display)
     width, height = default_size(image.display, WIDEST_QUILT // layout.columns)
     quilt = Quilt(np.empty((height * layout.rows, width * layout.columns, 3), dtype=np.float32), layout)
     for number in range(layout.views):

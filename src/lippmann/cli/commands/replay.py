@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -195,14 +194,15 @@ def _write_eye_views(
 def _sweep_before(display: Display, middle: Place, width: float | None, frames: int | None) -> list[Place]:
     """Places of an eye that sweeps ``width`` mm from left to right about ``middle``; by default over all views.
 
-    That is from the middle of the outermost pixel under a lens to that of the other one: at the edges of the field of
-    view, half a pixel farther, the views flip, and an eye sees those of both sides at once.
+    That is from the middle of the outermost pixel under a lens to that of the other one: at the edges of the view
+    cone, half a pixel farther, the views flip, and an eye sees those of both sides at once.
     """
+    from lippmann.display.view_cone import cone_tangent
     from lippmann.viewing.replay import path_of_eye
 
     reach = width
     if reach is None:
-        reach = _field_width(display, middle[2]) * (1 - 1 / display.pixels_per_lens[0])
+        reach = 2 * middle[2] * cone_tangent(display) * (1 - 1 / display.pixels_per_lens[0])
     start, stop = ((middle[0] + side * reach / 2, *middle[1:]) for side in (-1, 1))
     return path_of_eye(start, stop, 48 if frames is None else frames)
 
@@ -384,8 +384,3 @@ def _stereo(sbs: Literal["full", "half"] | None, anaglyph: bool, eyes: float | N
 
 def _position(eye: tuple[float, float, float]) -> str:
     return f"({eye[0]:.0f}, {eye[1]:.0f}, {eye[2]:.0f}) mm"
-
-
-def _field_width(display: Display, distance: float) -> float:
-    """Width in mm of the display's field of view at ``distance`` mm, from one flip of the views to the next."""
-    return 2 * distance * math.tan(math.radians(display.field_of_view / 2))
