@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -202,7 +203,8 @@ def _sweep_before(display: Display, middle: Place, width: float | None, frames: 
 
     reach = width
     if reach is None:
-        reach = 2 * middle[2] * cone_tangent(display) * (1 - 1 / display.pixels_per_lens[0])
+        width_of_pixel = 1 + math.tan(math.radians(abs(display.lens_array.slant)))  # across the lenses, with its height
+        reach = 2 * middle[2] * cone_tangent(display) * (1 - width_of_pixel / display.pixels_per_lens[0])
     start, stop = ((middle[0] + side * reach / 2, *middle[1:]) for side in (-1, 1))
     return path_of_eye(start, stop, 48 if frames is None else frames)
 
