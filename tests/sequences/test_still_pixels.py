@@ -140,7 +140,7 @@ def test_two_probes_that_change_leave_no_patch_but_an_even_change_and_a_narrow_o
     row, column = np.indices((64, 64))
     whole = np.ones((64, 64, 3))
     probes = np.where(((row + 2 * column) % 4 == 0)[..., None], whole, np.nan)
-    key = _Picture(PixelWindow(0, 0, 64, 64), probes, np.zeros((64, 64)), probes, whole)
+    key = _Picture(PixelWindow(0, 0, 64, 64), probes, np.zeros((64, 64)), probes, whole, None, np.zeros((64, 64), bool))
     few = probes.copy()
     few[32, 32] = few[28, 30] = 0
     assert _find_still(key, replace(key, probes=few), job).all()
@@ -159,11 +159,27 @@ def test_two_probes_that_change_leave_no_patch_but_an_even_change_and_a_narrow_o
     assert is_still[36:].all()
 
 
+def test_the_error_that_flickers_is_that_of_the_pixels_that_were_traced():
+    from lippmann.sequences.still_pixels import _sum_share
+
+    is_outline = np.array([[True, False, False]])
+    assert _sum_share(np.array([[3.0, 1.0, np.nan]], np.float32), is_outline) == pytest.approx(0.75)
+    assert _sum_share(np.array([[3.0, -1.0, 0.0]], np.float32), is_outline) == 1.0  # single estimates may be negative
+    assert _sum_share(None, is_outline) == 1.0
+
+
 def test_another_window_finds_each_pixels_own_sub_pixels():
     from lippmann.sequences.still_pixels import _Picture
 
     whole = np.arange(6.0 * 3 * 8).reshape(6, 24)  # 8 pixels of 3 sub-pixels in a row
-    key = _Picture(PixelWindow(10, 20, 8, 6), np.repeat(whole[..., None], 3, axis=2), whole, *2 * [whole[..., None]])
+    key = _Picture(
+        PixelWindow(10, 20, 8, 6),
+        np.repeat(whole[..., None], 3, axis=2),
+        whole,
+        *2 * [whole[..., None]],
+        whole,
+        whole > 100,
+    )
     part = key.crop(PixelWindow(13, 18, 7, 4), 3)
     assert part.features.shape == (4, 21)
     assert np.isnan(part.features[:2]).all()
@@ -171,6 +187,10 @@ def test_another_window_finds_each_pixels_own_sub_pixels():
     np.testing.assert_array_equal(part.features[2:, :15], whole[:2, 9:])
     np.testing.assert_array_equal(part.pixels[2:, :15, 0], whole[:2, 9:])
     np.testing.assert_array_equal(part.probes[2:, :15, 0], whole[:2, 9:])
+    # Nothing is known of the errors of what the other window does not show.
+    assert np.isnan(part.errors[:2]).all()
+    assert part.is_swept[:2].all()
+    assert not part.is_swept[2:, :15].any()
     assert np.isnan(key.crop(PixelWindow(40, 20, 8, 6), 3).pixels).all()
 
 
@@ -197,7 +217,7 @@ def test_a_key_frame_in_mid_film_keeps_its_own_features_and_probes(monkeypatch):
 
     none = np.zeros((0, 0))
     still, job = StillPixels(), SimpleNamespace(source=SimpleNamespace(width=1), sample_source=SimpleNamespace(width=1))
-    still._own = still_pixels._Picture(PixelWindow(0, 0, 9, 9), none, none, none)  # of the frame before
+    still._own = still_pixels._Picture(PixelWindow(0, 0, 9, 9), *[none] * 6)  # of the frame before
     monkeypatch.setattr(still_pixels, "_find_window", lambda job: None)
     still.trace_key(job, lambda job: SimpleNamespace(frame=SimpleNamespace(pixels=none)))
     assert still._key is None

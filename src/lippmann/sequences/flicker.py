@@ -11,7 +11,7 @@ from lippmann.sequences.tuning import TUNING
 Figures = Mapping[str, object]
 
 
-def add_flicker(estimate: Figures | None, traced: float = 1.0, *, stays: bool = False) -> Figures | None:
+def add_flicker(estimate: Figures | None, traced: float = 1.0, *, traced_error: float = 1.0) -> Figures | None:
     """A frame's estimate, as its file holds it, with its flicker.
 
     Flicker is half the mean squared change of the error from one frame to the next, in dB, as
@@ -21,7 +21,7 @@ def add_flicker(estimate: Figures | None, traced: float = 1.0, *, stays: bool = 
     a picture alike may stay from frame to frame, which does not flicker, or be new in each: half of it counts, and all
     and none of it are the ends of the interval. Pixels that take a key frame's light may not flicker at all, so that
     the upper end counts those alone that were traced. Behind a display at rest they keep their code, so that the
-    flicker itself counts the traced ones alone, too, with the mean error of all.
+    flicker itself counts the error of the traced ones alone, too.
 
     Parameters
     ----------
@@ -29,8 +29,8 @@ def add_flicker(estimate: Figures | None, traced: float = 1.0, *, stays: bool = 
         What :meth:`~lippmann.rendering.estimate.psnr.Estimate.to_dict` gives; None where nothing is known.
     traced:
         Share of the pixels that were traced.
-    stays:
-        Whether the others show what they showed in the frame before.
+    traced_error:
+        Share of the squared error in these, where the others show what they showed in the frame before.
 
     Returns
     -------
@@ -41,9 +41,10 @@ def add_flicker(estimate: Figures | None, traced: float = 1.0, *, stays: bool = 
     by_chance, psnr, low, high = (
         cast("float", estimate[name]) for name in ("by_chance", "psnr", "psnr_low", "psnr_high")
     )
-    fewer = -10 * math.log10(max(traced, TUNING.least_traced))
-    middle = mean_psnr((by_chance, psnr)) + (fewer if stays else 0.0)
-    most = max(by_chance, high) + fewer
+    moving, fewest = (
+        -10 * math.log10(max(share, TUNING.least_traced)) for share in (traced_error, min(traced, traced_error))
+    )
+    middle, most = mean_psnr((by_chance, psnr)) + moving, max(by_chance, high) + fewest
     return {**estimate, "flicker": round(middle, 2), "flicker_low": low, "flicker_high": round(most, 2)}
 
 

@@ -346,8 +346,9 @@ def make_frame_renderer(
         estimate = keys.estimate(made, key)
         # Noise that stands still has no flicker that the frames' own errors would tell.
         if not request.fixed_noise:
-            stays = shared is not None and shared.keeps_noise
-            estimate = add_flicker(estimate, made.pixel_shares.get("traced", 1.0), stays=stays)
+            shares = made.pixel_shares
+            traced_error = shared.traced_error if shared is not None and shares else 1.0
+            estimate = add_flicker(estimate, shares.get("traced", 1.0), traced_error=traced_error)
         return replace(image, provenance=replace(made, options={**made.options, "frame": frame}, estimate=estimate))
 
     return render

@@ -40,6 +40,8 @@ class KeyLight(ABC):
     keeps_noise = False
     #: Every so many frames one passes on the light that it took.
     frames_of_link = TUNING.frames_of_key
+    #: Share of a key frame's squared error in the pixels that have been traced since: these alone flicker.
+    traced_error = 1.0
 
     def trace_key(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
         """Trace a key frame; parameters as of ``trace_through`` in

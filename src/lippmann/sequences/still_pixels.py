@@ -57,6 +57,10 @@ class _Picture:
         ``(H, columns W, 3)`` linear, NaN where there are none.
     direct:
         ``(H, columns W, 3)``: those of direct light, likewise.
+    errors:
+        ``(H, columns W)``: estimated squared errors of the key frame; None where it tells none.
+    is_swept:
+        ``(H, columns W)``: pixels that have been traced since the key frame.
     """
 
     window: PixelWindow
@@ -64,6 +68,8 @@ class _Picture:
     features: NDArray[np.float64]
     probes: Floats
     direct: Floats
+    errors: Floats | None
+    is_swept: Mask
 
     def crop(self, window: PixelWindow, columns: int) -> _Picture:
         """The part that another window of the panel shows; NaN where it shows more."""
@@ -77,7 +83,9 @@ class _Picture:
                 there[_locate(common, window, columns)] = values[_locate(common, self.window, columns)]
             return there
 
-        return _Picture(window, part(self.pixels), part(self.features), part(self.probes), part(self.direct))
+        pixels, features, probes, direct = map(part, (self.pixels, self.features, self.probes, self.direct))
+        errors = None if self.errors is None else part(self.errors)
+        return _Picture(window, pixels, features, probes, direct, errors, part(self.is_swept))
 
 
 def _locate(part: PixelWindow, window: PixelWindow, columns: int) -> tuple[slice, slice]:
@@ -106,16 +114,19 @@ class StillPixels(KeyLight):
             return trace(job)
         key = self._key.crop(window, columns)
         probes, direct, rays = _trace_probes(job, window)
-        self._own = own = _Picture(window, key.pixels, _hash_features(job), probes, direct)
+        self._own = own = replace(
+            key, features=_hash_features(job), probes=probes, direct=direct, is_swept=np.ones_like(key.is_swept)
+        )
         is_known = _find_still(key, own, job)
         if not is_known.any():
             return trace(job)
         traced = trace_others(job, key.pixels, is_known)
         traced.frame.rays += rays
         # Changes count from the frame whose samples a pixel shows.
-        is_kept = np.repeat(is_known, columns, axis=1)[..., None]
-        probes, direct = (np.where(is_kept, *pair) for pair in ((key.probes, probes), (key.direct, direct)))
-        self._own = replace(own, probes=probes, direct=direct)
+        is_kept = np.repeat(is_known, columns, axis=1)
+        probes, direct = (np.where(is_kept[..., None], *pair) for pair in ((key.probes, probes), (key.direct, direct)))
+        self._own = own = replace(own, probes=probes, direct=direct, is_swept=key.is_swept | ~is_kept)
+        self.traced_error = _sum_share(key.errors, own.is_swept)
         return traced
 
     def holds(self, key: Moment, moment: Moment) -> bool:
@@ -126,11 +137,23 @@ class StillPixels(KeyLight):
         if self._own is not None:
             self._key = replace(self._own, pixels=pixels)
         elif window is not None:
-            self._key = _Picture(window, pixels, _hash_features(job), *_trace_probes(job, window)[:2])
+            probes, direct, _ = _trace_probes(job, window)
+            values = None if traced.errors is None else traced.errors.values
+            errors = None if values is None else np.repeat(values, count_columns(job), axis=1)
+            nothing = np.zeros(pixels.shape[:2], bool)
+            self._key = _Picture(window, pixels, _hash_features(job), probes, direct, errors, nothing)
         self._own = None
 
     def _forget(self) -> None:
         self._key = None
+
+
+def _sum_share(errors: Floats | None, is_chosen: Mask) -> float:
+    """The chosen pixels' share of all errors, as far as these are known."""
+    if errors is None:
+        return 1.0
+    share = np.nansum(errors[is_chosen], dtype=np.float64) / max(np.nansum(errors, dtype=np.float64), 1e-30)
+    return float(np.clip(share, 0.0, 1.0))
 
 
 def _find_window(job: Job) -> PixelWindow | None:
