@@ -91,6 +91,15 @@ def test_what_appears_is_switched_or_jumps(changed):
     assert is_cut(moment(), moment(**changed), DISPLAY)
 
 
+@pytest.mark.parametrize("size", [0.0, 1e-4])
+def test_what_appears_by_its_size_is_a_cut(size):
+    seen, hidden = (moment(instances=places(scaling(0.2 * scale))) for scale in (1, size))
+    assert is_cut(hidden, seen, DISPLAY)
+    assert is_cut(seen, hidden, DISPLAY)
+    assert not is_cut(hidden, hidden, DISPLAY)
+    assert not is_cut(seen, moment(instances=places(scaling(0.1))), DISPLAY)
+
+
 def test_smooth_motion():
     assert not is_cut(moment(), moment(instances=places(translation([0.3, 0, 0]))), DISPLAY)
     assert not is_cut(moment(), moment(translation([0, 0, 0.3])), DISPLAY)

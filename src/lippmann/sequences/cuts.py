@@ -28,8 +28,9 @@ class Moment(NamedTuple):
 def is_cut(before: Moment, after: Moment, display: Display) -> bool:
     """Whether two frames differ by more than smooth motion.
 
-    They do where meshes, materials, textures or light sources are others, or where the display, any mesh or any light
-    source has moved farther than a third of the display's width. Light sources may go along with the display instead.
+    They do where meshes, materials, textures or light sources are others, where a mesh appears or vanishes by its size,
+    at one pixel, or where the display, any mesh or any light source has moved farther than a third of the display's
+    width. Light sources may go along with the display instead.
     """
     width, height = display.size_mm
     panel = box_corners(np.array([[-width / 2, -height / 2, 0], [width / 2, height / 2, 0]]))
@@ -42,7 +43,11 @@ def is_cut(before: Moment, after: Moment, display: Display) -> bool:
             return True
         if _list_content(one) != _list_content(other) or not _has_same_texels(one, other):
             return True
-        moved.append(_measure_distances(_place_corners(one), _place_corners(other)))
+        corners = _place_corners(one), _place_corners(other)
+        are_seen = [np.ptp(boxes, axis=1).max(axis=1) >= reach / display.panel.width for boxes in corners]
+        if not np.array_equal(*are_seen):
+            return True
+        moved.append(_measure_distances(*(boxes.reshape(-1, 3) for boxes in corners)))
         lights = _place_lights(one, reach), _place_lights(other, reach)
         # A turntable's display goes round with them.
         along = transform_points(before.placement.world_from_display @ after.placement.display_from_world, lights[1])
@@ -104,11 +109,11 @@ def _place_lights(description: SceneDescription, reach: float) -> Bounds:
 
 
 def _place_corners(description: SceneDescription) -> Bounds:
-    """Corners ``(n, 3)`` of the boxes of all meshes, one for each copy, world units."""
-    corners = [np.zeros((0, 3))]
+    """Corners ``(n, 8, 3)`` of the boxes of all meshes, one for each copy, world units."""
+    corners = [np.zeros((0, 8, 3))]
     for mesh, places in description.placements.items():
         positions = description.meshes[mesh].positions
         if len(positions):
             box = box_corners(np.stack([positions.min(axis=0), positions.max(axis=0)]))
-            corners.append((box @ places[:, :3, :3].transpose(0, 2, 1) + places[:, None, :3, 3]).reshape(-1, 3))
+            corners.append((box @ places[:, :3, :3].transpose(0, 2, 1) + places[:, None, :3, 3]).reshape(-1, 8, 3))
     return np.concatenate(corners)
