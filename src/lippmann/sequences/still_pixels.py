@@ -83,7 +83,8 @@ class _Picture:
                 there[_locate(common, window, columns)] = values[_locate(common, self.window, columns)]
             return there
 
-        pixels, features, probes, direct = map(part, (self.pixels, self.features, self.probes, self.direct))
+        pixels, features = part(self.pixels), part(self.features)
+        probes, direct = part(self.probes), part(self.direct)
         errors = None if self.errors is None else part(self.errors)
         return _Picture(window, pixels, features, probes, direct, errors, part(self.is_swept))
 
