@@ -43,7 +43,7 @@ class PhotonShooter:
         self._scene = scene
         self._features = features
         self._casters = casters
-        self._emitter_numbers = mi.UInt32(casters.emitters)
+        self._emitter_numbers = upload(casters.emitters)
 
     def shoot(self, count: int, chances: NDArray[np.float64], seed: int) -> tuple[Photons, NDArray[np.int64]]:
         """Photons of ``count`` emissions, shared among the pairs by ``chances``, and the pair of each photon."""
