@@ -23,7 +23,7 @@ from lippmann.scene.values.description import (
     SceneDescription,
     Texture,
 )
-from lippmann.sequences.cuts import Moment, is_cut, is_light_at_rest
+from lippmann.sequences.cuts import Moment, are_emitters_at_rest, is_cut, is_light_at_rest
 from lippmann.sequences.frames import place_frames
 from lippmann.sequences.motion import open_motion
 from lippmann.sequences.turntable import open_turntable
@@ -114,6 +114,15 @@ def test_light_sources_move_smoothly_or_go_along_with_the_display():
     assert not is_cut(moment(**light(far)), moment(turned(10.0), **light(turned(10.0) @ far)), DISPLAY)
     assert is_cut(moment(**light(far)), moment(turned(10.0), **light(turned(-10.0) @ far)), DISPLAY)
     assert not is_cut(moment(**light(far)), moment(turned(10.0), **light(far)), DISPLAY)
+
+
+@pytest.mark.parametrize("glows", [False, True])
+def test_light_that_moves_is_not_at_rest_whether_it_is_a_source_or_a_surface(glows):
+    materials = {"materials": [Material(emission=(float(glows),) * 3)]}
+    aside = translation([0.1, 0, 0])
+    assert are_emitters_at_rest(moment(**materials), moment(**materials))
+    assert not are_emitters_at_rest(moment(**materials), moment(**materials, **light(aside)))
+    assert are_emitters_at_rest(moment(**materials), moment(**materials, instances=places(aside))) != glows
 
 
 def test_a_texture_is_changed():

@@ -66,6 +66,23 @@ def is_light_at_rest(before: Moment, after: Moment) -> bool:
     return bool(np.ptp(list(turns), axis=0).max() < 1e-6)
 
 
+def are_emitters_at_rest(before: Moment, after: Moment) -> bool:
+    """Whether no light source has moved, and no surface that emits light."""
+    one, other = before.scene.description, after.scene.description
+    if one is other or not (isinstance(one, SceneDescription) and isinstance(other, SceneDescription)):
+        return True
+    pairs = zip(_list_emitters(one), _list_emitters(other), strict=True)
+    return all(np.array_equal(*pair) for pair in pairs)
+
+
+def _list_emitters(description: SceneDescription) -> Iterator[NDArray[np.floating]]:
+    """Matrices of all light sources; corners and matrices of the copies of all meshes that emit light."""
+    yield from (light.world_from_light for light in description.lights)
+    for mesh, places in description.placements.items():
+        if any(description.materials[description.meshes[mesh].material].emission):
+            yield from (description.meshes[mesh].positions, places)
+
+
 def _measure_distances(one: Bounds, other: Bounds) -> NDArray[np.float64]:
     """Distances ``(n,)`` between points ``(n, 3)``."""
     return np.asarray(np.linalg.norm(one - other, axis=1))

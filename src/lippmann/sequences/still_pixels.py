@@ -10,7 +10,8 @@ knowledge of what has moved:
   temporal gradient of Schied et al. 2018, "Gradient Estimation for Real-Time Adaptive Temporal Filtering"). Narrow
   shadows, which few of these meet, are found by paths of every pixel that end at the first surface.
 
-Probes know no caustics, which paths hardly find: pictures with photons are traced whole.
+Probes know no caustics, which paths hardly find: pictures with photons are traced whole. So are those whose light
+sources move, all of whose pixels change.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display.panel import PixelWindow
-from lippmann.sequences.cuts import Moment
+from lippmann.sequences.cuts import Moment, are_emitters_at_rest
 from lippmann.sequences.key_light import (
     Floats,
     KeyLight,
@@ -131,7 +132,9 @@ class StillPixels(KeyLight):
         return traced
 
     def holds(self, key: Moment, moment: Moment) -> bool:
-        return np.array_equal(key.placement.world_from_display, moment.placement.world_from_display)
+        # Light that moves changes a little everywhere, which is too little for probes to tell from frame to frame.
+        is_at_rest = np.array_equal(key.placement.world_from_display, moment.placement.world_from_display)
+        return is_at_rest and are_emitters_at_rest(key, moment)
 
     def _keep(self, job: Job, traced: Traced) -> None:
         window, pixels = _find_window(job), np.repeat(traced.frame.pixels, count_columns(job), axis=1)
