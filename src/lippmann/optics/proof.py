@@ -18,7 +18,7 @@ from lippmann.optics.crosstalk import ANNOYING, MOST_STRIPS, VISIBLE, crosstalk,
 from lippmann.optics.directions import true_directions
 from lippmann.optics.first_order import extreme_ray_field, rule_of_depth
 from lippmann.optics.fitting import fit_profile, gap_of
-from lippmann.optics.lens import Lens
+from lippmann.optics.lens import Lens, check_display
 from lippmann.optics.moire import Wave, moire_waves
 from lippmann.optics.zone import ViewingZone
 from lippmann.wording import html_table
@@ -188,6 +188,7 @@ def prove(display: Display) -> Proof:
     >>> prove(lippmann.load_display("print-60lpi")).advice
     'keep the scene within 4.59 mm in front of and behind the lenses; ...'
     """
+    check_display(display)
     if display.stereo is not None:
         rule, fix = "an eye-tracked monitor steers the light of unknown lenses", "'lippmann plan' says its depth"
         raise DisplayError(f"{display.name} has no proof", parameter="display", rule=rule, fix=fix)
