@@ -39,6 +39,17 @@ def test_a_stray_point_does_not_count(tmp_path, points):
     assert len(middles(strayed)[0]) == 3002  # it is drawn all the same
 
 
+def test_tails_that_thin_out_count(tmp_path):
+    """Arms of a spiral, of which few points lie at the ends, and a normal distribution; but none of its strays."""
+    random = np.random.default_rng(1)
+    radius, arm = 6.0 * random.random(4000), np.pi * random.integers(0, 2, 4000)
+    spiral = np.stack([radius * np.cos(radius + arm), radius * np.sin(radius + arm), random.normal(0.0, 0.2, 4000)], 1)
+    scene = load_scene(cloud(tmp_path, [*spiral.round(4), (90.0, 0.0, 0.0)]), up="y")
+    extent = np.ptp(scene.bounds, axis=0)
+    assert extent[:2] == pytest.approx(np.ptp(spiral[:, :2], axis=0), rel=0.05)
+    assert 4.5 * 0.2 < extent[2] < 7.0 * 0.2
+
+
 def test_few_points_all_count(tmp_path):
     corners = [(x, y, z) for x in (0.0, 1.0) for y in (0.0, 2.0) for z in (0.0, 5.0)]
     scene = load_scene(cloud(tmp_path, corners), up="y")

@@ -21,7 +21,7 @@ def draw_cloud(clouds: Sequence[Mesh], width: Width | None = None) -> tuple[list
     :func:`lippmann.scene.splat_clouds.bulk_of`. The bulk tells how wide points are drawn, unless ``width`` says so.
     """
     positions = np.concatenate([cloud.positions for cloud in clouds]).astype(np.float64)
-    bulk = bulk_of(positions, np.ones(len(positions)))
+    bulk = bulk_of(positions, np.ones(len(positions)), tails=True)
     if not bulk.any():
         bulk[:] = True
     width = width or width_of(float(np.linalg.norm(np.ptp(positions[bulk], axis=0))), len(positions), lines=False)

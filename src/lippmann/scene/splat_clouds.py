@@ -22,6 +22,8 @@ _MOST_TELLING = 1 << 16
 #: Along each axis the cloud's extent is that between these shares of its opacity, and this share of it more on either
 #: side; but no more than between the outer ones. Floaters are seldom more than a few hundredths.
 _INNER, _MARGIN, _OUTER = 0.05, 0.15, 0.002
+#: Shares between which tails of measured points are followed outward, and how many times sparser than the inner ones.
+_TAIL, _SPARSE = (_INNER, 0.04, 0.03, 0.02, 0.01, 0.005, _OUTER), 20.0
 #: Splats that are moved at a time.
 _AT_A_TIME = 1 << 18
 #: Stretches that differ by less than this share are one.
@@ -132,16 +134,19 @@ def typical_points(splats: Splats) -> Numbers:
     return points[keep] if keep.any() else points
 
 
-def bulk_of(points: Numbers, weights: Numbers) -> NDArray[np.bool_]:
-    """Which of points ``(n, 3)`` of weights ``(n,)`` are no floaters, far outside of where nearly all weight is."""
+def bulk_of(points: Numbers, weights: Numbers, *, tails: bool = False) -> NDArray[np.bool_]:
+    """Which of points ``(n, 3)`` of weights ``(n,)`` are no floaters, far outside of where nearly all weight is.
+
+    With ``tails`` points count as far out as they thin out gradually, as measured data do.
+    """
     keep = np.ones(len(points), bool)
     for axis in range(3):
-        low, high = _extent(points[:, axis], weights)
+        low, high = _extent(points[:, axis], weights, tails=tails)
         keep &= (points[:, axis] >= low) & (points[:, axis] <= high)
     return keep
 
 
-def _extent(values: Numbers, weights: Numbers) -> tuple[float, float]:
+def _extent(values: Numbers, weights: Numbers, *, tails: bool) -> tuple[float, float]:
     order = np.argsort(values)
     values, weights = values[order], weights[order]
     total = np.cumsum(weights)
@@ -149,6 +154,12 @@ def _extent(values: Numbers, weights: Numbers) -> tuple[float, float]:
         return float(values[0]), float(values[-1])
     # A value's place is the middle of its own share.
     places = (total - weights / 2.0) / total[-1]
-    outer_low, low, high, outer_high = np.interp([_OUTER, _INNER, 1.0 - _INNER, 1.0 - _OUTER], places, values)
-    margin = _MARGIN * (high - low)
-    return float(max(outer_low, low - margin)), float(min(outer_high, high + margin))
+    shares = np.array(_TAIL)
+    down, up = (np.asarray(np.interp(at, places, values)) for at in (shares, 1.0 - shares))
+    span = float(up[0] - down[0])
+    ends = []
+    for lengths in (down[0] - down, up - up[0]):  # from an inner end outward
+        reach = min(float(lengths[-1]), _MARGIN * span)
+        is_sparse = np.diff(lengths) > _SPARSE * -np.diff(shares) * span / (1.0 - 2.0 * _INNER)
+        ends.append(max(reach, float(lengths[np.argmax([*is_sparse, True])])) if tails else reach)
+    return float(down[0]) - ends[0], float(up[0]) + ends[1]

@@ -56,6 +56,15 @@ def test_columns(read, text, name, colored, unread):
     assert sum(f"{unread} of " in note for note in scene.notes) == min(unread, 1)
 
 
+def test_names_above_the_rows_say_where_places_stand(read):
+    rows = "".join(f"{n},{z},{x},{y}\n" for n, (x, y, z) in enumerate(PLACES, 7))
+    scene = read(f'"id","Z","X","Y"\n{rows}', "a.csv")
+    (mesh,) = scene.meshes
+    middles = mesh.positions.reshape(-1, mesh.points, 3).mean(axis=1)
+    assert middles == pytest.approx(np.array(PLACES, float), abs=1e-5)
+    assert "1 of 4 columns are not shown" in scene.notes
+
+
 def test_z_is_up(tmp_path):
     path = tmp_path / "a.pts"
     path.write_text(rows())

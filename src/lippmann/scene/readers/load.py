@@ -116,7 +116,7 @@ _ELSEWHERE = {
     ".zae": "unzip it, and convert the .dae by Assimp: assimp export in.dae out.glb",
     **dict.fromkeys((".ksplat", ".lcc"), "open it in SuperSplat (superspl.at/editor), export it as .ply"),
     **dict.fromkeys((".e57", ".ptx", ".xyzrgb"), _CLOUD_COMPARE),
-    ".txt": "save clouds of points as .ply, in CloudCompare for instance, COLMAP's by its model_converter",
+    ".txt": "call rows of x, y, z of points .xyz; save COLMAP's by its model_converter as .ply",
     **dict.fromkeys((".mrc", ".map", ".ccp4"), "save it as .npy: numpy.save('a.npy', mrcfile.read('a.mrc'))"),
     **{kind: _OPEN_BABEL.format(kind) for kind in (".cube", ".gro", ".mae", ".pqr")},
     **dict.fromkeys((".bcif", ".mmtf"), "take the entry's .cif file from the data bank"),

@@ -167,7 +167,7 @@ _OWN = {
     "obj": Reader((".obj",), f"{_HERE}.obj:read_obj", options=("files",), up="y"),
     "ply": Reader((".ply",), f"{_HERE}.ply:read_ply", {b"ply\n": ".ply", b"ply\r": ".ply"}, ("files",), "y"),
     "pcd": Reader((".pcd",), f"{_HERE}.pcd:read_pcd", {b"# .PCD": ".pcd"}, up="y"),
-    "text-cloud": Reader((".pts", ".asc"), f"{_HERE}.text_cloud:read_text_cloud", up="z"),
+    "text-cloud": Reader((".pts", ".asc", ".csv"), f"{_HERE}.text_cloud:read_text_cloud", up="z"),
     "xyz": Reader((".xyz",), f"{_HERE}.text_cloud:read_xyz", up="z"),
     "las": Reader((".las", ".laz"), f"{_HERE}.lidar.reader:read_las", {b"LASF": ".las"}, up="z"),
     "off": Reader((".off",), f"{_HERE}.off:read_off", up="y"),

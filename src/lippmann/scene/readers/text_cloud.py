@@ -1,6 +1,7 @@
-"""Clouds of points as rows of numbers (``.xyz``, ``.pts``, ``.asc``), as scanners and programs of surveyors write them.
+"""Clouds of points as rows of numbers (``.xyz``, ``.pts``, ``.asc``, ``.csv``), as scanners and surveyors write them.
 
-There is no standard: a row is x, y, z, and then intensity, colours and normals in some order.
+There is no standard: a row is x, y, z, and then intensity, colours and normals in some order. A line of names above
+the rows says where x, y and z stand.
 """
 
 from __future__ import annotations
@@ -69,6 +70,7 @@ def read_text_cloud(path: Path) -> SceneDescription:
     except ValueError as error:
         fix = "has it decimal commas, or is it cut short?"
         raise SceneError(f"is no cloud of points ({error})", where=where, fix=fix) from None
+    table = _places_first(table, head[start - 1] if start else "")
     columns = {axis: table[:, place] for place, axis in enumerate("xyz")}
     after_intensity = path.suffix.lower() == ".pts"
     colors = _triple(table, _is_color, (4, 3, 6, 7) if after_intensity else (3, 4, 6, 7))
@@ -81,6 +83,15 @@ def read_text_cloud(path: Path) -> SceneDescription:
     if unread := table.shape[1] - len(columns):
         scene = replace(scene, notes=[*scene.notes, f"{unread} of {table.shape[1]} columns are not shown"])
     return scene
+
+
+def _places_first(table: NDArray[np.float64], line: str) -> NDArray[np.float64]:
+    """The table with the columns first that the line above its rows calls x, y and z."""
+    names = re.findall(r"[^\s,;\"'#/]+", line.lower())
+    if len(names) != table.shape[1] or not {"x", "y", "z"} <= set(names):
+        return table
+    first = [names.index(axis) for axis in "xyz"]
+    return table[:, first + [place for place in range(len(names)) if place not in first]]
 
 
 def _triple(
