@@ -200,7 +200,9 @@ def test_pointers_to_nodes_move_them(writer, moving, world_points):
     channel = writer.json["animations"][0]["channels"][0]
     pointer = f"/nodes/{channel['target']['node']}/translation"
     channel["target"] = {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}}
+    writer.json["extensionsUsed"] = ["KHR_animation_pointer"]
     scene = moving(writer)
+    assert not any("followed" in note for note in scene.at(0).notes)
     assert world_points(scene.at(0.5))[0, 0] - world_points(scene.at(0))[0, 0] == pytest.approx(2)
     channel["target"]["extensions"]["KHR_animation_pointer"]["pointer"] = "/nodes/9/translation"
     with pytest.raises(SceneError, match="there are 2 nodes"):

@@ -76,15 +76,14 @@ _UNDERSTOOD = frozenset(
 
 # They say nothing about what is seen while the scene stands still.
 _SILENT = frozenset({"KHR_xmp", "KHR_xmp_json_ld", "KHR_node_selectability", "KHR_node_hoverability"})
+# It moves what stands still in a scene at rest; channels that are not followed are noted one by one.
+_SILENT |= {"KHR_animation_pointer"}
 # They say where on the globe a tile lies, and what its parts stand for.
 _SILENT |= {"CESIUM_RTC", "EXT_instance_features", "EXT_mesh_features"}
 _SILENT |= {"EXT_feature_metadata", "EXT_structural_metadata"}
 
 # They say which triangles were one face, that a mesh is closed, and how an editor shows the root.
 _SILENT |= {"EXT_mesh_manifold", "FB_ngon_encoding", "GODOT_single_root"}
-
-# It moves what stands still in a scene at rest.
-_POINTER = "KHR_animation_pointer"
 
 # Surfaces as programs of shaders, and others that glTF 2.0 has no terms for: the meshes are read without them.
 _FORMER_MATERIALS = frozenset({"KHR_blend", "KHR_materials_common", "KHR_technique_webgl", "KHR_techniques_webgl"})
@@ -322,7 +321,7 @@ def check_extensions(document: Document) -> None:
         ``extensionsRequired`` names an extension that is not understood.
     """
     for name in document.root.texts("extensionsRequired"):
-        if not _is_understood(name) and name not in _SILENT | _FORMER_MATERIALS | {_POINTER}:
+        if not _is_understood(name) and name not in _SILENT | _FORMER_MATERIALS:
             raise document.error(
                 f"the file requires the glTF extension {name}",
                 rule="it is not understood",
@@ -341,8 +340,6 @@ def _remark(extension: str) -> str:
     """Consequence, in words, of an extension that the file uses, does not require, and that is not understood."""
     if extension in _FORMER_MATERIALS:
         return f"materials of the glTF extension {extension} are shown as plain ones; {_UPGRADE}"
-    if extension == _POINTER:
-        return f"animations of materials, lights, cameras and visibility ({extension}) are not followed"
     return f"the glTF extension {extension} is not understood; what it adds is left out"
 
 
