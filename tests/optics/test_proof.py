@@ -108,6 +108,14 @@ def test_advice_names_what_to_change(more, said):
     assert "keep the scene within" in advice
 
 
+def test_advice_tells_how_deep_scenes_are_fitted_on_large_pictures():
+    """A point at z spreads over z d / g: 13.75 mm x 0.04233 mm / 0.4158 mm."""
+    large, small = (prove(load_display(f"print:lpi=60,ppi=600,size={size}")).advice for size in ("A4", "60x45mm"))
+    start = "keep the scene within 4.16 mm in front of and behind the lenses"
+    assert large.startswith(f"{start} (scenes are fitted to 13.8 mm, where points are 1.4 mm wide)")
+    assert small.startswith(f"{start};")
+
+
 def test_dark_lines_make_moire():
     display = load_display("seed-lenticular")
     assert moire_waves(display) == []  # of full pixels behind upright lenses nothing is left

@@ -276,6 +276,9 @@ def _tolerances(display: Display, depth: float) -> PrintTolerances:
 def _advice(display: Display, straight: float, depth: float, tolerances: PrintTolerances | None) -> str:
     """Advice in one line: on crosstalk first, then on pixels that the lens does not tell apart, or could."""
     keep = f"keep the scene within {0.5 * depth:.3g} mm in front of and behind the lenses"
+    if display.resolved_size > display.lens_array.pitch:
+        keep += f" (scenes are fitted to {display.resolvable_depth[0]:.3g} mm, where points are "
+        keep += f"{display.resolved_size:.2g} mm wide)"
     if display.lens is None:
         return f"{keep}; with the table [lens] of a display file, or thickness= of a print, the true lens is proved"
     pixels = display.pixels_per_lens[0]
