@@ -91,6 +91,7 @@ def workplace(tmp_path, monkeypatch, moving_ball, fake_bridge):
     trimesh.creation.box().export(tmp_path / "model.obj")
     trimesh.creation.box().export(tmp_path / "model.stl")
     save_splats(tmp_path / "scan.ply")
+    save_film(tmp_path / "film.mp4")
     save_head(tmp_path)
     sky = np.ones((8, 16, 3), dtype=np.float32)
     write_plain_picture(sky, tmp_path / "sky.exr")
@@ -130,6 +131,17 @@ def save_head(folder: Path) -> None:
     values[2:10, 2:10, 2:10] = 40
     values[4:8, 4:8, 4:8] = 900
     nibabel.save(nibabel.Nifti1Image(values, np.diag([15.0, 15, 15, 1])), folder / "head.nii.gz")
+
+
+def save_film(path: Path) -> None:
+    import av
+
+    with av.open(str(path), "w") as film:
+        stream = film.add_stream("libx264", rate=24)
+        stream.width, stream.height, stream.pix_fmt = 60, 80, "yuv420p"
+        for level in (50, 150):
+            film.mux(stream.encode(av.VideoFrame.from_ndarray(np.full((80, 60, 3), level, np.uint8), format="rgb24")))
+        film.mux(stream.encode())
 
 
 def save_splats(path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 from PIL import Image, ImageCms
@@ -62,6 +63,20 @@ def test_one_animation_is_its_frames(tmp_path):
         first.save(tmp_path / name, save_all=True, append_images=others, lossless=True)
         quilt = read_photos([tmp_path / name], (8, 4), PAPER).quilt
         assert [quilt.view_values(k)[2, 4, 0] for k in range(quilt.layout.views)] == [30, 90, 160]
+
+
+def test_a_film_of_one_view_is_its_frames(tmp_path):
+    with av.open(str(tmp_path / "a.mp4"), "w") as film:
+        stream = film.add_stream("libx264", rate=24)
+        stream.width, stream.height, stream.pix_fmt = 64, 32, "yuv420p"
+        for level in (30, 90, 160):
+            codes = np.full((32, 64, 3), level, np.uint8)
+            film.mux(stream.encode(av.VideoFrame.from_ndarray(codes, format="rgb24")))
+        film.mux(stream.encode())
+    quilt = read_photos([tmp_path / "a.mp4"], (8, 4), PAPER).quilt
+    assert [quilt.view_values(k)[2, 4, 0] for k in range(quilt.layout.views)] == pytest.approx([30, 90, 160], abs=3)
+    with pytest.raises(PictureError, match=r"no stereo pair.*frames of a film are views for 'lippmann interlace'"):
+        quilt_of_pair(tmp_path / "a.mp4")
 
 
 def test_transparent_parts_show_white_paper(tmp_path):

@@ -83,7 +83,7 @@ def read_pair(path: Path) -> tuple[Photograph, Photograph] | None:
     if suffix == ".mpo":
         return _read_mpo(path)
     if suffix in FILMS:
-        from lippmann.codecs.spatial_film import read_first_pair
+        from lippmann.codecs.film_views import read_first_pair
 
         return read_first_pair(path)
     return None

@@ -305,7 +305,8 @@ def _first_missing(numbers: Iterable[int], first: int) -> int | None:
 
 def _check_ending(path: Path) -> None:
     if path.suffix.lower() in FILMS:
-        fix = "take a quilt out of it: ffmpeg -i in.mp4 -frames:v 1 out_qs8x6a0.75.png"
+        fix = "take a quilt out of it: ffmpeg -i in.mp4 -frames:v 1 out_qs8x6a0.75.png; "
+        fix += "frames of a camera that moves to the right are views for 'lippmann interlace'"
         raise PictureError("is a film", where=str(path), rule="pictures are read", fix=fix)
     if not path.suffix and not path.exists():
         raise unreadable(path, FileNotFoundError(), PictureError)

@@ -20,7 +20,7 @@ from lippmann.codecs.photograph import Photograph, open_photograph, report_error
 from lippmann.codecs.picture_notes import FileNotes
 from lippmann.codecs.pillow_formats import BYTES_PER_PIXEL, open_picture
 from lippmann.codecs.stereo_pairs import HEIF, PAIRS, read_pair
-from lippmann.codecs.types import Pixels
+from lippmann.codecs.types import FILMS, Pixels
 from lippmann.color.transfer import quantize
 from lippmann.errors import PictureError, UsageError
 from lippmann.image.read import MOST_PIXELS
@@ -38,7 +38,7 @@ Fit = Literal["cover", "contain", "stretch"]
 ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".avif", ".bmp", ".ppm", ".gif", ".tga", *PAIRS, *HEIF)
 
 #: Endings of files that may hold several frames.
-_ANIMATIONS = (".gif", ".webp", ".png", ".avif")
+_ANIMATIONS = (".gif", ".webp", ".png", ".avif", *FILMS)
 
 #: The code of white paper.
 _PAPER = 255
@@ -112,7 +112,7 @@ def read_photos(
     ----------
     paths:
         The photographs, at least 2, in the order of the views; a file of a stereo pair (JPS, MPO, HEIF) is two, and
-        one animation (GIF, WebP, PNG, AVIF) alone is its frames.
+        one animation (GIF, WebP, PNG, AVIF) or film alone is its frames.
     size:
         Largest width and height of a view in pixels.
     paper:
@@ -203,6 +203,8 @@ def quilt_of_pair(path: Path, *, half: bool = False) -> Quilt:
 
             if has_depth(path):
                 what, fix = "is a photograph with depth, no stereo pair", "show it by 'lippmann render'"
+        elif path.suffix.lower() in FILMS:
+            fix = "frames of a film are views for 'lippmann interlace'; spatial films need FFmpeg 7.1 (PyAV 14)"
         raise PictureError(what, where=str(path), rule="a pair is two views that are marked as such", fix=fix)
     (width, height), second = (_header(source).size for source in sources)
     size = (width + 1) // 2 if half else width, height
@@ -235,7 +237,11 @@ def _views_in(path: Path) -> list[_Source]:
 
 
 def _frames_of(path: Path) -> list[_Source]:
-    """The frames of an animation."""
+    """The frames of an animation or film."""
+    if path.suffix.lower() in FILMS:
+        from lippmann.codecs.film_views import read_frames
+
+        return [_Source(path, frame) for frame in read_frames(path)]
     with report_errors(path), open_picture(path) as picture:
         count, (width, height) = getattr(picture, "n_frames", 1), picture.size
         check_input(

@@ -35,7 +35,7 @@ FitOption = Annotated[
 def interlace(
     photos: Annotated[
         list[Path],
-        typer.Argument(help="Photographs or frames, in natural order, stereo pairs, or an animation; or their folder."),
+        typer.Argument(help="Photographs, in natural order, stereo pairs, an animation or a film; or their folder."),
     ],
     output: options.OptionalOutput = None,
     display: Annotated[

@@ -1,13 +1,15 @@
-"""The first pair of a spatial film: of x265's multi-view stream, decoded by FFmpeg."""
+"""Views in films: the first pair of x265's multi-view stream, decoded by FFmpeg, and the frames of other films."""
 
 from __future__ import annotations
 
 import base64
+import struct
 
 import av
 import numpy as np
 import pytest
 
+from lippmann.codecs.film_views import read_frames
 from lippmann.codecs.stereo_pairs import read_pair
 from lippmann.errors import PictureError
 
@@ -59,20 +61,52 @@ def test_both_views_of_the_first_frame_come_in_the_order_of_the_message(tmp_path
     assert pair[0].notes == ("of the film the first frame is read",)
 
 
-@pytest.mark.parametrize("codec", ["libx264", "libx265"])
-def test_a_film_of_one_view_is_no_pair(tmp_path, codec):
-    with av.open(str(tmp_path / "flat.mp4"), "w") as film:
+def write_film(path, frames, codec="libx264"):
+    """A film of frames that are the brighter the later, with a red left half."""
+    with av.open(str(path), "w") as film:
         stream = film.add_stream(codec, rate=24, options={"x265-params": "log-level=error"})
-        stream.width, stream.height, stream.pix_fmt = 64, 64, "yuv420p"
-        for _ in range(3):
-            film.mux(stream.encode(av.VideoFrame.from_ndarray(np.zeros((64, 64, 3), np.uint8), format="rgb24")))
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for number in range(frames):
+            codes = np.full((48, 64, 3), 2 * number, np.uint8)
+            codes[:, :32, 0] = 200
+            film.mux(stream.encode(av.VideoFrame.from_ndarray(codes, format="rgb24")))
         film.mux(stream.encode())
-    with pytest.raises(PictureError, match=r"flat\.mp4: is a film of one view; of films a spatial one"):
-        read_pair(tmp_path / "flat.mp4")
+    return path
+
+
+@pytest.mark.parametrize("codec", ["libx264", "libx265"])
+def test_a_film_of_one_view_is_no_pair_but_frames(tmp_path, codec):
+    path = write_film(tmp_path / "flat.mp4", 3, codec)
+    assert read_pair(path) is None
+    frames = read_frames(path)
+    assert [frame.size for frame in frames] == [(64, 48)] * 3
+    assert not any(frame.notes for frame in frames)
+    assert all(is_near(frame.codes()[20, 60], (2 * number,) * 3) for number, frame in enumerate(frames))
+
+
+def test_frames_of_a_long_film_are_evenly_spaced(tmp_path):
+    frames = read_frames(write_film(tmp_path / "long.mp4", 101), 5)
+    assert [round(float(frame.codes()[20:, 40:].mean()) / 50) for frame in frames] == [0, 1, 2, 3, 4]
+    assert frames[0].notes == ("of the film's 101 frames 5 are shown, evenly spaced",)
+
+
+def test_films_of_a_turned_telephone_are_upright(tmp_path):
+    """The matrix of a track's header turns what is coded by 90 degrees clockwise: the left half comes to the top."""
+    path = write_film(tmp_path / "turned.mp4", 2)
+    data = bytearray(path.read_bytes())
+    at = data.index(b"tkhd") + 44  # version, times, number, duration, layer and volume lie between
+    assert struct.unpack_from(">5i", data, at) == (1 << 16, 0, 0, 0, 1 << 16)
+    struct.pack_into(">5i", data, at, 0, 1 << 16, 0, -(1 << 16), 0)
+    path.write_bytes(data)
+    (first, _) = read_frames(path)
+    assert first.size == (48, 64)
+    assert is_near(first.codes()[4, 24], (200, 0, 0))
+    assert is_near(first.codes()[60, 24], (0, 0, 0))
 
 
 @pytest.mark.parametrize("data", [b"", b"no film", FILM[:700], FILM.replace(b"hev1", b"????")])
 def test_damaged_films(tmp_path, data):
     (tmp_path / "a.mov").write_bytes(data)
-    with pytest.raises(PictureError, match=r"a\.mov: (cannot be decoded \(.*\); a film|is a film of one view)"):
-        read_pair(tmp_path / "a.mov")
+    for read in (read_pair, read_frames):
+        with pytest.raises(PictureError, match=r"a\.mov: (cannot be decoded \(.*\)|has no pictures .*); a film"):
+            read(tmp_path / "a.mov")
