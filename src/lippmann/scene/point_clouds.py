@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.scene.matrices import transform_points
-from lippmann.scene.parsing.points_lines import POINTS_NOTE, Width, as_mesh, thin_to_most, width_of
+from lippmann.scene.parsing.points_lines import (
+    POINTS_NOTE,
+    Width,
+    as_mesh,
+    thin_to_most,
+    width_of_lines,
+    width_of_points,
+)
 from lippmann.scene.splat_clouds import bulk_of
 from lippmann.scene.values.description import Instance, Material, Matrix, Mesh, SceneDescription
 
@@ -24,14 +31,16 @@ def draw_cloud(clouds: Sequence[Mesh], width: Width | None = None) -> tuple[list
     bulk = bulk_of(positions, np.ones(len(positions)), tails=True)
     if not bulk.any():
         bulk[:] = True
-    width = width or width_of(float(np.linalg.norm(np.ptp(positions[bulk], axis=0))), len(positions), lines=False)
+    width = width or width_of_points(positions, float(np.linalg.norm(np.ptp(positions[bulk], axis=0))))
+    radii = np.broadcast_to(width.radius, len(positions))
     meshes, first = [], 0
     for cloud in clouds:
-        inside = bulk[first : first + len(cloud.positions)]
-        first += len(cloud.positions)
+        part = slice(first, first + len(cloud.positions))
+        first = part.stop
+        inside, own = bulk[part], radii[part]
         for chosen, fitted in ((inside, cloud.fitted), (~inside, False)):
             if chosen.any():
-                drawn = as_mesh(_select_vertices(cloud, chosen), np.eye(4)[None], width.radius, cloud.material)
+                drawn = as_mesh(_select_vertices(cloud, chosen), np.eye(4)[None], own[chosen], cloud.material)
                 meshes.append(replace(drawn, fitted=fitted))
     return meshes, width
 
@@ -42,7 +51,7 @@ def draw_thin(thin: Sequence[Mesh], width: Width | None = None) -> tuple[list[Me
         return draw_cloud(thin, width)
     positions = np.concatenate([mesh.positions for mesh in thin])
     diagonal = float(np.linalg.norm(np.ptp(positions, axis=0)))
-    width = width or width_of(diagonal, sum(len(mesh.faces) for mesh in thin), lines=True)
+    width = width or width_of_lines(diagonal, sum(len(mesh.faces) for mesh in thin))
     return [as_mesh(mesh, np.eye(4)[None], width.radius, mesh.material) for mesh in thin], width
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lippmann.scene.parsing.points_lines import as_mesh, balls, rods, width_of
+from lippmann.scene.parsing.points_lines import as_mesh, balls, rods, width_of_lines, width_of_points
 from lippmann.scene.values.description import Mesh
 
 POINTS = np.array([[0.0, 0.0, 0.0], [5.0, 1.0, -2.0], [5.0, 1.0, 7.0]])
@@ -56,7 +56,28 @@ def test_copies_keep_their_colours_and_coordinates():
 
 
 def test_radii_follow_the_extent_and_shrink_in_crowds():
-    assert width_of(200.0, 9, lines=False).radius == pytest.approx(2.0)
-    assert width_of(200.0, 9, lines=True).radius == pytest.approx(1.0)
-    assert width_of(200.0, 1_000_000, lines=False).radius == pytest.approx(0.1)
-    assert width_of(0.0, 1, lines=False).radius == pytest.approx(0.01)
+    assert width_of_lines(200.0, 9).radius == pytest.approx(1.0)
+    assert width_of_lines(200.0, 1_000_000).radius == pytest.approx(0.05)
+    assert width_of_points(POINTS, 200.0).radius == pytest.approx([2.0] * 3)
+    assert width_of_points(POINTS[:1], 0.0).radius == pytest.approx([0.01])
+    assert width_of_points(np.zeros((40_000, 3)), 200.0).radius == pytest.approx(np.full(40_000, 0.5))
+
+
+@pytest.mark.parametrize("spread", ["random", "even"])
+def test_balls_close_the_surface_on_which_points_lie(spread):
+    generator = np.random.default_rng(2)
+    flat = np.stack(np.meshgrid(*[(np.arange(150) + 0.5) / 150] * 2), axis=-1).reshape(-1, 2)
+    flat = flat if spread == "even" else generator.uniform(size=flat.shape)
+    points = np.pad(flat, ((0, 0), (0, 1)))
+    radii = width_of_points(points, 2**0.5).radius
+    assert radii.max() < 3.0 / 150  # and no more than that: neighbours in a grid are 1/150 away
+    seen = generator.uniform(0.05, 0.95, (2000, 2))
+    away = np.abs(seen[:, None] - flat).sum(axis=2)  # as wide as octahedra are
+    assert (away < radii).any(axis=1).mean() > 0.985
+
+
+def test_radii_follow_the_density():
+    generator = np.random.default_rng(3)
+    dense, sparse = generator.uniform(size=(2, 40_000, 3)) * np.array([[[0.2, 0.2, 0.0]], [[1.0, 1.0, 0.0]]])
+    radii = width_of_points(np.concatenate([dense - 1.0, sparse]), 1.8).radius
+    assert np.median(radii[:40_000]) < 0.5 * np.median(radii[40_000:])

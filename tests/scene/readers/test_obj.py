@@ -194,7 +194,7 @@ def test_points_and_lines_are_drawn(read):
     middles = [rod.mean(axis=0) for rod in [*np.split(red, 2), blue]]
     assert np.array(middles) == pytest.approx(np.array([(0.5, 0, 0), (0.5, 0.5, 0), (0.5, 1, 0)]), abs=1e-6)
     assert scene.notes == [
-        "points are drawn as balls of a radius of 1.00 % of the scene's diagonal",
+        "points are drawn as balls of a radius of up to 1.00 % of the scene's diagonal",
         "lines are drawn as rods of a radius of 0.50 % of the scene's diagonal",
     ]
 

@@ -243,7 +243,7 @@ def test_a_cloud_of_points_is_drawn_as_balls(read, colored):
     diagonal = 5**0.5
     for ball, vertex in zip(balls, VERTICES, strict=True):
         assert np.linalg.norm(ball - vertex, axis=1) == pytest.approx(np.full(len(ball), 0.01 * diagonal), rel=1e-4)
-    assert scene.notes[0] == "points are drawn as balls of a radius of 1.00 % of the scene's diagonal"
+    assert scene.notes[0] == "points are drawn as balls of a radius of up to 1.00 % of the scene's diagonal"
     assert scene.materials[0].unlit == colored
     assert (mesh.colors is not None) == colored
 

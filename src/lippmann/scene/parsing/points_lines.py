@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,6 +17,12 @@ POINT_RADIUS, LINE_RADIUS = 0.01, 0.005
 
 #: More points or lines than that are not drawn: each is six or eight triangles.
 MOST = 1 << 18
+
+# Neighbour whose distance tells the spacing about a point: the 16th lies 2.2 spacings away in a grid as in a random
+# cloud. Balls of this share of it close both: octahedra leave 1 % of a random surface open.
+_NEIGHBOR, _SHARE_OF_DISTANCE = 16, 0.7
+# Radii of points over that of as many spread evenly, at most: more would fill clouds that have no surface.
+_SPREAD = 3.0
 
 # Up to so many, points are balls of 32 triangles, and lines have 6 sides; of more, which are thinner, 8 and 3. A few
 # points, which may be wide, are balls of 512. Half or double the few moves only where these begin to cost: with 128 000
@@ -38,9 +45,9 @@ class Solids:
 
 @dataclass(frozen=True)
 class Width:
-    """How wide points or lines are drawn: their radius, and the note that says so."""
+    """How wide points or lines are drawn: their radius, or that of each point ``(n,)``, and the note that says so."""
 
-    radius: float
+    radius: float | FloatArray
     note: str
 
 
@@ -48,15 +55,40 @@ class Width:
 POINTS_NOTE = "points are drawn as balls"
 
 
-def width_of(diagonal: float, count: int, *, lines: bool) -> Width:
-    """Width of points or lines in a box of a ``diagonal``: less where there are so many that they would touch.
+def width_of_lines(diagonal: float, count: int) -> Width:
+    """Width of ``count`` lines in a box of a ``diagonal``: less where there are so many that they would touch."""
+    share = _share(LINE_RADIUS, count)
+    return Width(share * (diagonal or 1.0), f"lines are drawn as rods of a radius of {_percent(share)}")
 
-    ``count`` points spread over a surface lie about ``diagonal / sqrt(count)`` from each other.
+
+def width_of_points(points: Points, diagonal: float) -> Width:
+    """Width of each of points ``(n, 3)`` in a box of a ``diagonal``, with which a surface that they sample is closed.
+
+    ``n`` points spread over a surface lie about ``diagonal / sqrt(n)`` from each other. The radius follows the distance
+    of the 16th neighbour from half of that to three halves, up to :data:`POINT_RADIUS`. All of up to 2500 points have
+    that.
     """
-    most = LINE_RADIUS if lines else POINT_RADIUS
-    share = min(most, 50.0 * most / max(count, 1) ** 0.5)
-    what = "lines are drawn as rods" if lines else POINTS_NOTE
-    return Width(share * (diagonal or 1.0), f"{what} of a radius of {100 * share:.2f} % of the scene's diagonal")
+    least = _share(POINT_RADIUS, len(points))
+    most = min(POINT_RADIUS, _SPREAD * least)
+    diagonal = diagonal or 1.0
+    radii = np.full(len(points), least * diagonal, np.float32)
+    if most > least:
+        from scipy.spatial import cKDTree  # here: most scenes have no points
+
+        tree, distances = cKDTree(points), np.empty(len(points))
+        # In the tree's own order, which is three times as fast; a point's first neighbour is itself.
+        distances[tree.indices] = tree.query(points[tree.indices], [_NEIGHBOR + 1])[0][:, 0]
+        radii = np.clip(_SHARE_OF_DISTANCE * distances, least * diagonal, most * diagonal).astype(np.float32)
+    return Width(radii, f"{POINTS_NOTE} of a radius of up to {_percent(most)}")
+
+
+def _share(most: float, count: int) -> float:
+    """A radius over the diagonal, less than ``most`` from 2500 points or lines on."""
+    return most * min(1.0, 50.0 / math.sqrt(max(count, 1)))
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2f} % of the scene's diagonal"
 
 
 def as_material(material: Material) -> Material:
@@ -108,16 +140,16 @@ def as_mesh(thin: Mesh, world_from_mesh: Points, width: float | FloatArray, mate
     world_from_mesh:
         ``(k, 4, 4)``, one for each copy.
     width:
-        Radius in the world, or that of each position of a single copy.
+        Radius in the world, or that of each position of a single copy ``(n,)``.
     material:
         Index of the solids' material.
     """
-    points = thin.positions @ world_from_mesh[:, :3, :3].transpose(0, 2, 1) + world_from_mesh[:, None, :3, 3]
     step = len(thin.positions)
-    elements = (thin.faces.astype(np.int64) + step * np.arange(len(points))[:, None, None]).reshape(
+    elements = (thin.faces.astype(np.int64) + step * np.arange(len(world_from_mesh))[:, None, None]).reshape(
         -1, thin.faces.shape[1]
     )
-    drawn = (balls if elements.shape[1] == 1 else rods)(points.reshape(-1, 3), elements, width)
+    points = place_copies(thin.positions, world_from_mesh)
+    drawn = (balls if elements.shape[1] == 1 else rods)(points, elements, width)
     sources = drawn.sources % step
     return Mesh(
         thin.name,
@@ -129,6 +161,12 @@ def as_mesh(thin: Mesh, world_from_mesh: Points, width: float | FloatArray, mate
         None if thin.colors is None else thin.colors[sources],
         points=len(drawn.positions) // max(1, len(elements)) if elements.shape[1] == 1 else 0,
     )
+
+
+def place_copies(positions: FloatArray, world_from_mesh: Points) -> Points:
+    """Points ``(k n, 3)`` in the world of ``k`` copies of positions ``(n, 3)``."""
+    worlds = positions @ world_from_mesh[:, :3, :3].transpose(0, 2, 1) + world_from_mesh[:, None, :3, 3]
+    return worlds.reshape(-1, 3)
 
 
 def balls(points: Points, elements: Integers, width: float | FloatArray) -> Solids:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from lippmann.errors import SceneError
-from lippmann.scene.parsing.points_lines import MOST, as_mesh, width_of
+from lippmann.scene.parsing.points_lines import MOST, as_mesh, width_of_lines, width_of_points
 from lippmann.scene.readers.obj_tables import Integers, Lines, Points
 from lippmann.scene.values.description import Mesh
 
@@ -44,7 +44,10 @@ def draw_points_and_lines(
             continue
         if len(elements) > MOST:
             raise SceneError(f"holds {len(elements)} {what}", where=where, rule=f"up to {MOST} are drawn")
-        width = width_of(diagonal, len(elements), lines=size == 2)
+        one_each = positions[elements[:, 0]]
+        width = width_of_points(one_each, diagonal) if size == 1 else width_of_lines(diagonal, len(elements))
+        radii = np.zeros(len(positions), np.float32)
+        radii[elements] = np.reshape(width.radius, (-1, 1))
         notes.append(width.note)
         for material in np.unique(materials[owners]):
             mine = elements[materials[owners] == material]
@@ -56,7 +59,7 @@ def draw_points_and_lines(
                 int(material),
                 colors=None if colors is None else colors[used].astype(np.float32),
             )
-            meshes.append(as_mesh(thin, np.eye(4)[None], width.radius, int(material)))
+            meshes.append(as_mesh(thin, np.eye(4)[None], radii[used], int(material)))
     return [mesh for mesh in meshes if len(mesh.faces)], notes
 
 

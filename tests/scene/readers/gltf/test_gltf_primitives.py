@@ -58,7 +58,7 @@ def test_points_are_balls_with_the_colours_of_their_vertices(writer, read):
     for color, place in zip(np.eye(3), [[0, 0, 0], [1, 0, 0], [0, 1, 0]], strict=True):
         mine = mesh.positions[(mesh.colors == color).all(axis=1)]
         np.testing.assert_allclose(np.linalg.norm(mine - place, axis=1), 0.01 * 2**0.5, rtol=1e-4)
-    assert scene.notes == ("points are drawn as balls of a radius of 1.00 % of the scene's diagonal",)
+    assert scene.notes == ("points are drawn as balls of a radius of up to 1.00 % of the scene's diagonal",)
 
 
 def test_points_stand_where_all_nodes_place_them_at_one_size(writer, read):

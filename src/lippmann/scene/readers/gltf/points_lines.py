@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from lippmann.scene.parsing.far_origin import box_of_copies
-from lippmann.scene.parsing.points_lines import MOST, as_mesh, thin_out, width_of
+from lippmann.scene.parsing.points_lines import (
+    MOST,
+    Width,
+    as_mesh,
+    place_copies,
+    thin_out,
+    width_of_lines,
+    width_of_points,
+)
 from lippmann.scene.readers.gltf.document import Document
 from lippmann.scene.values.description import Matrix, Mesh
 
@@ -17,12 +25,12 @@ _POINTS, _LINES = 1, 2  # vertices each
 
 @dataclass
 class ThinWidth:
-    """Length to which the width of points and lines is proportional: the diagonal of the scene's box when first drawn.
+    """Widths of points (key 1) and lines (key 2), as the scene's box and their number tell when first drawn.
 
-    All times of an animation share that of the scene at rest, for points that grow with a box would pulsate.
+    All times of an animation share those of the scene at rest, for points that grow with a box would pulsate.
     """
 
-    diagonal: float | None = None
+    widths: dict[int, Width] = field(default_factory=dict)
 
 
 def has_points_or_lines(document: Document) -> bool:
@@ -43,7 +51,7 @@ def draw_points_and_lines(
     placements:
         Indices of meshes with matrices ``(k, 4, 4)`` of copies; those of triangles add to the scene's extent.
     thin_width:
-        Remembers the scene's extent.
+        Remembers the widths.
 
     Returns
     -------
@@ -63,8 +71,6 @@ def draw_points_and_lines(
     if not stacks:
         return {}
     copies = {mesh: sum(map(len, stack)) for mesh, stack in stacks.items()}
-    if thin_width.diagonal is None:
-        thin_width.diagonal = _diagonal(meshes, placements)
     drawn: dict[int, Mesh] = {}
     for size in (_POINTS, _LINES):
         chosen = {mesh: meshes[mesh] for mesh in stacks if meshes[mesh].faces.shape[1] == size}
@@ -78,10 +84,21 @@ def draw_points_and_lines(
             step = -(-count // MOST)
             document.notes.add(f"of {count} {kind} one in {step} is drawn")
             chosen = {mesh: thin_out(thin, step) for mesh, thin in chosen.items()}
-        width = width_of(thin_width.diagonal, min(count, MOST), lines=size == _LINES)
+        matrices = {mesh: np.concatenate(stacks[mesh]) for mesh in chosen}
+        if size not in thin_width.widths:
+            diagonal = _diagonal(meshes, placements)
+            if size == _POINTS:
+                points = [
+                    place_copies(thin.positions[thin.faces[:, 0]], matrices[mesh]) for mesh, thin in chosen.items()
+                ]
+                thin_width.widths[size] = width_of_points(np.concatenate(points), diagonal)
+            else:
+                thin_width.widths[size] = width_of_lines(diagonal, min(count, MOST))
+        width = thin_width.widths[size]
         document.notes.add(width.note)
         for mesh, thin in chosen.items():
-            drawn[mesh] = as_mesh(thin, np.concatenate(stacks[mesh]), width.radius, thin.material)
+            # One radius for all points, whose number may change with time.
+            drawn[mesh] = as_mesh(thin, matrices[mesh], float(np.median(width.radius)), thin.material)
     return drawn
 
 
