@@ -146,7 +146,7 @@ def test_a_texture_starts_no_program(tmp_path, ghostscript, scene):
     assert not ghostscript.exists()
     line = str(refused.value)
     assert len(line.splitlines()) == 1
-    assert "PNG, JPEG, GIF, BMP, TIFF, WebP, AVIF, PPM and TGA are read" in line
+    assert "PNG, JPEG, GIF, BMP, TIFF, WebP, AVIF, PPM, DDS and TGA are read" in line
 
 
 def test_the_stand_in_is_started_where_formats_are_not_restricted(ghostscript):
@@ -155,7 +155,7 @@ def test_the_stand_in_is_started_where_formats_are_not_restricted(ghostscript):
     assert ghostscript.exists()
 
 
-@pytest.mark.parametrize("kind", ["PNG", "JPEG", "GIF", "BMP", "TIFF", "WEBP", "AVIF", "PPM", "TGA"])
+@pytest.mark.parametrize("kind", ["PNG", "JPEG", "GIF", "BMP", "TIFF", "WEBP", "AVIF", "PPM", "DDS", "TGA"])
 def test_the_formats_of_the_list_are_read_whatever_their_name_says(kind):
     Pillow.init()
     if kind not in Pillow.SAVE:
@@ -165,6 +165,25 @@ def test_the_formats_of_the_list_are_read_whatever_their_name_says(kind):
     image = decode_image(stream.getvalue(), "skin.eps", where="f:7")
     assert image.pixels.shape == (4, 5, 3)
     assert image.pixels[0, 0].tolist() == pytest.approx([250, 0, 0], abs=6)
+
+
+def dds(texels, blocks):
+    stream = io.BytesIO()
+    Pillow.fromarray(np.tile(np.array(texels, np.uint8), (8, 8, 1))).save(stream, "DDS", pixel_format=blocks)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize(("blocks", "srgb"), [("BC2", 75), ("BC3", 78)])
+def test_dds_of_srgb_coded_blocks(blocks, srgb):
+    data = bytearray(dds([200, 100, 50, 255], blocks))
+    data[128:132] = srgb.to_bytes(4, "little")
+    found = decode_image(bytes(data), "skin.dds", where="f").pixels
+    assert found[3, 3].tolist() == pytest.approx([200, 100, 50, 255], abs=6)
+
+
+def test_dds_of_two_channels_are_normals():
+    found = decode_image(dds([204, 128, 0], "BC5"), "relief.dds", where="f").pixels
+    assert found[3, 3].tolist() == pytest.approx([204, 128, 229], abs=3)  # of x 0.6, z is 0.8
 
 
 def test_two_pictures_in_one_jpeg_file_are_a_jpeg_file():

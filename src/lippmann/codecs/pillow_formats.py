@@ -32,6 +32,7 @@ FORMATS = {
     "WEBP": "WebP",
     "AVIF": "AVIF",
     "PPM": "PPM",
+    "DDS": "DDS",
     "TGA": "TGA",
 }
 
@@ -40,6 +41,11 @@ _SEVERAL = "MPO"
 
 #: The tag of PhotometricInterpretation.
 _PHOTOMETRIC = 262
+
+# DDS files with an extended header: where that names its format (DXGI_FORMAT), and formats of sRGB-coded blocks with
+# those of the same blocks without a curve, which Pillow reads alone (13.0).
+_EXTENDED_DDS, _DXGI_AT = (b"DDS ", b"DX10"), 128
+_PLAIN_BLOCKS = {72: 71, 75: 74, 78: 77}
 
 #: Bytes of a pixel: four channels in Pillow's memory, and as much again in the array that is made of them.
 BYTES_PER_PIXEL = 8
@@ -109,6 +115,14 @@ def _size(picture: Image.Image) -> str:
     return f"{picture.width} x {picture.height} pixels"
 
 
+def with_plain_blocks(data: bytes) -> bytes:
+    """The bytes of a picture; a DDS file's blocks that are named sRGB-coded (BC1 to BC3) go by their plain name."""
+    if (data[:4], data[84:88]) != _EXTENDED_DDS:
+        return data
+    kind = int.from_bytes(data[_DXGI_AT : _DXGI_AT + 4], "little")
+    return data[:_DXGI_AT] + _PLAIN_BLOCKS.get(kind, kind).to_bytes(4, "little") + data[_DXGI_AT + 4 :]
+
+
 def codes_of(picture: Image.Image) -> Pixels:
     """Codes ``(h, w, 1 | 3 | 4)`` of an open picture: uint8, or uint16 or float32 where the file holds such greys.
 
@@ -126,7 +140,15 @@ def codes_of(picture: Image.Image) -> Pixels:
     if picture.mode in ("1", "L") and not has_alpha:
         return np.array(picture.convert("L"))[..., None]
     mode = "RGBA" if has_alpha else "RGB"
-    return np.asarray(picture if picture.mode == mode else picture.convert(mode))
+    codes = np.asarray(picture if picture.mode == mode else picture.convert(mode))
+    return _with_blue(codes) if getattr(picture, "pixel_format", "").startswith("BC5") else codes
+
+
+def _with_blue(codes: Pixels) -> Pixels:
+    """Unit normals' codes of their x and y alone, which BC5 blocks hold."""
+    x, y = np.moveaxis(codes[..., :2] / np.float32(127.5) - np.float32(1.0), -1, 0)
+    z = np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
+    return np.dstack([codes[..., :2], np.rint(127.5 + 127.5 * z).astype(np.uint8)])
 
 
 def _is_white_zero(picture: Image.Image) -> bool:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.codecs.orientation import as_stored, of_picture
-from lippmann.codecs.pillow_formats import RULE, codes_of, is_allowed, open_picture
+from lippmann.codecs.pillow_formats import RULE, codes_of, is_allowed, open_picture, with_plain_blocks
 from lippmann.errors import MemoryLimitError, PictureError, SceneError
 from lippmann.runtime.machine import check_input
 from lippmann.runtime.regular_file import check_kind, near_miss, unreadable
@@ -286,7 +286,7 @@ def decode_image(data: bytes, name: str, *, where: str) -> Image:
     MemoryLimitError
         They take more than the memory that is left.
     """
-    with decoding(f"texture '{name}'", where), open_picture(io.BytesIO(data)) as picture:
+    with decoding(f"texture '{name}'", where), open_picture(io.BytesIO(with_plain_blocks(data))) as picture:
         turn = of_picture(picture) if picture.format == "TIFF" else 1  # those alone Pillow turns by itself
         pixels = as_stored(texels_of(picture), turn)
     return Image(name, pixels)
