@@ -58,7 +58,7 @@ def test_a_missing_empty_or_foreign_file(tmp_path):
             (tmp_path / name).write_bytes(content)
         with pytest.raises(PictureError, match=message):
             read_picture(tmp_path / name)
-    with pytest.raises(PictureError, match="is a folder, no file"):
+    with pytest.raises(PictureError, match="is a folder, no file; name a file in it: 'lippmann weave'"):
         read_picture(tmp_path)
 
 

@@ -45,13 +45,18 @@ def test_pointers_of_git_lfs_are_refused(tmp_path):
     ("name", "said"),
     [
         ("Pictur.png", "no such file; a picture; is 'picture.png' meant?"),
+        ("picture.jpg", "no such file; a picture; is 'picture.png' meant?"),
+        ("teapot.png", "no such file; a picture; is 'teapot_qs8x6a0.75.png' meant?"),
+        ("teapo.png", "no such file; a picture"),
         ("other.tif", "no such file; a picture"),
+        ("re.png", "no such file; a picture"),
         ("none/picture.png", "no such file; a picture; there is no folder '{folder}{sep}none'"),
         ("picture.png/a.png", "no such file; a picture; there is no folder '{folder}{sep}picture.png'"),
     ],
 )
 def test_a_missing_file_is_told_in_one_way(tmp_path, name, said):
-    (tmp_path / "picture.png").write_bytes(b"x")
+    for present in ("picture-preview.png", "picture.png", "e.png", "teapot_qs8x6a0.75.png"):
+        (tmp_path / present).write_bytes(b"x")
     path = tmp_path / name
     with pytest.raises((FileNotFoundError, NotADirectoryError)) as caught:
         path.open()

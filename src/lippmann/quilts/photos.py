@@ -147,7 +147,8 @@ def read_photos(
         what = "one photograph is given" if sources else "no photographs are given"
         rule = f"at least 2 are interlaced, of {', '.join(ENDINGS)}"
         fix = (
-            "weave two that stand in it: lippmann weave --layout 2x1, or 1x2 with the left one on top"
+            "weave two that stand in it: lippmann weave --layout 2x1, or 1x2 with the left one on top; "
+            "show one with a depth map by 'lippmann render'"
             if sources
             else ""
         )

@@ -8,7 +8,7 @@ import stat
 from collections.abc import Collection
 from pathlib import Path
 
-from lippmann.errors import LippmannError
+from lippmann.errors import LippmannError, PictureError
 
 _KINDS = (
     (stat.S_ISDIR, "a folder"),
@@ -51,7 +51,8 @@ def unreadable(path: Path, reason: OSError, error: type[LippmannError], rule: st
     if isinstance(reason, (FileNotFoundError, NotADirectoryError)):
         return error("no such file", where=str(path), rule=rule, fix=near_miss(path))
     if isinstance(reason, IsADirectoryError):
-        return error("is a folder, no file", where=str(path), rule=rule)
+        folders = ": 'lippmann weave', 'quilt pack' and 'import' take folders of views" if error is PictureError else ""
+        return error("is a folder, no file", where=str(path), rule=rule, fix=f"name a file in it{folders}")
     return error(f"cannot be read ({reason.strerror or reason})", where=str(path), rule=rule)
 
 
@@ -66,7 +67,11 @@ def near_miss(path: Path, foreign: Collection[str] = (), folder: str = "") -> st
     except OSError:
         return f"there is no folder '{folder or path.parent}'"
     folded = {name.casefold(): name for name in names}
-    close = difflib.get_close_matches(path.name.casefold(), folded, n=1, cutoff=0.75)
+    stem, stems = path.stem.casefold(), {Path(name).stem: name for name in folded}
+    # Another ending, or more behind, as in teapot_qs8x6a0.75.png, before a slip of the pen.
+    longer = [name for name in folded if name.startswith(stem) and not name[len(stem) :][:1].isalnum()]
+    close = difflib.get_close_matches(path.name.casefold(), longer, n=1, cutoff=0.0)
+    close = close or [stems[each] for each in difflib.get_close_matches(stem, stems, n=1, cutoff=0.75)]
     return f"is '{folded[close[0]]}' meant?" if close else ""
 
 

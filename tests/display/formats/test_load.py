@@ -210,7 +210,7 @@ def test_values_that_are_no_display(nothing):
 def test_unreadable_places(tmp_path):
     with pytest.raises(DisplayError, match="no such file"):
         load_display(tmp_path / "absent.toml")
-    with pytest.raises(DisplayError, match="is a folder, no file"):
+    with pytest.raises(DisplayError, match=r"is a folder, no file; .*; name a file in it$"):
         load_display(tmp_path)
 
 

@@ -335,10 +335,15 @@ def print_of_texts(texts: Mapping[str, str]) -> Print:
     DisplayError
         If a key is unknown or missing, or a value is out of its range; ``where`` is the key as written here.
     """
+    for key in ("bleed", "marks", "icc", "mirror"):
+        if key in texts:
+            raise DisplayError(
+                f"{key} is no number of the lens sheet", where=key, fix=f"say it beside the print: {key}=..."
+            )
     refuse_unknown(texts, KEYS)
-    for key in ("ppi", "size"):
-        if key not in texts:
-            raise DisplayError(f"{key} is missing", where=key, rule="a print needs lpi (or print-lpi), ppi and size")
+    if missing := [key for key in ("ppi", "size") if key not in texts]:
+        what = f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+        raise DisplayError(what, where=missing[0], rule="a print needs lpi (or print-lpi), ppi and size")
     numbers = {key: validation.plain_number(texts[key], key) for key in _NUMBERS if key in texts}
     lengths = {
         key: validation.length(texts[key], key, unit="", rule=length_rule(key, validation.LENGTH))
