@@ -365,6 +365,21 @@ def test_copies_beyond_all_bounds_are_refused(read):
         read(triangle() + body)
 
 
+@pytest.mark.parametrize(
+    ("copies", "says"),
+    [
+        ("int[] protoIndices = [0, 0]\n", "has not one position for each copy"),
+        ("int[] protoIndices = [0, 0]\npoint3f[] positions = [(1, 0, 0)]\n", "has not one position for each copy"),
+        ("int[] protoIndices = [1]\npoint3f[] positions = [(1, 0, 0)]\n", "has copies of prototypes that it does not"),
+    ],
+)
+def test_copies_without_places_or_prototypes_are_left_out(read, copies, says):
+    body = f'def PointInstancer "p" {{\nrel prototypes = [</p/m>]\n{copies}{triangle()}}}\n'
+    scene = read(body + triangle("other"))
+    assert len(scene.instances) == 1
+    assert [note.partition(says)[0] for note in scene.notes] == ["/p: "]
+
+
 def test_what_is_not_drawn_is_named(read):
     curve = 'def HermiteCurves "c" {\nint[] curveVertexCounts = [2]\npoint3f[] points = [(0, 0, 0), (1, 0, 0)]\n}\n'
     assert read(triangle() + curve).notes == ["1 prim(s) of type HermiteCurves are not drawn"]
@@ -374,9 +389,11 @@ def test_schemas_that_change_what_is_shown_are_named(read):
     body = 'def Xform "x" (prepend apiSchemas = ["GeomModelAPI", "ColorSpaceAPI"]) {\n'
     body += 'uniform token model:drawMode = "cards"\nuniform token colorSpace:name = "lin_ap1_scene"\n'
     assert read(body + triangle() + "}").notes == [
-        "/x: model:drawMode 'cards' is not honoured: its meshes are shown",
+        "/x: model:drawMode 'cards' is not honoured: meshes are shown",
         "/x: colours in the space 'lin_ap1_scene' are taken as linear Rec. 709",
     ]
+    again = body.replace('"x"', '"z"').replace("lin_ap1_scene", "")
+    assert read(body + triangle() + "}\n" + again + "}").notes[0].startswith("/x and 1 more: model:drawMode 'cards'")
     body = body.replace("cards", "default").replace("lin_ap1_scene", "lin_rec709_scene")
     image = 'def Shader "i" (prepend apiSchemas = ["ColorSpaceAPI"]) {\n'  # whose sourceColorSpace says so
     image += 'uniform token colorSpace:name = "srgb_rec709_display"\n}\n'

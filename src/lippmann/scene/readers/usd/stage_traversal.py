@@ -70,6 +70,7 @@ class Traversal:
         self._copy_color: tuple[float, ...] | None = None
         self._copies = 0
         self._unread: dict[str, int] = {}
+        self._departures: dict[str, dict[str, None]] = {}
 
     def run(self) -> None:
         """Visit all prims.
@@ -82,6 +83,9 @@ class Traversal:
         self._visit(self._stage.GetPseudoRoot(), np.eye(4)[None], np.eye(4), 0)
         for kind, count in self._unread.items():
             self.notes[f"{count} prim(s) of type {kind} are not drawn"] = None
+        for text, paths in self._departures.items():
+            more = f" and {len(paths) - 1} more" if len(paths) > 1 else ""
+            self.notes[f"{next(iter(paths))}{more}: {text}"] = None
 
     def tree(self) -> Record:
         """All records."""
@@ -138,11 +142,15 @@ class Traversal:
         """Name what schemas applied to a prim, and to what is below it, would change."""
         applied = prim.GetAppliedSchemas()
         if "GeomModelAPI" in applied and (mode := prim.GetAttribute("model:drawMode").Get()) not in _AS_MESHES:
-            self.notes[f"{prim.GetPath()}: model:drawMode '{mode}' is not honoured: its meshes are shown"] = None
+            self._note_departure(prim, f"model:drawMode '{mode}' is not honoured: meshes are shown")
         if "ColorSpaceAPI" in applied and (space := prim.GetAttribute("colorSpace:name").Get()) not in _AS_REC709:
             if prim.IsA(UsdShade.Shader) and is_coded(space):
                 return  # of an image, whose sourceColorSpace says so
-            self.notes[f"{prim.GetPath()}: colours in the space '{space}' are taken as linear Rec. 709"] = None
+            self._note_departure(prim, f"colours in the space '{space}' are taken as linear Rec. 709")
+
+    def _note_departure(self, prim: Usd.Prim | UsdGeom.PointInstancer, text: str) -> None:
+        """Say of all prims together, by their first, how they are shown otherwise than the stage has them."""
+        self._departures.setdefault(text, {})[str(prim.GetPath())] = None
 
     def _leave_out(self, kind: str) -> None:
         self._unread[kind] = self._unread.get(kind, 0) + 1
@@ -218,9 +226,11 @@ class Traversal:
         places = _instance_matrices(instancer, self._time)
         visible = np.asarray(instancer.ComputeMaskAtTime(self._time) or [True] * len(kinds), bool)
         if len(places) != len(kinds) or len(visible) != len(kinds):
-            raise StageError(f"{name} has {len(places)} places for {len(kinds)} copies", rule="one each")
+            self._note_departure(instancer, "has not one position for each copy, and is left out")
+            return
         if len(kinds) and not 0 <= kinds.min() <= kinds.max() < len(targets):
-            raise StageError(f"{name} has {len(targets)} prototypes, counted from 0, and names {kinds.max()}")
+            self._note_departure(instancer, "has copies of prototypes that it does not name, and is left out")
+            return
         colors = self._colors_of_copies(instancer, len(kinds))
         for number, target in enumerate(targets):
             chosen = (kinds == number) & visible
