@@ -166,7 +166,15 @@ def test_a_draft_is_one_in_every_form(form):
     found = resolve(RenderRequest(effort="draft"), SCENE, load_display("looking-glass-portrait"), form)
     assert (found.spp, found.method, found.denoise) == (1, "full", "oidn-fast")
     plain = resolve(RenderRequest(effort="draft"), SCENE, form="preview")
-    assert (plain.spp, plain.denoise) == (1, "none")
+    assert (plain.spp, plain.denoise) == (1, "oidn-fast")
+
+
+@pytest.mark.parametrize(
+    ("values", "denoiser"), [({}, "oidn"), ({"denoise": "none"}, "none"), ({"integrator": "normal"}, "none")]
+)
+def test_plain_pictures_are_denoised_where_they_have_noise(values, denoiser):
+    assert resolve(RenderRequest(**values), SCENE, form="preview").denoise == denoiser
+    assert resolve(RenderRequest(**values), unlit(), form="preview").denoise == "none"
 
 
 def test_a_draft_of_a_photograph_needs_no_network():

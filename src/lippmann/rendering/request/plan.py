@@ -163,8 +163,13 @@ class _Facts:
     @property
     def is_denoised_draft(self) -> bool:
         """Whether a draft's single sample is denoised by the fast network."""
-        is_open = self.form != "preview" and self.request.denoise == "auto" and machine.has_denoiser()
+        is_open = self.request.denoise == "auto" and machine.has_denoiser()
         return self.is_draft and is_open and self.is_pooled_light and not self.is_photograph
+
+    @property
+    def is_noisy_view(self) -> bool:
+        """Whether a plain picture of sampled light is asked for."""
+        return self.form == "preview" and self.is_pooled_light and not self.shows_own_colors
 
     @property
     def shows_own_colors(self) -> bool:
@@ -256,6 +261,7 @@ def _choose_denoiser(facts: _Facts, method: Choice[Method]) -> Choice[Denoiser]:
         (is_draft, "oidn-fast", "a draft"),
         (method.value == "pooled", "oidn", "pooled light is denoised, with the effort that its samples are worth"),
         (request.method == "full", "none", "full rendering for references"),
+        (facts.is_noisy_view and machine.has_denoiser(), "oidn", "a plain picture of sampled light"),
         (True, "none", method.reason),
     )
 
