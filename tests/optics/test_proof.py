@@ -116,6 +116,14 @@ def test_advice_tells_how_deep_scenes_are_fitted_on_large_pictures():
     assert small.startswith(f"{start};")
 
 
+def test_a_print_is_named_with_its_size_and_resolution():
+    proof = prove(load_display("print:lpi=60,ppi=600,size=A4"))
+    assert proof.in_words()["display"] == (
+        "print-60lpi: 60-lpi lenticular print, 210x297 mm at 600 ppi, seen from 500 mm"
+    )
+    assert replace(proof, title="").in_words()["display"] == "print-60lpi"
+
+
 def test_dark_lines_make_moire():
     display = load_display("seed-lenticular")
     assert moire_waves(display) == []  # of full pixels behind upright lenses nothing is left

@@ -74,8 +74,8 @@ class Proof:
 
     Attributes
     ----------
-    display, lens:
-        Their names; ``lens`` is None where the display gives none and an ideal one is taken.
+    display, title, lens:
+        Name of the display, a line on it, and the lens; None where the display gives none and an ideal one is taken.
     pixels:
         Pixels of one lens across.
     directions:
@@ -108,6 +108,7 @@ class Proof:
     """
 
     display: str
+    title: str
     lens: str | None
     pixels: float
     directions: float
@@ -129,7 +130,7 @@ class Proof:
         rule = "" if self.rule_of_depth is None else f" (rule of the trade: {self.rule_of_depth:.3g} mm)"
         extreme = self.field_of_extreme_ray
         words = {
-            "display": self.display,
+            "display": f"{self.display}: {self.title}" if self.title else self.display,
             "lens": self.lens or "none is given: an ideal pinhole at the gap",
             "directions": f"{self.directions:.3g} that one lens tells apart, of {self.pixels:.4g} pixels",
             "crosstalk": f"{_ghost(self.crosstalk)} straight ahead, {_ghost(self.crosstalk_aside)} half-way aside",
@@ -199,6 +200,7 @@ def prove(display: Display) -> Proof:
     lens = display.lens
     return Proof(
         display=display.name,
+        title=display.title,
         lens=None if lens is None else lens.in_words(),
         pixels=display.pixels_per_lens[0],
         directions=directions,
