@@ -98,6 +98,18 @@ def test_lenses_across_show_the_first_photograph_from_above(lippmann, frames, tm
         assert (seen(np.rot90(codes), (number + 0.5) / COUNT) == level).all()
 
 
+def test_a_print_with_lenses_across_is_replayed_turned_to_the_left(lippmann, frames, tmp_path):
+    flip = ("interlace", *frames, *SHEET, "--size", "20x30mm", "--lenses", "across", "--views", "nearest")
+    assert "a replay of lying lenses needs the file turned" in lippmann(*flip, "-o", tmp_path / "flip.png").err
+    with Image.open(tmp_path / "flip.png") as picture:
+        picture.transpose(Image.Transpose.ROTATE_90).save(tmp_path / "turned.png")
+    sheet = f"print:lpi={LPI},ppi={PPI},size=30x20mm,viewing-distance={DISTANCE}mm,field={FIELD}"
+    for x, level in ((-100, LEVELS[0]), (100, LEVELS[-1])):  # from above and from below
+        seen_by_eye = ("replay", tmp_path / "turned.png", "-d", sheet, f"--eye={x},0,{DISTANCE}", "--size", "30x20")
+        assert lippmann(*seen_by_eye, "-o", tmp_path / "seen.png").code == 0
+        assert abs(int(np.asarray(Image.open(tmp_path / "seen.png"))[10, 15, 0]) - level) <= 1
+
+
 def test_photographs_stand_upright_under_lenses_across(lippmann, tmp_path):
     half = np.zeros((40, 60, 3), dtype=np.uint8)
     half[:20, :30] = 200  # top left

@@ -116,6 +116,8 @@ def write_interlaced(
     whole = replace(display, sheet=None)  # no part of which is cut off: the photographs cover it
     weaving = Weaving(photos.quilt, whole, choice, correct, headroom)
     options, notes = weaving.describe_correction()
+    if across:
+        notes += ("a replay of lying lenses needs the file turned to the left: see docs/how-to/print.md",)
     finished = replace(finish, profile=Profile(name_of(photos.icc), photos.icc) if photos.icc else None).display(
         display
     )
