@@ -365,6 +365,12 @@ def test_copies_beyond_all_bounds_are_refused(read):
         read(triangle() + body)
 
 
+def test_a_cage_without_faces_after_one_that_is_refined(read):
+    smooth = triangle().replace('"none"', '"catmullClark"')
+    empty = smooth.replace('"m"', '"empty"').replace("[3]", "[]").replace("[0, 1, 2]", "[]")
+    assert len(read(smooth + empty).instances) == 1
+
+
 @pytest.mark.parametrize(
     ("copies", "says"),
     [

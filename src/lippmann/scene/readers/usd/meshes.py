@@ -279,6 +279,8 @@ class MeshReader:
             batch, quads = [record], 0
             after = next(place for place, each in enumerate(self._records) if each is record) + 1
             for each in self._records[after:]:
+                if not (self._integers(each, "counts") >= 3).any():
+                    continue
                 quads += len(self._array(each, "indices")) << (2 * levels - 2)
                 if quads > _FEW_QUADS or self._levels_of(each) != levels or each["boundary"] != record["boundary"]:
                     break
