@@ -149,6 +149,14 @@ def test_marks_after_a_bleed_cut_at_the_trim(lippmann, frames, tmp_path):
     assert dark(left).tolist() == [*range(176 - line, 176), *range(176 + plain[1], 176 + plain[1] + line)]
 
 
+def test_info_tells_the_size_and_borders_of_a_print(lippmann, frames, tmp_path):
+    finished = ("--bleed", "1.27mm", "--marks", "7mm", "--mirror")
+    for options, borders in (((), "\n"), (finished, ", bleed 1.27 mm, margin 6.985 mm, mirrored\n")):
+        interlace(lippmann, frames, tmp_path / "a.tif", "--size", "30x20mm", *options)
+        told = lippmann("info", tmp_path / "a.tif").out
+        assert f"\nprint       20-lpi lenticular print, 30x20 mm at 400 ppi, seen from 300 mm{borders}" in told
+
+
 def test_a_mirrored_print_is_the_whole_sheet_mirrored_once(lippmann, frames, tmp_path):
     options = ("--size", "30x20mm", "--bleed", "3mm", "--marks", "5mm")
     plain = interlace(lippmann, frames, tmp_path / "plain.tif", *options)

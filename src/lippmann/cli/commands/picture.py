@@ -167,6 +167,10 @@ def _info_lines(path: Path, file: PictureFile) -> list[str]:
         f"display     {display.name} ({display.lens_array.layout}, {grid.columns}x{grid.rows} lenses, "
         f"field {display.field_of_view:.1f} degrees)",
     ]
+    if display.sheet is not None:
+        sheet, pixel = display.sheet, display.panel.pixel_pitch
+        borders = [f"{name} {size * pixel:.4g} mm" for name in ("bleed", "margin") if (size := getattr(sheet, name))]
+        lines.append("print       " + ", ".join([display.title, *borders, *["mirrored"] * sheet.mirrored]))
     return lines + _provenance_lines(provenance)
 
 

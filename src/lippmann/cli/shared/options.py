@@ -84,9 +84,9 @@ PictureDisplay = Annotated[
 Scene = Annotated[
     str,
     typer.Argument(
-        help="A .glb, .gltf, .obj, .ply, .spz, .sog, .stl, .off, .blend, .usd, Mitsuba .xml, Tachyon .dat or .nff "
-        "file, a volume (.nii, .nii.gz, .nrrd, .mhd, .vdb, .npy, .npz, .vol, a DICOM folder), a VTK file, a photograph "
-        "with depth, or a bundled scene's name.",
+        help="A .glb, .gltf, .obj, .ply, .stl, .3mf, .off, .blend, .usd, Mitsuba .xml, Tachyon .dat or .nff file, "
+        "Gaussian splats (.ply, .spz, .sog), points (.ply, .xyz, .csv, .las), a molecule (.pdb, .cif, .sdf), a volume "
+        "(.nii, .nrrd, .vdb, .npy, a DICOM folder), a VTK file, a photograph with depth, or a bundled scene's name.",
         autocompletion=complete_scenes,
     ),
 ]
