@@ -46,11 +46,35 @@ def test_colours_that_are_not_set_are_none(save):
     assert all(mesh.colors is None for mesh in scene.description.meshes)
 
 
-def test_one_line_says_what_is_wrong(save, tmp_path):
-    data = save("a.laz", CODES).read_bytes()
-    (tmp_path / "b.laz").write_bytes(data[:300])
-    with pytest.raises(SceneError, match=r"^b\.laz: is no scan that is understood \([^\n]+\); LAS or LAZ$"):
-        load_scene(tmp_path / "b.laz")
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+@pytest.mark.parametrize(
+    ("left", "says"), [(60, "it ends within its header"), (150, ""), (300, ""), (-1, ""), (-20, "")]
+)
+def test_one_line_says_that_a_file_is_cut_short(save, name, left, says):
+    path = save(name, CODES)
+    path.write_bytes(path.read_bytes()[:left])
+    with pytest.raises(SceneError, match=rf"^a\.la[sz]: is no scan that is understood \({says}[^\n]*\); LAS or LAZ$"):
+        load_scene(path)
+
+
+def test_a_header_that_counts_more_records_than_there_are(save):
+    path = save("a.las", CODES)
+    data = bytearray(path.read_bytes())
+    data[100:104] = (1 << 24).to_bytes(4, "little")
+    path.write_bytes(data)
+    with pytest.raises(SceneError, match="its header counts 16777216 records"):
+        load_scene(path)
+
+
+def test_a_scan_of_more_points_than_are_shown(save, monkeypatch):
+    pytest.importorskip("laspy")
+    from lippmann.scene.readers.lidar import child
+
+    path = save("a.las", CODES)
+    monkeypatch.setattr(child, "MOST_POINTS", 3)
+    found = child._read({"path": str(path)})
+    assert found["positions"][:, :2] == pytest.approx(PLACES[[0, 2], :2] + [600_000.0, 5_000_000.0])
+    assert "one of 2 points is shown" in found["notes"].tolist()
 
 
 def test_without_the_library_one_line_says_how_to_install_it(tmp_path, monkeypatch):

@@ -61,7 +61,9 @@ def _read(request: dict[str, Any]) -> dict[str, NDArray[np.generic]]:
 def _check_records(path: str) -> None:
     """Refuse a header that counts more records behind it than the file has room for: ``laspy`` reads on for hours."""
     with open(path, "rb") as file:
-        file.seek(_COUNT_AT)
-        (count,) = struct.unpack("<I", file.read(4))
+        head = file.read(_COUNT_AT + 4)
+        if len(head) < _COUNT_AT + 4:
+            raise ValueError("it ends within its header")
+        (count,) = struct.unpack_from("<I", head, _COUNT_AT)
         if _RECORD * count > file.seek(0, 2):
             raise ValueError(f"its header counts {count} records")
