@@ -41,6 +41,21 @@ def test_an_output_without_its_option_is_told_of_it(lippmann, kept):
 
 
 @pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ("weave", "views", "-d", "print", "--lpi", "60"),
+            "--lpi: this command takes a print in one word: print:lpi",
+        ),
+        (("proof", "--lpi", "60"), "print:lpi=60,ppi=720,size=200x300mm"),
+        (("render", "teapot", "--dpi", "300"), "--dpi: it is called --ppi here"),
+    ],
+)
+def test_options_of_other_commands_and_programs_are_known(lippmann, words, said):
+    refuse(lippmann(*words), said)
+
+
+@pytest.mark.parametrize(
     ("words", "where"),
     [
         (("render", ""), "an argument"),

@@ -109,7 +109,8 @@ def test_a_picture_without_a_display(tmp_path, display, picture):
     assert image.display == array
     assert image.provenance == Provenance()
     assert open_file(path).metadata is None
-    with pytest.raises(PictureError, match=r"foreign.png: has 12 x 9 pixels; the display test-square has 15 x 9"):
+    said = r"foreign.png: has 12 x 9 pixels; the display test-square has 15 x 9; of a quilt, say its columns"
+    with pytest.raises(PictureError, match=said):
         read_picture(path, display=display("square", lenses=(5, 3)))
 
 

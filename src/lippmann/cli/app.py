@@ -279,11 +279,12 @@ _NO_COMMAND = re.compile(r"Missing command\.|No such command '[^']*'\.")
 #: How it refuses one argument too many, here a file to write.
 _EXTRA = re.compile(r"Got unexpected extra argument(?:\(s\))? \((\S+\.\w+)\)")
 _NO_SUCH = re.compile(r"No such option: (--[\w-]+)")
-#: Options by the names that other programs give them.
+#: Options by the names that other programs, or other commands, give them.
 _OTHER_NAMES = {
     "--dpi": "it is called --ppi here, pixels per inch",
     "--samples": "it is called --spp here, samples per pixel",
     "--out": "it is called --output or -o here",
+    "--lpi": "this command takes a print in one word: print:lpi=60,ppi=720,size=200x300mm",
 }
 
 

@@ -104,7 +104,8 @@ class PictureFile:
         panel = metadata.display.panel
         if (self.width, self.height) != (panel.width, panel.height):
             rule = f"the display {metadata.display.name} has {panel.width} x {panel.height}"
-            raise PictureError(f"has {self.width} x {self.height} pixels", where=str(self.path), rule=rule)
+            fix = "" if self.metadata else "of a quilt, say its columns and rows: layout=... of weave, replay or view"
+            raise PictureError(f"has {self.width} x {self.height} pixels", where=str(self.path), rule=rule, fix=fix)
         return metadata
 
     def decode(self, *, as_srgb: bool = False) -> tuple[Values, dict[str, Layer]]:
