@@ -125,6 +125,12 @@ def test_light_that_moves_is_not_at_rest_whether_it_is_a_source_or_a_surface(glo
     assert are_emitters_at_rest(moment(**materials), moment(**materials, instances=places(aside))) != glows
 
 
+@pytest.mark.parametrize("form", ["inner_angle", "outer_angle", "radius"])
+def test_light_whose_cone_or_radius_changes_is_not_at_rest(form):
+    lamps = [[replace(SCENE.lights[0], kind="spot", **{form: size})] for size in (0.2, 0.21)]
+    assert not are_emitters_at_rest(*(moment(lights=lights) for lights in lamps))
+
+
 def test_a_texture_is_changed():
     assert not is_cut(moment(**painted(100)), moment(**painted(100)), DISPLAY)
     assert is_cut(moment(**painted(100)), moment(**painted(101)), DISPLAY)

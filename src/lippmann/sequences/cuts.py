@@ -67,7 +67,7 @@ def is_light_at_rest(before: Moment, after: Moment) -> bool:
 
 
 def are_emitters_at_rest(before: Moment, after: Moment) -> bool:
-    """Whether no light source has moved, and no surface that emits light."""
+    """Whether no light source has moved or changed its cone or radius, nor any surface that emits light."""
     one, other = before.scene.description, after.scene.description
     if one is other or not (isinstance(one, SceneDescription) and isinstance(other, SceneDescription)):
         return True
@@ -76,8 +76,9 @@ def are_emitters_at_rest(before: Moment, after: Moment) -> bool:
 
 
 def _list_emitters(description: SceneDescription) -> Iterator[NDArray[np.floating]]:
-    """Matrices of all light sources; corners and matrices of the copies of all meshes that emit light."""
-    yield from (light.world_from_light for light in description.lights)
+    """Matrices and forms of all light sources; corners and matrices of the copies of all meshes that emit light."""
+    for light in description.lights:
+        yield from (light.world_from_light, np.array([light.inner_angle, light.outer_angle, light.radius]))
     for mesh, places in description.placements.items():
         if any(description.materials[description.meshes[mesh].material].emission):
             yield from (description.meshes[mesh].positions, places)
