@@ -14,13 +14,14 @@ from lippmann.image import Provenance
 from lippmann.image.preview import Preview
 from lippmann.options.placement import PlacementOptions
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
+from lippmann.rendering.film.wavefront import Frame
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.values.whitted_scene import CameraPose
 from lippmann.sequences.cuts import Moment
 from lippmann.sequences.frames import place_frames, render_frames, render_sequence
 from lippmann.sequences.key_frames import KeyFrames, estimate_next, list_frames_before
 from lippmann.sequences.key_light import LightOfSurfaces
-from lippmann.sequences.motion import Flight
+from lippmann.sequences.motion import Flight, Motion
 from lippmann.sequences.still_pixels import StillPixels
 from lippmann.sequences.turntable import open_turntable
 
@@ -35,6 +36,23 @@ def motion():
 @pytest.fixture(scope="module")
 def display():
     return load_display("seed-lenticular").resized(32, 32)
+
+
+class AtRest(Motion):
+    """A scene in which nothing moves, before a display at rest."""
+
+    count = 6
+    content = None
+    still = lippmann.load_scene("teapot")
+
+    def scene(self, frame):
+        return self.still
+
+    def camera(self, frame, name):
+        return None
+
+    def bounds(self):
+        return self.still.bounds
 
 
 def asked_of(motion, display, frames, estimate=ESTIMATE, **options):
@@ -88,8 +106,9 @@ def test_no_key_frame_is_rendered_for_a_frame_after_a_cut(motion, display, monke
     ids=["slow", "cut", "fast"],
 )
 def test_frames_along_a_camera_path_follow_the_first_up_to_a_cut_or_the_next_that_shows_another_view(
-    display, places, halves, before
+    display, places, halves, before, monkeypatch
 ):
+    monkeypatch.setattr(LightOfSurfaces, "has_light", True)
     scene = lippmann.load_scene("room")
     camera = scene.classic.camera
     center = camera.center
@@ -101,14 +120,26 @@ def test_frames_along_a_camera_path_follow_the_first_up_to_a_cut_or_the_next_tha
 
 
 def test_frames_after_a_step_of_the_light_take_none_from_before_it(display):
+    job, traced = SimpleNamespace(denoiser=SimpleNamespace(variance=1.0)), SimpleNamespace(frame=Frame(None))
     shared = LightOfSurfaces()
     shared.holds = lambda key, moment: (key.number, moment.number) != (0, 2)
-    keys = KeyFrames(display, None, None, shared)
+    for name in ("trace_next", "trace_key", "pass_on"):
+        setattr(shared, name, lambda job, trace, name=name: asked.append(name) or traced)
+    keys, asked = KeyFrames(display, None, None, shared), []
     key = keys.add(Moment(0, None, None), Provenance(method="pooled", spp=8), None)
-    for number, through in enumerate((shared.trace_next, shared.trace_key, shared.trace_next, shared.pass_on), 1):
+    for number in range(1, 5):
         moment = Moment(number, None, None)
-        assert keys.make_request(RenderRequest(), moment, key).trace_through == through
+        keys.make_request(RenderRequest(), moment, key).trace_through(job, None)
         keys.add(moment, key.made, key)
+    assert asked == ["trace_next", "trace_key", "trace_next", "pass_on"]
+
+
+@pytest.mark.parametrize(("has_light", "halves"), [(True, [0]), (False, [0, 4])])
+def test_every_fourth_frame_has_halves_where_no_light_is_kept(display, has_light, halves, monkeypatch):
+    # Pictures with photons are traced whole: a film stated up to 23 dB too much after its first frame.
+    monkeypatch.setattr(StillPixels, "has_light", has_light)
+    asked = asked_of(AtRest(), display, range(6))
+    assert [frame for frame, (*_, has_halves) in enumerate(asked) if has_halves] == halves
 
 
 @pytest.mark.parametrize(
@@ -137,14 +168,21 @@ def test_more_noise_lowers_the_estimate_by_its_root_and_the_lower_end_by_itself(
     assert (less["psnr_low"], less["psnr_high"]) == (38.0, pytest.approx(43 + by_share, abs=0.01))
 
 
+@pytest.mark.parametrize("shared", [None, StillPixels()])
 @pytest.mark.parametrize(
     ("variances", "noise"), [((2.0, 6.0), 4.0), ((6.0, 2.0), 4 / 9), ((0.0, 2.0), 4 / 3), ((2.0, 0.0), 4 / 3)]
 )
-def test_a_frame_notices_that_its_object_has_turned_to_a_noisier_side(display, variances, noise):
-    keys, key = KeyFrames(display, None, None, None), None
+def test_a_frame_that_is_traced_whole_notices_that_it_is_noisier(display, shared, variances, noise, monkeypatch):
+    monkeypatch.setattr(StillPixels, "holds", lambda *moments: True)
+    monkeypatch.setattr(StillPixels, "_keep", lambda *picture: None)  # as of pictures with photons
+    monkeypatch.setattr("lippmann.sequences.still_pixels._find_window", lambda job: None)
+    traced = SimpleNamespace(frame=Frame(None))
+    columns = {name: SimpleNamespace(width=1) for name in ("source", "sample_source")}
+    keys, key = KeyFrames(display, None, None, shared), None
     for number, variance in enumerate(variances):
         through = keys.make_request(RenderRequest(), Moment(number, None, None), key).trace_through
-        assert through(SimpleNamespace(denoiser=SimpleNamespace(variance=variance)), lambda job: "traced") == "traced"
+        job = SimpleNamespace(denoiser=SimpleNamespace(variance=variance), **columns)
+        assert through(job, lambda job: traced) is traced
         key = keys.add(Moment(number, None, None), Provenance(method="pooled", spp=8, estimate=ESTIMATE), key)
     assert keys.estimate(Provenance(), key) == estimate_next(ESTIMATE, noise)
 

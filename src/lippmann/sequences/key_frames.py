@@ -83,32 +83,34 @@ class KeyFrames:
             frame = key.moment.number
             source = f"the estimate of the error follows from frame {frame}'s, with three quarters of its samples"
             own = replace(request, spp=samples, judged_by=source, keep_light=self._light.reuse_key)
-            if self._shared is None:
-                return replace(own, trace_through=partial(self._note_variance, "next"))
-            if self._shared.holds(self._last[0], moment):
-                return replace(own, trace_through=self._shared.pass_on if has_next else self._shared.trace_next)
-            return replace(own, trace_through=self._shared.trace_key) if has_next else own
+            holds = self._shared is not None and self._shared.holds(self._last[0], moment)
+            return replace(own, trace_through=partial(self._trace, "next", holds, has_next))
         if not (has_next and _is_open(request)):
             return request
-        through = partial(self._note_variance, "key") if self._shared is None else self._shared.trace_key
-        return replace(request, keep_light=self._light.keep_key, trace_through=through)
+        return replace(request, keep_light=self._light.keep_key, trace_through=partial(self._trace, "key", False, True))
 
-    def _note_variance(self, kind: str, job: Job, trace: Callable[[Job], Traced]) -> Traced:
-        traced = trace(job)
-        self._variances[kind] = job.denoiser.variance
+    def _trace(self, kind: str, holds: bool, has_next: bool, job: Job, trace: Callable[[Job], Traced]) -> Traced:
+        """Trace a frame with the key frame's light where that ``holds``; others may follow those that ``has_next``."""
+        if self._shared is None or not (holds or has_next):
+            traced = trace(job)
+        elif holds:
+            traced = (self._shared.pass_on if has_next else self._shared.trace_next)(job, trace)
+        else:
+            traced = self._shared.trace_key(job, trace)
+        # Among clean pixels the denoiser takes other noise.
+        self._variances[kind] = 0.0 if "reprojected" in traced.frame.shares else job.denoiser.variance
         return traced
 
     def estimate(self, made: Provenance, key: Key | None) -> Figures | None:
         """The estimate of a frame that was ``made`` last, after a ``key`` frame or, None, as one; as its file holds it.
 
-        Noise is taken to fall in proportion to the samples, and to grow with the variance of one. Where frames take a
+        Noise is taken to fall in proportion to the samples, and to grow with the variance of one. Where a frame takes a
         key frame's light, only the samples count.
         """
         if key is None or key.made.estimate is None:
             return made.estimate
         variances = self._variances
-        is_known = self._shared is None and 0.0 not in variances.values()
-        grown = variances["next"] / variances["key"] if is_known else 1.0
+        grown = variances["next"] / variances["key"] if 0.0 not in variances.values() else 1.0
         return estimate_next(key.made.estimate, grown / TUNING.samples_kept)
 
     def noise_of(self, frame: int, request: RenderRequest) -> int:
@@ -146,9 +148,13 @@ class KeyFrames:
             key = self.add(last, made, before)
         else:
             key = kept[1]
-        has_estimate = key.made.estimate is not None and "by_chance" in key.made.estimate
+        if key.made.estimate is None or "by_chance" not in key.made.estimate:
+            return None
         # A steady flight leaves its key frame's view behind, too: it has halves again as often as other films do.
-        return key if has_estimate and not (may_have_halves and is_cut(key.moment, moment, self._display)) else None
+        # So have pictures that are traced whole, such as those with photons.
+        shared = self._shared
+        follows = shared and shared.has_light and not is_cut(key.moment, moment, self._display)
+        return key if follows or not may_have_halves else None
 
 
 def list_frames_before(frame: int, request: RenderRequest, shared: KeyLight | None) -> list[int]:

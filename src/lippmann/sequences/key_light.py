@@ -42,6 +42,13 @@ class KeyLight(ABC):
     frames_of_link = TUNING.frames_of_key
     #: Share of a key frame's squared error in the pixels that have been traced since: these alone flicker.
     traced_error = 1.0
+    #: What is kept of the key frame.
+    _key: object | None = None
+
+    @property
+    def has_light(self) -> bool:
+        """Whether the last key frame's light is kept: not of pictures that are traced whole."""
+        return self._key is not None
 
     def trace_key(self, job: Job, trace: Callable[[Job], Traced]) -> Traced:
         """Trace a key frame; parameters as of ``trace_through`` in
@@ -71,9 +78,8 @@ class KeyLight(ABC):
     def _keep(self, job: Job, traced: Traced) -> None:
         """Keep the picture of a job."""
 
-    @abstractmethod
     def _forget(self) -> None:
-        """Give up the picture that is kept."""
+        self._key = None
 
 
 class LightOfSurfaces(KeyLight):
@@ -100,9 +106,6 @@ class LightOfSurfaces(KeyLight):
         if light is not None and views is not None:
             colors = _split_columns(job, traced.frame.pixels)
             self._key = light, KeyPicture(_make_pixels(job), colors, views, count_columns(job))
-
-    def _forget(self) -> None:
-        self._key = None
 
 
 def light_of(job: Job) -> PreparedLight | None:

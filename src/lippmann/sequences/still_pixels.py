@@ -148,9 +148,6 @@ class StillPixels(KeyLight):
             self._key = _Picture(window, pixels, _hash_features(job), probes, direct, errors, nothing)
         self._own = None
 
-    def _forget(self) -> None:
-        self._key = None
-
 
 def _sum_share(errors: Floats | None, is_chosen: Mask) -> float:
     """The chosen pixels' share of all errors, as far as these are known."""
