@@ -220,9 +220,14 @@ def size(text: str, key: str) -> tuple[float, float]:
     return sides[0], sides[1]
 
 
+#: Digits of a number that an error repeats.
+_MOST_DIGITS = 20
+
+
 def _no_unit(bare: str, key: str, *units: str) -> DisplayError:
-    *others, last = (bare + unit for unit in units)
-    return DisplayError(f"{bare!r} has no unit", where=key, fix=f"say {', '.join(others)} or {last}")
+    quoted = bare if len(bare) <= _MOST_DIGITS else f"{bare[:_MOST_DIGITS]}..."
+    *others, last = (quoted + unit for unit in units)
+    return DisplayError(f"{quoted!r} has no unit", where=key, fix=f"say {', '.join(others)} or {last}")
 
 
 def plain_number(text: str, key: str) -> float:
