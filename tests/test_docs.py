@@ -138,9 +138,9 @@ def save_film(path: Path) -> None:
 
     with av.open(str(path), "w") as film:
         stream = film.add_stream("libx264", rate=24)
-        stream.width, stream.height, stream.pix_fmt = 60, 80, "yuv420p"
+        stream.width, stream.height, stream.pix_fmt = 192, 256, "yuv420p"
         for level in (50, 150):
-            film.mux(stream.encode(av.VideoFrame.from_ndarray(np.full((80, 60, 3), level, np.uint8), format="rgb24")))
+            film.mux(stream.encode(av.VideoFrame.from_ndarray(np.full((256, 192, 3), level, np.uint8), format="rgb24")))
         film.mux(stream.encode())
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 from PIL import Image, features
@@ -13,7 +14,7 @@ from lippmann.color.primaries import REC709
 from lippmann.errors import OutputError, PictureError
 from lippmann.image import PictureFile, encoding
 from lippmann.quilts import files as quilt_files
-from lippmann.quilts.files import is_quilt, read_quilt, read_views, write_quilt, write_views
+from lippmann.quilts.files import ending_of_views, is_quilt, read_film, read_quilt, read_views, write_quilt, write_views
 from lippmann.quilts.quilt import Quilt, QuiltLayout
 from lippmann.viewing.stereo import write_pair
 
@@ -114,6 +115,23 @@ def test_transparent_parts_lie_on_black(tmp_path, ending):
     picture.save(tmp_path / f"x_qs4x2a2.{ending}", lossless=True)
     values = read_quilt(tmp_path / f"x_qs4x2a2.{ending}").values
     assert values[0, [0, 256]].tolist() == [[200, 100, 50], [40, 20, 10]]
+
+
+def test_frames_of_a_film_become_a_quilt(tmp_path):
+    path = tmp_path / "orbit.mp4"
+    with av.open(str(path), "w") as film:
+        stream = film.add_stream("libx264", rate=24)
+        stream.width, stream.height, stream.pix_fmt = 96, 128, "yuv420p"
+        for number in range(13):
+            codes = np.full((128, 96, 3), 20 * number, np.uint8)
+            film.mux(stream.encode(av.VideoFrame.from_ndarray(codes, format="rgb24")))
+        film.mux(stream.encode())
+    assert ending_of_views(path) == "_qs4x3a0.75"  # one of the thirteen is left out
+    quilt = read_film(path, QuiltLayout(2, 2, 0.75))
+    assert [int(quilt.view_values(number)[60, 40, 0]) for number in range(4)] == pytest.approx([0, 80, 160, 240], abs=3)
+    assert quilt.notes == ("of the film's 13 frames 4 are shown, evenly spaced",)
+    with pytest.raises(PictureError, match=r"orbit.mp4: it holds 13 frames; 8x6 views are 48"):
+        read_film(path, QuiltLayout(8, 6, 0.75))
 
 
 def test_other_formats_are_named(tmp_path):

@@ -75,7 +75,7 @@ def test_a_film_of_one_view_is_its_frames(tmp_path):
         film.mux(stream.encode())
     quilt = read_photos([tmp_path / "a.mp4"], (8, 4), PAPER).quilt
     assert [quilt.view_values(k)[2, 4, 0] for k in range(quilt.layout.views)] == pytest.approx([30, 90, 160], abs=3)
-    with pytest.raises(PictureError, match=r"no stereo pair.*frames of a film are views for 'lippmann interlace'"):
+    with pytest.raises(PictureError, match=r"no stereo pair.*frames of a film are views for 'interlace'"):
         quilt_of_pair(tmp_path / "a.mp4")
 
 

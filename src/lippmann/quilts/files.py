@@ -159,14 +159,40 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
     return replace(quilt, notes=taken + notes.lines())
 
 
-def ending_of_views(folder: Path) -> str:
-    """The ending ``_qsCxRaA`` of the quilt of a folder's views that is nearest to a square; errors as of
-    :func:`read_views`.
+def read_film(path: Path, layout: QuiltLayout) -> Quilt:
+    """A quilt of frames of a film, evenly spaced, the first as the leftmost view.
+
+    Raises
+    ------
+    PictureError
+        If the film is damaged, or has fewer frames than the layout views.
     """
-    paths, _ = _list_numbered(folder)
+    from lippmann.codecs.film_views import read_frames
+
+    frames = read_frames(path, layout.views)
+    if len(frames) < layout.views:
+        rule = f"{layout.columns}x{layout.rows} views are {layout.views}"
+        raise PictureError(f"it holds {len(frames)} frames", where=str(path), rule=rule)
+    quilt = replace(_blank_quilt(frames[0].size, layout, "uint8"), notes=frames[0].notes)
+    for number, frame in enumerate(frames):
+        quilt.view_values(number)[...] = frame.codes()
+    return quilt
+
+
+def ending_of_views(source: Path) -> str:
+    """The ending ``_qsCxRaA`` of the quilt of a folder's views, or a film's frames, that is nearest to a square; errors
+    as of :func:`read_views` and :func:`read_film`.
+    """
+    if source.is_file():
+        from lippmann.codecs.film_views import read_frames
+
+        frames = read_frames(source)
+        aspect = frames[0].size[0] / frames[0].size[1]
+        columns = max(1, round(math.sqrt(len(frames) / aspect)))  # a few frames may be left out
+        return QuiltLayout(columns, max(1, len(frames) // columns), float(f"{aspect:.6g}")).ending
+    paths, _ = _list_numbered(source)
     with open_view(paths[0]) as file:
-        aspect = file.size[0] / file.size[1]
-    count = len(paths)
+        count, aspect = len(paths), file.size[0] / file.size[1]
     # Columns a row more than a square quilt has are as far from it as so many times fewer.
     columns = min(
         (each for each in range(1, count + 1) if count % each == 0), key=lambda c: abs(math.log(c * c * aspect / count))
@@ -306,7 +332,7 @@ def _first_missing(numbers: Iterable[int], first: int) -> int | None:
 def _check_ending(path: Path) -> None:
     if path.suffix.lower() in FILMS:
         fix = "take a quilt out of it: ffmpeg -i in.mp4 -frames:v 1 out_qs8x6a0.75.png; "
-        fix += "frames of a camera that moves to the right are views for 'lippmann interlace'"
+        fix += "frames of a camera that moves to the right are views for 'interlace' and 'quilt pack'"
         raise PictureError("is a film", where=str(path), rule="pictures are read", fix=fix)
     if not path.suffix and not path.exists():
         raise unreadable(path, FileNotFoundError(), PictureError)

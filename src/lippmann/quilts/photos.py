@@ -205,7 +205,7 @@ def quilt_of_pair(path: Path, *, half: bool = False) -> Quilt:
             if has_depth(path):
                 what, fix = "is a photograph with depth, no stereo pair", "show it by 'lippmann render'"
         elif path.suffix.lower() in FILMS:
-            fix = "frames of a film are views for 'lippmann interlace'; spatial films need FFmpeg 7.1 (PyAV 14)"
+            fix = "frames of a film are views for 'interlace' and 'quilt pack'; spatial ones need FFmpeg 7.1 (PyAV 14)"
         raise PictureError(what, where=str(path), rule="a pair is two views that are marked as such", fix=fix)
     (width, height), second = (_header(source).size for source in sources)
     size = (width + 1) // 2 if half else width, height

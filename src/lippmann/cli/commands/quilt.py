@@ -177,8 +177,8 @@ def pack(
     folder: Annotated[
         Path,
         typer.Argument(
-            help="A folder with one picture per view, numbered from the left, or a stereo pair: an .mpo, .jps "
-            "or .heic file."
+            help="A folder with one picture per view, numbered from the left; a film of a camera that moves to the "
+            "right; or a stereo pair: an .mpo, .jps or .heic file."
         ),
     ],
     output: Annotated[
@@ -196,19 +196,25 @@ def pack(
     quiet: options.Quiet = False,
 ) -> None:
     """Put a folder of views into a quilt, the leftmost at the bottom left."""
+    from lippmann.codecs.stereo_pairs import read_pair
+    from lippmann.codecs.types import FILMS
     from lippmann.image.write import check_output
-    from lippmann.quilts.files import ending_of_views, read_views, write_quilt
+    from lippmann.quilts.files import ending_of_views, read_film, read_views, write_quilt
     from lippmann.quilts.photos import quilt_of_pair
     from lippmann.quilts.quilt import layout_of_name, names_half_pair
 
     console = Console(quiet, as_json)
+    is_film = folder.suffix.lower() in FILMS and folder.is_file() and read_pair(folder) is None
+    is_pair = folder.is_file() and not is_film
     if output is None:
-        output = output_of(None, folder, ("_2x1" if folder.is_file() else ending_of_views(folder)) + ".png")
+        output = output_of(None, folder, ("_2x1" if is_pair else ending_of_views(folder)) + ".png")
     layout, half = layout_of_name(output, to_write=True), names_half_pair(output)
     check_output(output, bits)
     with console.progress() as progress:
-        if folder.is_file():
+        if is_pair:
             packed = quilt_of_pair(folder, half=half)
+        elif is_film:
+            packed = read_film(folder, layout)
         else:
             packed = read_views(folder, layout, progress=progress)
             if half:
