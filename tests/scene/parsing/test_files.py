@@ -65,6 +65,7 @@ def test_the_one_file_that_differs_in_case_or_folder_is_meant(folder, name):
 
 
 def test_a_scene_file_is_not_the_answer_to_a_missing_asset(folder):
+    (folder / "long_name_of_scene.mhd").write_bytes(b"x")
     (folder / "long_name_of_scene.gltf").write_bytes(b"x")
     with pytest.raises(MissingFileError) as caught:
         find(folder, "long_name_of_scene.bin", what="buffer")
@@ -90,6 +91,7 @@ def test_text_in_old_and_new_coding():
     assert decode_text("é".encode("latin-1"), "x") == "é"
     assert decode_text("\ufeffv 1 é".encode("utf-16-be"), "x") == "v 1 é"
     assert decode_text("\ufeffv 1 é".encode("utf-16-le"), "x") == "v 1 é"
+    assert decode_text(b"f 1 2 3\n\n\0\n", "x") == "f 1 2 3"  # as ZBrush ends an OBJ file
     assert decode_text(b"v 1\rv 2\r", "x") == "v 1\nv 2\n"  # as on the old Mac OS
     with pytest.raises(SceneError, match="is not a text file"):
         decode_text(b"v 1\0\0", "x.obj")

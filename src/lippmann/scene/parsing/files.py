@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 #: Endings of files that name other files.
 _NAMING_FILES = frozenset(
     {
-        *(".blend", ".dat", ".glb", ".gltf", ".mtl", ".nff", ".obj", ".ply", ".stl"),
+        *(".blend", ".dat", ".fbx", ".glb", ".gltf", ".mhd", ".mtl", ".nff", ".nhdr", ".obj", ".ply", ".stl"),
         *(".usd", ".usda", ".usdc", ".usdz", ".xml"),
     }
 )
@@ -87,6 +87,8 @@ def decode_text(data: bytes, where: str) -> str:
             return _with_line_feeds(data.decode("utf-16"))
         except UnicodeDecodeError:
             raise SceneError("is no text in UTF-16, as which it begins", where=where) from None
+    if b"\0" in data[-4:]:  # ends that ZBrush writes
+        data = data.rstrip(b"\0\r\n")
     if b"\0" in data[:4096]:
         raise SceneError("is not a text file", where=where, rule="this format is plain text")
     try:
