@@ -87,7 +87,7 @@ def decode_text(data: bytes, where: str) -> str:
             return _with_line_feeds(data.decode("utf-16"))
         except UnicodeDecodeError:
             raise SceneError("is no text in UTF-16, as which it begins", where=where) from None
-    if b"\0" in data[-4:]:  # ends that ZBrush writes
+    if data.endswith((b"\n\0\n", b"\n\0\r\n")):  # as ZBrush ends files
         data = data.rstrip(b"\0\r\n")
     if b"\0" in data[:4096]:
         raise SceneError("is not a text file", where=where, rule="this format is plain text")
