@@ -78,13 +78,13 @@ def obj(folder):
     (folder / "skin.png").write_bytes(EPS)
     (folder / "m.mtl").write_text("newmtl a\nmap_Kd skin.png\n")
     (folder / "s.obj").write_text(OBJ)
-    read_obj(folder / "s.obj")
+    return read_obj(folder / "s.obj")
 
 
 def ply(folder):
     (folder / "skin.png").write_bytes(EPS)
     (folder / "s.ply").write_text(PLY)
-    read_ply(folder / "s.ply")
+    return read_ply(folder / "s.ply")
 
 
 def gltf(folder, image, *, view=None):
@@ -108,12 +108,12 @@ def gltf(folder, image, *, view=None):
         "buffers": [{"byteLength": len(data), "uri": uri}],
     }
     (folder / "s.gltf").write_text(json.dumps(tree))
-    read_gltf(folder / "s.gltf")
+    return read_gltf(folder / "s.gltf")
 
 
 def gltf_file(folder):
     (folder / "skin.png").write_bytes(EPS)
-    gltf(folder, {"uri": "skin.png"})
+    return gltf(folder, {"uri": "skin.png"})
 
 
 def gltf_data(folder):
@@ -179,6 +179,15 @@ def test_dds_of_srgb_coded_blocks(blocks, srgb):
     data[128:132] = srgb.to_bytes(4, "little")
     found = decode_image(bytes(data), "skin.dds", where="f").pixels
     assert found[3, 3].tolist() == pytest.approx([200, 100, 50, 255], abs=6)
+
+
+@pytest.mark.parametrize("scene", [obj, ply, gltf_file])
+def test_models_are_shown_without_dds_that_pillow_does_not_decode(tmp_path, monkeypatch, scene):
+    unknown = bytearray(dds([200, 100, 50, 255], "BC3"))
+    unknown[128:132] = (61).to_bytes(4, "little")  # R8
+    monkeypatch.setattr(f"{__name__}.EPS", bytes(unknown))
+    notes = scene(tmp_path).notes
+    assert any("is not decoded (Unimplemented DXGI format 61)" in note and "shown without it" in note for note in notes)
 
 
 def test_dds_of_two_channels_are_normals():

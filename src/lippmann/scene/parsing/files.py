@@ -36,7 +36,7 @@ _NAMING_FILES = frozenset(
 
 
 class MissingFileError(SceneError):
-    """A file that a scene file names and that is not found."""
+    """A file that a scene file names and that is not found, or a picture in a variety that is not decoded."""
 
     def note(self, consequence: str) -> str:
         """The line that says what is missing, where it is named, and what is shown instead."""
@@ -285,6 +285,8 @@ def decode_image(data: bytes, name: str, *, where: str) -> Image:
     ------
     SceneError
         The bytes are no picture of a format of :data:`lippmann.codecs.pillow_formats.FORMATS`, or are cut short.
+    MissingFileError
+        They are a DDS picture of a variety that Pillow does not decode.
     MemoryLimitError
         They take more than the memory that is left.
     """
@@ -309,6 +311,8 @@ def decoding(what: str, where: str) -> Iterator[None]:
         raise SceneError(f"{what} is not a picture that can be read", where=where, rule=RULE) from None
     except SceneError:
         raise
+    except NotImplementedError as error:  # of DDS
+        raise MissingFileError(f"{what} is not decoded ({error})", where=where, fix="convert it to PNG") from None
     except Exception as error:  # Pillow's decoders pass on whatever their libraries throw at damaged data
         raise SceneError(f"{what} cannot be decoded ({error})", where=where) from error
 

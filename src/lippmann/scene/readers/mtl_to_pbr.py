@@ -82,7 +82,8 @@ class MaterialMapper:
         maps, numbers = dict(record.maps), dict(record.numbers)
         for key, reference in record.maps.items():
             try:
-                self._image(reference) if is_tiled(reference.file) else self._path(reference)
+                by_itself = _is_linear(reference.file) and not is_tiled(reference.file)
+                self._path(reference) if by_itself else self._image(reference)
             except MissingFileError as error:
                 self._note_once(error.note("shown without it"))
                 del maps[key]

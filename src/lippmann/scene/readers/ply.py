@@ -106,12 +106,12 @@ def describe_polygons(
     textures: list[Texture | None] = []
     for name in header.textures or (_beside(path) if _UV_FACES in columns else []):
         try:
-            image = NamedFiles.of(path, files).find(name, where=where, what="texture")
+            image = read_image(NamedFiles.of(path, files).find(name, where=where, what="texture"), where=where)
         except MissingFileError as error:
             notes.append(error.note("shown without it"))
             textures.append(None)
         else:
-            textures.append(Texture(read_image(image, where=where), srgb=True))
+            textures.append(Texture(image, srgb=True))
     if textures and not mesh.uvs:
         notes.append("the texture is not used: the file gives no texture coordinates")
         textures = []
