@@ -371,9 +371,8 @@ def render_turntable(
     from lippmann.sequences.turntable import open_turntable
 
     _refuse_misplaced(options)
-    classic = options.get("integrator") == "classic"
     where = options_of_sequence(placement)
-    motion = open_turntable(_scene(scene), frames, swing=swing, placement=where, classic=classic)
+    motion = open_turntable(_scene(scene), frames, swing=swing, placement=where)
     report = progress or silent
     pictures = render_sequence(
         motion,

@@ -8,9 +8,7 @@ import pytest
 import lippmann
 from lippmann.options.placement import PlacementOptions
 from lippmann.scene.matrices import inverse, rotation, transform_points
-from lippmann.scene.turntable import move_lights, outline, swept_points, turn_about, turning_axis
-from lippmann.scene.values.whitted_surfaces import Background, ClassicLight
-from lippmann.scene.whitted.world_frame import world_from_scene
+from lippmann.scene.turntable import outline, swept_points, turn_about, turning_axis
 
 AXES = [(0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)]
 
@@ -69,29 +67,3 @@ def test_what_is_swept_is_round(teapot):
     assert high[0] - low[0] == pytest.approx(high[2] - low[2], rel=1e-9)
     assert (high - low)[1] == pytest.approx(np.ptp(teapot.bounds[:, 1]))
     assert high[0] - low[0] >= np.ptp(teapot.bounds[:, 0])
-
-
-def test_classic_light_moves_in_the_world():
-    """Tachyon's own coordinates have the z of the world negated."""
-    from dataclasses import replace
-
-    scene = lippmann.load_scene("gears")
-    light = ClassicLight("spot", center=(1.0, 2.0, 3.0), direction=(0.0, 0.0, 1.0))
-    plane = Background("sky-plane", up=(1.0, 1.0, 0.0), top_value=5.0, bottom_value=-1.0)
-    classic = replace(scene.classic, lights=(light,), background=plane)
-    turn = turn_about((0.0, 1.0, 0.0), (4.0, 0.0, -2.0), 40.0)
-    moved = move_lights(replace(scene, classic_form=classic), turn).classic
-    mirror = world_from_scene(classic)
-    before, after = (transform_points(mirror, np.array([one.lights[0].center])) for one in (classic, moved))
-    assert after == pytest.approx(transform_points(turn, before))
-    travels = turn[:3, :3] @ mirror[:3, :3] @ np.array(light.direction)
-    assert mirror[:3, :3] @ moved.lights[0].direction == pytest.approx(travels)
-    # A ray that goes along meets the same place of the gradient.
-    origin = np.array([[0.3, -0.7, 2.0]])
-    there = transform_points(mirror @ turn @ mirror, origin)
-    share = [
-        (float(place[0] @ np.array(one.background.up)) - one.background.bottom_value)
-        / (one.background.top_value - one.background.bottom_value)
-        for one, place in ((classic, origin), (moved, there))
-    ]
-    assert share[0] == pytest.approx(share[1])

@@ -227,12 +227,6 @@ def test_the_call_renders_a_whole_turn(engine, display):
     assert not np.array_equal(images[0].pixels, images[1].pixels)
 
 
-def test_the_form_for_the_classic_models_turns_where_it_is_asked_for():
-    teapot = lippmann.load_scene("teapot")
-    assert open_turntable(teapot, classic=True).scene(0).is_classic
-    assert not open_turntable(teapot).scene(0).is_classic
-
-
 @pytest.mark.parametrize(("count", "swing"), [(1, None), (0, None), (8, 0.0), (8, 361.0), (8, float("nan"))])
 def test_what_is_no_turn_is_refused(count, swing):
     with pytest.raises(UsageError, match=r"frames of a turn|at most 360 degrees"):

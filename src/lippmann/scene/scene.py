@@ -98,17 +98,27 @@ class Scene:
     @cached_property
     def classic(self) -> ClassicScene | None:
         """The scene in the terms of the classic light models; None where it has no such form."""
+        form = self._own_classic
+        if form is None or self.light_moved is None:
+            return form
+        from lippmann.scene.classic_light import move_light
+
+        return move_light(form, self.light_moved)
+
+    @cached_property
+    def _own_classic(self) -> ClassicScene | None:
+        """:attr:`classic` with its light where it was made."""
         return self.classic_form() if callable(self.classic_form) else self.classic_form
 
     @cached_property
     def physical(self) -> SceneDescription | MitsubaSource:
-        """The scene in the terms of physically based light."""
+        """The scene in the terms of physically based light, which is not moved yet."""
         if self.description is not None:
             return self.description
         from lippmann.scene.whitted.to_pbr import to_physical
 
-        assert self.classic is not None
-        return to_physical(self.classic, self.views)
+        assert self._own_classic is not None
+        return to_physical(self._own_classic, self.views)
 
     @property
     def is_classic(self) -> bool:
@@ -277,13 +287,15 @@ class Scene:
         )
 
     def with_light_moved(self, matrix: Matrix) -> Scene:
-        """The scene with its light moved by a rigid ``matrix`` (4x4); what was derived of its content is kept.
+        """The scene with its light sources, environment and background moved by a rigid ``matrix`` (4x4).
 
-        A form for the classic light models is left out: its light would not have moved.
+        Its shapes stay, and what was derived of them is kept. Light sources in a scene of Mitsuba's are parts of it and
+        stay, too; an environment that was given instead moves.
         """
+        _ = self.physical  # which all that are moved share
         moved = copy.copy(self)
         object.__setattr__(moved, "light_moved", matrix)
-        object.__setattr__(moved, "classic", None)
+        vars(moved).pop("classic", None)
         return moved
 
     @property

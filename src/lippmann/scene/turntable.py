@@ -7,10 +7,8 @@ go round the other way: that gives the same picture, of shapes that keep their p
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lippmann.options.placement import PlacementOptions
 from lippmann.scene.camera_placement import remove_scale
@@ -18,9 +16,6 @@ from lippmann.scene.matrices import Bounds, Vector, inverse, rotation, transform
 from lippmann.scene.placement import face_viewer
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Matrix
-from lippmann.scene.values.whitted_scene import ClassicScene
-from lippmann.scene.values.whitted_surfaces import Background, ClassicLight
-from lippmann.scene.whitted.world_frame import world_from_scene
 
 #: Steps (degrees) in which the outline of a scene and the space that it sweeps are measured. A circle's radius is exact
 #: to 0.1 %.
@@ -63,17 +58,6 @@ def turning_axis(scene: Scene, options: PlacementOptions) -> Vector:
     return axis[0], axis[1], axis[2]
 
 
-def move_lights(scene: Scene, matrix: Matrix) -> Scene:
-    """The scene with its light sources, environment and background moved by a rigid ``matrix``; its shapes stay.
-
-    Light sources in a scene of Mitsuba's are parts of it and stay, too; an environment that was given instead moves.
-    """
-    if scene.description is not None:
-        return scene.with_light_moved(matrix)
-    assert scene.classic is not None
-    return replace(scene, classic_form=_move_classic_lights(scene.classic, matrix))
-
-
 def outline(scene: Scene, axis: Vector, center: Vector | Bounds) -> Bounds:
     """Points ``(n, 3)`` whose convex hull, a prism along ``axis``, is the least one of so many sides about the scene.
 
@@ -112,34 +96,3 @@ def _frame_along(axis: Vector) -> Matrix:
     matrix = np.eye(4)
     matrix[:3, :3] = np.stack([right, up, np.cross(right, up)])
     return matrix
-
-
-def _move_classic_lights(scene: ClassicScene, matrix: Matrix) -> ClassicScene:
-    """``matrix`` moves in the world, whose z the scene's own numbers may have negated."""
-    mirror = world_from_scene(scene)
-    own = mirror @ matrix @ mirror
-    lights = tuple(_move_light(light, own) for light in scene.lights)
-    return replace(scene, lights=lights, background=_move_background(scene.background, own))
-
-
-def _move_light(light: ClassicLight, matrix: Matrix) -> ClassicLight:
-    center = transform_points(matrix, np.asarray([light.center], np.float64))[0]
-    direction = matrix[:3, :3] @ np.asarray(light.direction, np.float64)
-    return replace(light, center=_vector(center), direction=_vector(direction))
-
-
-def _move_background(background: Background, matrix: Matrix) -> Background:
-    up = matrix[:3, :3] @ np.asarray(background.up, np.float64)
-    # A gradient over a plane is told by places, which move along.
-    offset = float(up @ matrix[:3, 3]) if background.kind == "sky-plane" else 0.0
-    return replace(
-        background,
-        up=_vector(up),
-        top_value=background.top_value + offset,
-        bottom_value=background.bottom_value + offset,
-    )
-
-
-def _vector(values: NDArray[np.float64]) -> Vector:
-    x, y, z = values.tolist()
-    return x, y, z

@@ -18,7 +18,6 @@ from lippmann.scene.placement import Placement, face_viewer, place
 from lippmann.scene.scene import Scene
 from lippmann.scene.turntable import (
     STEP,
-    move_lights,
     swept_points,
     turn_about,
     turning_axis,
@@ -86,7 +85,7 @@ class Turntable(Motion):
         return 360.0 * share if self._swing is None else self._swing / 2.0 * math.sin(2.0 * math.pi * share)
 
     def scene(self, frame: int) -> Scene:
-        return move_lights(self._scene, self.display_turn(frame))
+        return self._scene.with_light_moved(self.display_turn(frame))
 
     def camera(self, frame: int, name: str | None) -> Camera | None:
         return None
@@ -156,7 +155,6 @@ def open_turntable(
     *,
     swing: float | None = None,
     placement: PlacementOptions | None = None,
-    classic: bool = False,
 ) -> Turntable:
     """A scene on a turntable, upright as the viewer sees it.
 
@@ -170,16 +168,12 @@ def open_turntable(
         Degrees from one end of the swing to the other; None for a whole turn.
     placement:
         How the display will be placed: the axis of the scene that stands most upright before it is turned about.
-    classic:
-        Whether a scene with a form for the classic light models turns in that form.
 
     Raises
     ------
     UsageError, SceneError
         A number is out of range; the camera of the placement is not found.
     """
-    if classic and scene.classic is not None:
-        scene = replace(scene, description=None, views=scene.cameras)
     axis = turning_axis(scene, placement or PlacementOptions())
     return Turntable(scene, TURNTABLE_FRAMES if frames is None else frames, swing=swing, axis=axis)
 

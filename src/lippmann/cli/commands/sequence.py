@@ -197,13 +197,7 @@ def open_moving(source: SceneSource, spec: SequenceOptions, request: RenderReque
         # A scene of Mitsuba's tells its box only once the engine runs, and that on the device that was asked for.
         engine.start(request.device, request.threads)
         placement = request.placement if isinstance(request.placement, PlacementOptions) else None
-        return open_turntable(
-            source.load(),
-            spec.turntable,
-            swing=spec.swing,
-            placement=placement,
-            classic=request.integrator == "classic",
-        )
+        return open_turntable(source.load(), spec.turntable, swing=spec.swing, placement=placement)
     from lippmann.sequences.motion import open_motion
 
     return open_motion(
