@@ -58,15 +58,6 @@ def render(checkout: Checkout, film: Film, display: str, frames: range, out: Pat
     return checkout.run(_PROGRAM, [*words, *more, "-o", str(out / "%04d.png")])
 
 
-def longer(last: int) -> dict[str, range]:
-    """Frames of the longer command: those up to the 32nd hold as many key frames as any 32, of camera paths one.
-
-    The earlier version renders all frames alike: every eighth of the same ones stands for them, as those of a turntable
-    differ in samples by up to seven times.
-    """
-    return {"other": range(0, last + 1, 8), "today": range(last + 1)}
-
-
 def read(folder: Path) -> list[Any]:
     import lippmann
 
@@ -111,18 +102,18 @@ def references(checkout: Checkout, film: Film, display: str, folder: Path) -> li
 
 def measure(checkouts: dict[str, Checkout], film: Film, scratch: Path, options: argparse.Namespace) -> dict[str, Any]:
     """Figures of one film by checkout."""
-    display, many = options.display, longer(options.last)
+    display, many = options.display, range(options.last + 1)
     sides: dict[str, dict[str, Any]] = {name: {} for name in checkouts}
     for name, checkout in checkouts.items():
         (scratch / name).mkdir()
         (scratch / "timed" / name).mkdir(parents=True)
         render(checkout, film, display, JUDGED, scratch / name)
-        render(checkout, film, display, many[name], scratch / "timed" / name)  # compiles the kernels of all frames
+        render(checkout, film, display, many, scratch / "timed" / name)  # compiles the kernels of all frames
     spent: dict[tuple[str, range], list[dict[str, float]]] = {}
     for _ in range(options.runs):
         for name, checkout in checkouts.items():
             out = scratch / "timed" / name
-            for frames in (FEW, many[name]):
+            for frames in (FEW, many):
                 spent.setdefault((name, frames), []).append(render(checkout, film, display, frames, out))
     medians = {
         key: {what: statistics.median(run[what] for run in runs) for what in ("cpu", "peak")}
@@ -131,8 +122,8 @@ def measure(checkouts: dict[str, Checkout], film: Film, scratch: Path, options: 
     images = {name: read(scratch / name) for name in checkouts}
     shows = {name: [all_[0].provenance.options.get(key) for key in SHOWN] for name, all_ in images.items()}
     for name, side in sides.items():
-        side["seconds"] = (medians[name, many[name]]["cpu"] - medians[name, FEW]["cpu"]) / len(many[name][1:])
-        side |= {"still_peak": medians[name, FEW]["peak"], "peak": medians[name, many[name]]["peak"]}
+        side["seconds"] = (medians[name, many]["cpu"] - medians[name, FEW]["cpu"]) / options.last
+        side |= {"still_peak": medians[name, FEW]["peak"], "peak": medians[name, many]["peak"]}
         first = images[name][0].provenance
         side |= {"spp": first.spp, "stated": (first.estimate or {}).get("psnr")}
     measured = {**sides, "runs": options.runs, "last": options.last}
@@ -169,7 +160,7 @@ def main() -> None:
     parser.add_argument("--given", type=Path, help="folder of models that somebody else made")
     parser.add_argument("--time-only", action="store_true", help="no references: time and memory alone")
     parser.add_argument("--runs", type=int, default=3, help="whose median counts: single ones may differ by a quarter")
-    parser.add_argument("--last", type=int, default=32, help="last frame that is timed, a multiple of 8")
+    parser.add_argument("--last", type=int, default=32, help="last frame that is timed")
     parser.add_argument("--cache", type=Path, default=Path.home() / ".cache" / "lippmann-benchmarks")
     options = parser.parse_args()
     known, missing = films(options.cache, options.given)

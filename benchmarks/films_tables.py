@@ -24,9 +24,8 @@ def describe(result: dict[str, Any]) -> str:
 their own with compiled kernels, in turn; commit {before} and, after the arrows,
 {", ".join(commits)}.
 The time of a frame is the difference of their processor seconds over that of their frames. Many are the frames up to
-the one that the table names, every eighth of them on the other side; it is the median of so many runs. A still is the
-first frame alone. Turntables have 48 frames, the swing covers 40 degrees. Films in italics are of bundled scenes; no
-setting was tuned on the others.
+the one that the table names; it is the median of so many runs. A still is the first frame alone. Turntables have 48
+frames, the swing covers 40 degrees. Films in italics are of bundled scenes; no setting was tuned on the others.
 
 {(chr(10) * 2).join(parts)}
 """
