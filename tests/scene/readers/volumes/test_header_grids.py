@@ -106,6 +106,18 @@ def test_rows_of_a_metaimage_s_matrix_are_directions(tmp_path):
 
 
 @pytest.mark.parametrize(
+    "names", ["data file: slice%02d.raw 1 4 1 2", "data file: LIST\nslice01.raw\nslice02.raw\nslice03.raw\nslice04.raw"]
+)
+def test_a_file_for_each_slice(tmp_path, names):
+    header = NRRD.format(kind="short", endian="little", encoding="raw", more="", **LPS).rstrip()
+    (tmp_path / "a.nhdr").write_text(f"{header}\n{names}\n")
+    for number, part in enumerate(GRID, 1):
+        (tmp_path / f"slice{number:02}.raw").write_bytes(part.tobytes())
+    (tmp_path / "b.nrrd").write_bytes(f"{header}\n\n".encode() + GRID.tobytes())
+    assert (volume_of(tmp_path / "a.nhdr").grid == volume_of(tmp_path / "b.nrrd").grid).all()
+
+
+@pytest.mark.parametrize(
     ("change", "said"),
     [
         (("short", "block"), "has a header without sense"),
@@ -122,7 +134,9 @@ def test_rows_of_a_metaimage_s_matrix_are_directions(tmp_path):
         (("kinds: domain", "kinds: vector"), "2 values a voxel, vector; one is read"),
         (("sizes: 2 3 4", "sizes: 2 3 5"), "holds 48 of 60 bytes of voxels"),
         (("(0,0,3)", "(0,2,0)"), "its voxels have no extent"),
-        (("key:=value", "data file: LIST"), "names a file for each slice"),
+        (("key:=value", "data file: LIST"), "names 0 files of voxels"),
+        (("key:=value", "data file: a%d.raw 1 5 1"), "names 5 files of voxels; each holds as many of them"),
+        (("key:=value", "data file: a%d.raw 1 4 1"), "file of voxels 'a1.raw' not found"),
         (("key:=value", "data file: ../b.raw"), "allow_outside"),
     ],
 )

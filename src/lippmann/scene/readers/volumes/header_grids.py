@@ -54,6 +54,8 @@ _BYTES_PER_BYTE = 32
 _WORLD_FROM_SLICES = np.diag([1.0, -1.0, -1.0, 1.0])
 #: Kinds of axes along which places, and not the numbers of one voxel, lie.
 _PLACES = ("domain", "space", "time", "none", "???")
+#: Files with a slice each: the pattern of their names, with the first and last number and the step.
+_NUMBERED, _MOST_FILES = re.compile(r"([^%]*%0?\d?d[^%\s]*)\s+(-?\d+)\s+(-?\d+)\s+(-?\d+)(?:\s+\d+)?"), 1 << 16
 _LINE = re.compile(r"\s*([^:=#]+?)\s*[:=]\s*(.*?)\s*")
 
 
@@ -104,11 +106,30 @@ def read_header_grid(path: Path, *, files: NamedFiles) -> SceneDescription:
     shape = [*sizes, 1][2::-1]
     size = math.prod(shape) * grid.dtype.itemsize
     check_input(size + 4 * math.prod(shape), f"{' x '.join(map(str, sizes))} voxels", where=where)
-    if grid.file is not None:
-        if "%" in grid.file or grid.file.startswith("LIST"):
-            raise SceneError("names a file for each slice", where=where, rule="voxels in one file are read")
-        data = read_bytes(files.find(grid.file, where=where, what="file of voxels"))
-    start = 0 if grid.file is not None or end is None else end.end()
+    if grid.file is None:
+        body = _voxels(data, 0 if end is None else end.end(), size, grid, where)
+    else:
+        names = _file_names(grid.file, data[:_MOST_HEADER].decode("latin-1"))
+        if not names or size % len(names):
+            raise SceneError(f"names {len(names)} files of voxels", where=where, rule="each holds as many of them")
+        found = (files.find(name, where=where, what="file of voxels") for name in names)
+        body = b"".join(_voxels(read_bytes(part), 0, size // len(names), grid, where) for part in found)
+    return describe_volume(path.stem, np.frombuffer(body, grid.dtype).reshape(shape), grid.matrix, notes=grid.notes)
+
+
+def _file_names(file: str, header: str) -> list[str]:
+    """Files that hold the voxels one after the other: numbered by a pattern, in a list that ends the header, or one."""
+    if file.split()[0] == "LIST":
+        listed = re.split(r"[:=]\s*LIST[^\n]*\n", re.split(r"\r?\n\r?\n", header)[0], maxsplit=1)[1:]
+        return [line.strip() for line in "".join(listed).splitlines() if line.strip()]
+    if (numbered := _NUMBERED.fullmatch(file)) is None:
+        return [file]
+    first, last, step = map(int, numbered.groups()[1:])
+    return [numbered[1] % number for number in range(first, last + 1, step)[:_MOST_FILES]] if step else []
+
+
+def _voxels(data: bytes, start: int, size: int, grid: _Grid, where: str) -> bytes:
+    """``size`` bytes of voxels, unpacked, of a file in which they or what stands before them begin at ``start``."""
     for _ in range(grid.lines):
         if (start := data.find(b"\n", start) + 1) == 0:
             raise SceneError(f"has no {grid.lines} lines before its voxels", where=where, fix="is it whole?")
@@ -117,7 +138,7 @@ def read_header_grid(path: Path, *, files: NamedFiles) -> SceneDescription:
         check_input(_BYTES_PER_BYTE * len(data), "voxels as text", where=where)
         try:
             words = data[start + skip :].replace(b",", b" ").split()
-            body = np.array(words[: math.prod(shape)], np.float64).astype(grid.dtype).tobytes()
+            body = np.array(words[: size // grid.dtype.itemsize], np.float64).astype(grid.dtype).tobytes()
         except ValueError as error:
             raise SceneError(f"holds voxels that are no numbers ({error})", where=where, fix="is it whole?") from None
     elif grid.encoding != "raw":
@@ -131,7 +152,7 @@ def read_header_grid(path: Path, *, files: NamedFiles) -> SceneDescription:
         body = data[-size:] if grid.skip < 0 else data[start + skip : start + skip + size]
     if len(body) < size:
         raise SceneError(f"holds {len(body)} of {size} bytes of voxels", where=where, fix="is it whole?")
-    return describe_volume(path.stem, np.frombuffer(body, grid.dtype).reshape(shape), grid.matrix, notes=grid.notes)
+    return body
 
 
 def _matrix(steps: NDArray[np.float64], origin: NDArray[np.float64]) -> NDArray[np.float64]:
