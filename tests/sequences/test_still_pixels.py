@@ -126,17 +126,38 @@ def test_a_frame_is_the_same_alone_and_after_others(frames, display):
     np.testing.assert_array_equal(alone.pixels, frames[5].pixels)
 
 
-def test_two_probes_that_change_leave_no_patch_but_an_even_change_and_a_narrow_one_are_found():
+def covered_job(size):
+    """A job whose picture of ``size x size`` pixels surfaces cover."""
     from lippmann.rendering.film.wavefront import Coverage
-    from lippmann.sequences.still_pixels import _find_still, _Picture
 
-    coverage = Coverage(np.ones((64, 64, 1), np.float32), 6)
-    job = SimpleNamespace(
+    coverage = Coverage(np.ones((size, size, 1), np.float32), 6)
+    return SimpleNamespace(
         denoiser=SimpleNamespace(coverage=lambda: (coverage, coverage)),
         session=SimpleNamespace(engine=SimpleNamespace(threads=1)),
-        source=SimpleNamespace(width=64),
-        sample_source=SimpleNamespace(width=64),
+        source=SimpleNamespace(width=size),
+        sample_source=SimpleNamespace(width=size),
     )
+
+
+def test_a_change_of_light_that_few_paths_bring_is_found():
+    from lippmann.sequences.still_pixels import _find_still, _Picture
+
+    # As beside a board that a lamp close by lights: one path in 70 meets it, and brings a fifth of the light.
+    size = 160
+    row, column = np.indices((size, size))
+    is_probed = ((row + 2 * column) % 4 == 0)[..., None]
+    light = np.where(np.random.default_rng(1).random((size, size, 1)) < 1 / 70, 15.0, 1.0) * np.ones(3)
+    whole, nothing = np.ones((size, size, 3)), np.zeros((size, size))
+    probes, after = (np.where(is_probed, part, np.nan) for part in (light, whole))
+    key = _Picture(PixelWindow(0, 0, size, size), whole, nothing, probes, whole, None, nothing > 0)
+    assert _find_still(key, key, covered_job(size)).all()
+    assert not _find_still(key, replace(key, probes=after), covered_job(size)).any()
+
+
+def test_two_probes_that_change_leave_no_patch_but_an_even_change_and_a_narrow_one_are_found():
+    from lippmann.sequences.still_pixels import _find_still, _Picture
+
+    job = covered_job(64)
     row, column = np.indices((64, 64))
     whole = np.ones((64, 64, 3))
     probes = np.where(((row + 2 * column) % 4 == 0)[..., None], whole, np.nan)

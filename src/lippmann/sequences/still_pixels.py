@@ -8,7 +8,8 @@ knowledge of what has moved:
 * Where a surface is seen, *probes* of the key frame and of this one agree around the pixel: single paths of every
   fourth pixel with the same random numbers, which differ only where they meet another surface or another shadow (the
   temporal gradient of Schied et al. 2018, "Gradient Estimation for Real-Time Adaptive Temporal Filtering"). Narrow
-  shadows, which few of these meet, are found by paths of every pixel that end at the first surface.
+  shadows, which few of these meet, are found by paths of every pixel that end at the first surface. Light that bounces
+  off what moves, which few paths bring, is found in wide neighbourhoods.
 
 Probes know no caustics, which paths hardly find: pictures with photons are traced whole. So are those whose light
 sources move, all of whose pixels change.
@@ -210,28 +211,44 @@ def _trace_probes(job: Job, window: PixelWindow) -> tuple[Floats, Floats, RayTot
 def _find_still(key: _Picture, own: _Picture, job: Job) -> Mask:
     """The pixels ``(H, W)`` that show the same light in both pictures."""
     is_same = key.features == own.features
-    is_agreed = _find_agreed(key.probes, own.probes, is_same, TUNING.probe_reach, job)
-    is_agreed &= _find_agreed(key.direct, own.direct, is_same, TUNING.direct_reach, job)
+    is_agreed = is_same & _find_agreed(key.direct, own.direct, is_same, TUNING.direct_reach, job)
+    # Few paths bring much of the light that bounces off a bright surface. As shares of their own light they count too
+    # little, and in small neighbourhoods they are too few.
+    change, light = (np.where(is_agreed, np.nan_to_num(part), 0) for part in _compare(key.probes, own.probes))
+    is_agreed &= _is_little(change, light, TUNING.bounce_reach, job)
+    is_agreed &= _find_agreed(key.probes, own.probes, is_same, TUNING.probe_reach, job)
     is_still = is_same & (is_agreed | (sum_coverage(job) == 0))
     return np.asarray(is_still.reshape(len(is_still), -1, count_columns(job)).all(axis=2))
 
 
+def _compare(key: Floats, own: Floats) -> tuple[Floats, Floats]:
+    """Change and light ``(H, columns W)`` of probes ``(H, columns W, 3)``, NaN where there are none."""
+    return np.abs(own - key).sum(axis=2), (own + key).sum(axis=2)
+
+
 def _find_agreed(key: Floats, own: Floats, is_same: Mask, reach: int, job: Job) -> Mask:
     """Where probes ``(H, columns W, 3)`` agree in the mean over ``reach`` pixels to either side."""
-    from lippmann.rendering.denoise.noisy_blend import mean_around
-    from lippmann.runtime.row_threads import Bands
-
-    change, light = np.abs(own - key).sum(axis=2), (own + key).sum(axis=2)
+    change, light = _compare(key, own)
     is_probed, is_lit = ~np.isnan(light), light > 0
     # Beside another surface light is taken to change, too.
     change = np.where(is_same, np.divide(change, light, out=np.zeros_like(light), where=is_lit), is_lit)
-    bands = Bands(job.session.engine.threads)
-    parts = change, np.square(change), is_lit, is_probed
-    change, squares, lit, probed = (mean_around(part.astype(np.float32), reach, bands) for part in parts)
-    # Less its standard error: a few long paths that meet what moves would leave patches of grain on clean surfaces.
-    change -= np.sqrt(squares) / (2 * reach + 1)
     # Where no probe finds light in either frame, such as on the outer side of a wall, there is none to change.
-    return np.asarray((probed > 0) & (change <= TUNING.largest_change * lit))
+    return (_mean_around(is_probed, reach, job) > 0) & _is_little(change, is_lit, reach, job)
+
+
+def _is_little(change: NDArray[Any], light: NDArray[Any], reach: int, job: Job) -> Mask:
+    """Where the mean change, less its standard error, is at most the limit's share of the mean light."""
+    # Less its standard error: a few long paths that meet what moves would leave patches of grain on clean surfaces.
+    error = np.sqrt(_mean_around(np.square(change), reach, job)) / (2 * reach + 1)
+    sure = _mean_around(change, reach, job) - error
+    return np.asarray(sure <= TUNING.largest_change * _mean_around(light, reach, job))
+
+
+def _mean_around(values: NDArray[Any], reach: int, job: Job) -> Floats:
+    from lippmann.rendering.denoise.noisy_blend import mean_around
+    from lippmann.runtime.row_threads import Bands
+
+    return mean_around(values.astype(np.float32), reach, Bands(job.session.engine.threads))
 
 
 __all__ = ["StillPixels"]

@@ -28,6 +28,8 @@ class FilmTuning:
         Pixels to either side whose probes are averaged.
     direct_reach:
         Likewise, of those of direct light.
+    bounce_reach:
+        Likewise, of probes whose change counts as a share of all light (``docs/research/films.md`` has half).
     largest_change:
         Largest mean change of probes, less its standard error, as a share of the light of both.
     least_traced:
@@ -46,6 +48,7 @@ class FilmTuning:
     pixels_of_probe: int = 4
     probe_reach: int = 8
     direct_reach: int = 2
+    bounce_reach: int = 64
     largest_change: float = 0.02
     least_traced: float = 0.01
     moments: int = 65
