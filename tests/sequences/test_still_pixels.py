@@ -30,8 +30,8 @@ class Sliding(Motion):
     count = 6
     content = None
 
-    def __init__(self, places=(-12, -12, -9, -6, -3, 0), wall=30):
-        self.places, self.wall = places, wall
+    def __init__(self, places=(-12, -12, -9, -6, -3, 0), wall=30, size=5):
+        self.places, self.wall, self.size = places, wall, size
 
     def scene(self, frame):
         corners = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], np.float32)
@@ -44,7 +44,7 @@ class Sliding(Motion):
                 "sliding",
                 [box],
                 [Material(base_color=(0.7, 0.5, 0.3), roughness=0.5)],
-                [Instance(0, translation((self.places[frame], 0, 4)) @ scaling(5)), Instance(0, wall)],
+                [Instance(0, translation((self.places[frame], 0, 4)) @ scaling(self.size)), Instance(0, wall)],
                 lights=[Light("point", (6000.0, 6000.0, 6000.0), translation((20, 30, 60)))],
             )
         )
@@ -86,6 +86,12 @@ def test_pixels_are_found_in_another_window(display):
     assert 0.03 < np.mean(kept & (key.pixels > 0).all(axis=2)) < 0.9
     np.testing.assert_array_equal(after.pixels[kept], key.pixels[kept])
     assert not kept[(after.pixels > 0).all(axis=2) & (key.pixels == 0).all(axis=2)].any()
+
+
+def test_where_more_than_a_third_changes_all_is_traced(display):
+    _, after = dict(render_sequence(Sliding((-6, 0), size=18), display, range(2), **PATHS)).values()
+    assert "reprojected" not in after.provenance.pixel_shares
+    assert (after.maps[SAMPLES_LAYER] > 0).all()
 
 
 @pytest.mark.slow

@@ -12,7 +12,8 @@ knowledge of what has moved:
   off what moves, which few paths bring, is found in wide neighbourhoods.
 
 Probes know no caustics, which paths hardly find: pictures with photons are traced whole. So are those whose light
-sources move, all of whose pixels change.
+sources move, all of whose pixels change, and those in which so much changes that little is saved: probes miss a part of
+the light that bounces off large things.
 """
 
 from __future__ import annotations
@@ -121,7 +122,7 @@ class StillPixels(KeyLight):
             key, features=_hash_features(job), probes=probes, direct=direct, is_swept=np.ones_like(key.is_swept)
         )
         is_known = _find_still(key, own, job)
-        if not is_known.any():
+        if np.mean(is_known) < TUNING.least_known:
             return trace(job)
         traced = trace_others(job, key.pixels, is_known)
         traced.frame.rays += rays

@@ -32,6 +32,9 @@ class FilmTuning:
         Likewise, of probes whose change counts as a share of all light (``docs/research/films.md`` has half).
     largest_change:
         Largest mean change of probes, less its standard error, as a share of the light of both.
+    least_known:
+        Least share of pixels that show the same light, else all are traced (``docs/research/films.md`` has half and
+        three quarters).
     least_traced:
         Least share of traced pixels by which flicker is estimated: it is finite where none was, at 20 dB more.
     moments:
@@ -50,6 +53,7 @@ class FilmTuning:
     direct_reach: int = 2
     bounce_reach: int = 64
     largest_change: float = 0.02
+    least_known: float = 2 / 3
     least_traced: float = 0.01
     moments: int = 65
     rounding: float = 1e-3
