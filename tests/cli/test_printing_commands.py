@@ -117,7 +117,7 @@ def test_bad_prints_are_one_line_and_code_2(lippmann, tmp_path, words, said):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("render", "teapot", "--display", "print"), "--ppi: ppi is missing; a print needs lpi"),
+        (("render", "teapot", "--display", "print"), "--lpi: lpi, ppi, size are missing; a print needs lpi"),
         (("render", "teapot", "--display", "print", "--ppi", "720", "--size", "9x9cm"), "--lpi: lpi is missing"),
         (("render", "teapot", "--lpi", "60"), "--lpi: does not apply to the display seed-lenticular"),
         (("render", "teapot", "--display", SHORT, "--ppi", "60"), "--ppi: does not apply to the display print:"),
@@ -137,7 +137,7 @@ def test_bad_prints_are_one_line_and_code_2(lippmann, tmp_path, words, said):
         (("weave", "absent.png", "-d", "lkg-portrait", "--marks", "8mm"), "--marks: does not apply to the display"),
         (("pitch-test", *SHEET, "--strips", "0"), "0 is out of range"),
         (("pitch-test", *SHEET, "--step", "-1"), "-1 is out of range"),
-        (("pitch-test",), "--ppi: ppi is missing"),
+        (("pitch-test",), "--lpi: lpi, ppi, size are missing"),
         (("marks", "absent.tif"), "absent.tif: no such file"),
     ],
 )

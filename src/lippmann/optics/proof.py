@@ -187,7 +187,7 @@ def prove(display: Display) -> Proof:
     --------
     >>> from lippmann.optics.proof import prove
     >>> prove(lippmann.load_display("print-60lpi")).advice
-    'keep the scene within 4.59 mm in front of and behind the lenses; ...'
+    'keep the scene within 4.59 mm in front of and behind the lenses ...'
     """
     check_display(display)
     if display.stereo is not None:

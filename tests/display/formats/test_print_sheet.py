@@ -165,7 +165,7 @@ def test_lengths_have_units():
         ({"lpi": "1", "ppi": "72", "viewing-distance": "60mm"}, "viewing-distance", "look from farther away"),
         ({"paper": "A4"}, "paper", "unknown key 'paper'"),
         ({"bleed": "3mm"}, "bleed", "bleed is no number of the lens sheet; say it beside the print: bleed=..."),
-        ({"ppi": None, "size": None}, "ppi", "ppi and size are missing; a print needs lpi"),
+        ({"ppi": None, "size": None}, "ppi", "ppi, size are missing; a print needs lpi"),
     ],
 )
 def test_nonsense_is_refused(texts, where, said):

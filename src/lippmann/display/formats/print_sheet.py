@@ -341,9 +341,10 @@ def print_of_texts(texts: Mapping[str, str]) -> Print:
                 f"{key} is no number of the lens sheet", where=key, fix=f"say it beside the print: {key}=..."
             )
     refuse_unknown(texts, KEYS)
-    if missing := [key for key in ("ppi", "size") if key not in texts]:
-        what = f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
-        raise DisplayError(what, where=missing[0], rule="a print needs lpi (or print-lpi), ppi and size")
+    needed = ({"lpi", "print-lpi", "sheet"}, {"ppi"}, {"size"})
+    if missing := [min(keys) for keys in needed if not keys & texts.keys()]:
+        what = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+        raise DisplayError(what, where=missing[0], rule="a print needs lpi (or print-lpi, or sheet), ppi and size")
     numbers = {key: validation.plain_number(texts[key], key) for key in _NUMBERS if key in texts}
     lengths = {
         key: validation.length(texts[key], key, unit="", rule=length_rule(key, validation.LENGTH))
