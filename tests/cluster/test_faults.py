@@ -14,7 +14,7 @@ from urllib.request import urlopen
 import psutil
 import pytest
 
-from lippmann.errors import ClusterError
+from lippmann.errors import ClusterError, UsageError
 
 TILES = 16
 #: Of a picture that is the same byte by byte wherever its tiles are rendered.
@@ -263,7 +263,7 @@ def test_encrypted_connections(lab, here, tmp_path, until):
     with connect(parse_target(address), TlsFiles(certificate, certificate, key)) as cluster:
         api.render_to_file("primitives", output, runner=runner_on(cluster), **OPTIONS)
     assert output.read_bytes() == here
-    with pytest.raises(ClusterError), connect(parse_target(address)):
+    with pytest.raises(UsageError, match="tls_ca: is missing"), connect(parse_target(address)):
         pass
 
 
