@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -61,16 +62,22 @@ def read_frames(path: Path, most: int = MOST_FRAMES) -> list[Photograph]:
     MemoryLimitError
         Its pixels take more than the memory that is left.
     """
-    with _opened(path, 1) as (film, stream):
-        count = sum(packet.size > 0 for packet in film.demux(stream))
+    count = count_frames(path)
     chosen = set(np.rint(np.linspace(0, count - 1, min(count, most))).tolist())
     notes = (f"of the film's {count} frames {len(chosen)} are shown, evenly spaced",) if len(chosen) < count else ()
     with _opened(path, len(chosen)) as (film, stream):
-        frames = [frame for number, frame in enumerate(film.decode(stream)) if number in chosen]
+        decoded = islice(film.decode(stream), int(max(chosen, default=-1)) + 1)
+        frames = [frame for number, frame in enumerate(decoded) if number in chosen]
     # PyAV before 14 does not tell the rotation.
     turns = [round(getattr(frame, "rotation", 0) / 90) for frame in frames]
     codes = [np.rot90(frame.to_ndarray(format="rgb24"), turn) for frame, turn in zip(frames, turns, strict=True)]
     return [Photograph.of_codes(each, b"", notes) for each in codes]
+
+
+def count_frames(path: Path) -> int:
+    """Number of a film's frames, none of which is decoded; errors as of :func:`read_frames`."""
+    with _opened(path, 1) as (film, stream):
+        return sum(packet.size > 0 for packet in film.demux(stream))
 
 
 @contextmanager

@@ -184,12 +184,12 @@ def ending_of_views(source: Path) -> str:
     as of :func:`read_views` and :func:`read_film`.
     """
     if source.is_file():
-        from lippmann.codecs.film_views import read_frames
+        from lippmann.codecs.film_views import MOST_FRAMES, count_frames, read_frames
 
-        frames = read_frames(source)
-        aspect = frames[0].size[0] / frames[0].size[1]
-        columns = max(1, round(math.sqrt(len(frames) / aspect)))  # a few frames may be left out
-        return QuiltLayout(columns, max(1, len(frames) // columns), float(f"{aspect:.6g}")).ending
+        count, (width, height) = min(count_frames(source), MOST_FRAMES), read_frames(source, 1)[0].size
+        aspect = width / height
+        columns = max(1, round(math.sqrt(count / aspect)))  # a few frames may be left out
+        return QuiltLayout(columns, max(1, count // columns), float(f"{aspect:.6g}")).ending
     paths, _ = _list_numbered(source)
     with open_view(paths[0]) as file:
         count, aspect = len(paths), file.size[0] / file.size[1]
