@@ -150,11 +150,13 @@ class KeyFrames:
             key = kept[1]
         if key.made.estimate is None or "by_chance" not in key.made.estimate:
             return None
+        if not may_have_halves:
+            return key
         # A steady flight leaves its key frame's view behind, too: it has halves again as often as other films do.
         # So have pictures that are traced whole, such as those with photons.
         shared = self._shared
         follows = shared and shared.has_light and not is_cut(key.moment, moment, self._display)
-        return key if follows or not may_have_halves else None
+        return key if follows else None
 
 
 def list_frames_before(frame: int, request: RenderRequest, shared: KeyLight | None) -> list[int]:

@@ -16,12 +16,7 @@ from lippmann.scene.matrices import Bounds, Vector, inverse, transform_points
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.placement import Placement, face_viewer, place
 from lippmann.scene.scene import Scene
-from lippmann.scene.turntable import (
-    STEP,
-    swept_points,
-    turn_about,
-    turning_axis,
-)
+from lippmann.scene.turntable import STEP, swept_points, turn_about, turning_axis
 from lippmann.scene.values.description import Camera, Matrix
 from lippmann.sequences.motion import Motion
 
